@@ -1,0 +1,35 @@
+"""Every error this library raises on purpose, under one base class."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class MobeeError(Exception):
+    """What was given, where, what is valid, and what to do next, in one message."""
+
+
+class RobotFileError(MobeeError):
+    """A robot or world file that cannot be read: file, line, field and remedy are in the message."""
+
+
+class InvalidValue(MobeeError, ValueError):
+    """An argument with the wrong shape, unit or range."""
+
+
+class UnknownName(MobeeError, KeyError):
+    """A name that the robot, the world or a table does not have."""
+
+    def __init__(self, kind: str, given: str, valid: Iterable[str]) -> None:
+        names = sorted(valid)
+        near = difflib.get_close_matches(given, names, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        super().__init__(f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names) or 'none'}.")
+
+    def __str__(self) -> str:  # KeyError would print the repr of the message
+        return str(self.args[0])
+
+
+class ActionInterrupted(MobeeError):
+    """An action that ended without an outcome (hold, fault, or a new run): it is not an observation."""

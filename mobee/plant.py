@@ -1,0 +1,39 @@
+"""The Plant: the one face through which an agent acts, offline and live."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from mobee.robot.robot import Array, Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """How an action ended.
+
+    `q`: (n_part,) rad as the encoders say.  `settled`: False means timeout, still an observation.
+    `duration`: s of plant time.  `touched`: names of world objects in contact (fields included) at the end.
+    """
+
+    q: Array
+    settled: bool
+    duration: float
+    touched: tuple[str, ...] = ()
+
+
+class Plant(Protocol):
+    """A robot one can act on (DESIGN section 2)."""
+
+    robot: Robot
+
+    def measure(self, part: str) -> Array:
+        """The part's motor positions as the encoders say now, shape (n_part,), in [rad]."""
+        ...
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """Set the part's attractor and wait until it settles or times out (thesis 6.1).
+
+        `target`: (n_part,) rad, all motors of the part.  Raises ActionInterrupted on hold, fault or a new run.
+        """
+        ...
