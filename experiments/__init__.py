@@ -1,0 +1,1 @@
+"""One readable file a claim: the claim, its source, the published number, the run that tests it."""

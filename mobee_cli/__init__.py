@@ -1,0 +1,1 @@
+"""The command `mobee`: one file a verb."""

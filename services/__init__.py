@@ -1,0 +1,1 @@
+"""The processes of the system; each decodes a message, calls the library and encodes the answer."""

@@ -1,0 +1,1 @@
+"""A curious agent that explores the configuration space of one part."""

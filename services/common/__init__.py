@@ -1,0 +1,1 @@
+"""What every service shares: session, delivery classes, Rate, life cycle, configuration, and the live Plant."""

@@ -1,0 +1,1 @@
+"""The MoBeE controller: forces and goals in, motor commands out, once a tick."""

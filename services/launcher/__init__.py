@@ -1,0 +1,1 @@
+"""The launcher: router, start order, supervision, status and stop."""

@@ -1,0 +1,1 @@
+"""The picture of the running system in Rerun: a browser page and a recording."""

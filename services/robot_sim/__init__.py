@@ -1,0 +1,1 @@
+"""The simulated robot: motors, safety gate, state streams and eye images."""
