@@ -1,0 +1,6 @@
+"""The contract between the processes: key expressions, messages, codec, version."""
+
+from bus_schema.codec import Refused, decode, encode, encoding_of
+from bus_schema.version import VERSION
+
+__all__ = ["VERSION", "Refused", "decode", "encode", "encoding_of"]

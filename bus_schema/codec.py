@@ -1,0 +1,110 @@
+"""msgpack on the wire: typed, versioned, length-checked and finite, or refused with a reason."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta, Struct
+
+from bus_schema.version import VERSION
+
+_S = TypeVar("_S", bound=Struct)
+_encoder = msgspec.msgpack.Encoder()
+
+
+class Refused(Exception):
+    """A message that must not be used; `reason` is what is counted: type, version, decode, length or value."""
+
+    def __init__(self, reason: str, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+def encoding_of(cls: type[Struct]) -> str:
+    """The encoding string that travels with a message of this type."""
+    return f"application/msgpack;icub/{cls.__name__}/{VERSION}"
+
+
+def encode(message: Struct) -> bytes:
+    """The message as msgpack."""
+    return _encoder.encode(message)
+
+
+def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = None, robot: int | None = None) -> _S:
+    """The message, if everything about it is right.
+
+    `part`, `robot`: number of motors that PartVector and RobotVector fields must have (None: not checked).
+    Raises Refused with the reason.
+    """
+    if encoding != encoding_of(cls):
+        _refuse_encoding(cls, encoding)
+    try:
+        message = _decoder(cls).decode(payload)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise Refused("decode", f"{cls.__name__}: {error}") from None
+    version = getattr(message, "v", VERSION)
+    if version != VERSION:
+        raise Refused("version", f"{cls.__name__}: version {version}, this side speaks {VERSION}")
+    _check_lengths(message, part=part, robot=robot)
+    if not _finite(message):
+        raise Refused("value", f"{cls.__name__}: NaN or infinity")
+    return message  # type: ignore[no-any-return]  # the decoder was made for cls
+
+
+def _refuse_encoding(cls: type[Struct], encoding: str) -> None:
+    name, _, version = encoding.removeprefix("application/msgpack;icub/").partition("/")
+    if name == cls.__name__ and version:
+        raise Refused("version", f"{cls.__name__}: version {version[:20]}, this side speaks {VERSION}")
+    raise Refused("type", f"expected {encoding_of(cls)!r}, got {encoding[:80]!r}")
+
+
+@cache
+def _decoder(cls: type[Struct]) -> msgspec.msgpack.Decoder[Any]:
+    return msgspec.msgpack.Decoder(cls)
+
+
+@cache
+def _vectors(cls: type[Struct]) -> tuple[tuple[str, str], ...]:
+    """(field, "part" or "robot") of every field whose length depends on the robot."""
+    found = []
+    for name, hint in get_type_hints(cls, include_extras=True).items():
+        kind = _length_kind(hint)
+        if kind:
+            found.append((name, kind))
+    return tuple(found)
+
+
+def _length_kind(hint: Any) -> str | None:
+    for meta in getattr(hint, "__metadata__", ()):
+        if isinstance(meta, Meta) and meta.extra and "length" in meta.extra:
+            return str(meta.extra["length"])
+    if get_origin(hint) is not None:
+        for inner in get_args(hint):
+            kind = _length_kind(inner)
+            if kind:
+                return kind
+    return None
+
+
+def _check_lengths(message: Struct, **lengths: int | None) -> None:
+    for name, kind in _vectors(type(message)):
+        expected, value = lengths[kind], getattr(message, name)
+        if expected is not None and value is not None and len(value) != expected:
+            raise Refused("length", f"{type(message).__name__}.{name}: {len(value)} numbers, expected {expected}")
+
+
+def _finite(value: Any) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, list):
+        if value and isinstance(value[0], float):
+            return math.isfinite(sum(value))
+        return all(_finite(item) for item in value)
+    if isinstance(value, dict):
+        return all(_finite(item) for item in value.values())
+    if isinstance(value, Struct):
+        return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
+    return True

@@ -1,0 +1,112 @@
+"""Typed streams on a session: headers stamped on the way out, everything checked and counted on the way in."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from typing import Any, Generic, TypeVar
+
+import zenoh
+import zenoh.ext
+from zenoh.handlers import RingChannel
+
+from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
+from bus_schema.messages import Event, Message
+from services.common.delivery import EVENTS, Delivery
+
+_M = TypeVar("_M", bound=Message)
+NO_RUN = "-"  # before the first clock message
+
+
+class Publisher(Generic[_M]):
+    """One stream of one type; numbers its messages."""
+
+    def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
+        self._bus, self._cls, self._seq = bus, cls, 0
+        settings: dict[str, Any] = {
+            "encoding": encoding_of(cls),
+            "congestion_control": delivery.congestion,
+            "priority": delivery.priority,
+            "express": False,  # a burst of express messages overflows its two-batch queue and is lost
+        }
+        if delivery.history:
+            cache = zenoh.ext.CacheConfig(max_samples=delivery.history)
+            self._publisher: Any = zenoh.ext.declare_advanced_publisher(bus.session, key, cache=cache, publisher_detection=True, **settings)
+        else:
+            self._publisher = bus.session.declare_publisher(key, **settings)
+
+    def put(self, *, k: int | None = None, t: int | None = None, **fields: Any) -> None:
+        """Send one message; k and t default to the bus clock's."""
+        bus = self._bus
+        message = self._cls(
+            v=VERSION,
+            run=bus.run,
+            src=bus.who,
+            seq=self._seq,
+            k=bus.k if k is None else k,
+            t=bus.t if t is None else t,
+            tw=time.monotonic_ns(),
+            **fields,
+        )
+        self._seq += 1
+        self._publisher.put(encode(message))
+
+
+class Latest(Generic[_M]):
+    """The newest message of a stream, polled; older ones are overwritten, never queued."""
+
+    def __init__(self, bus: Bus, key: str, cls: type[_M], part: str | None) -> None:
+        self._bus, self._cls, self._part = bus, cls, part
+        self._subscriber = bus.session.declare_subscriber(key, RingChannel(1))
+
+    def take(self) -> _M | None:
+        """The newest message since the last call, if there is one and it is right."""
+        sample = self._subscriber.try_recv()
+        return None if sample is None else self._bus.receive(self._cls, sample, self._part)
+
+
+class Bus:
+    """A session, the bus clock as last heard, and the count of what was refused."""
+
+    def __init__(self, session: zenoh.Session, who: str, log: logging.Logger) -> None:
+        self.session, self.who, self.log = session, who, log
+        self.run, self.k, self.t = NO_RUN, 0, 0
+        self.part_sizes: dict[str, int] = {}
+        self.robot_size: int | None = None
+        self.rejected: Counter[str] = Counter()
+        self._reported: dict[str, float] = {}
+        self._events: Publisher[Event] = self.publisher(keys.event(who), Event, EVENTS)
+
+    def publisher(self, key: str, cls: type[_M], delivery: Delivery) -> Publisher[_M]:
+        """A stream to write."""
+        return Publisher(self, key, cls, delivery)
+
+    def latest(self, key: str, cls: type[_M], part: str | None = None) -> Latest[_M]:
+        """A stream to poll for its newest message; `part` names whose motors its vectors are over."""
+        return Latest(self, key, cls, part)
+
+    def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
+        """The message in a sample; None if it was refused, which is counted and told."""
+        try:
+            size = None if part is None else self.part_sizes[part]
+            message = decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.robot_size)
+            if not any_run and message.run != self.run:
+                raise Refused("run", f"{cls.__name__} of run {message.run}, this is {self.run}")
+        except Refused as refused:
+            self.reject(refused.reason, f"{sample.key_expr}: {refused}")
+            return None
+        return message
+
+    def reject(self, reason: str, text: str) -> None:
+        """Count a refused message or call; tell it at most once a second and reason."""
+        self.rejected[reason] += 1
+        now = time.monotonic()
+        if now - self._reported.get(reason, -1.0) >= 1.0:
+            self._reported[reason] = now
+            self.event("warning", "refused", text, reason=float(self.rejected[reason]))
+
+    def event(self, level: str, code: str, text: str, **values: float) -> None:
+        """Tell a person: on the bus and in the log."""
+        self.log.log({"info": 20, "warning": 30, "error": 40}[level], "%s: %s", code, text)
+        self._events.put(level=level, code=code, text=text[:2000], values=values)

@@ -1,0 +1,66 @@
+"""One inbox a process: Zenoh's threads only put, the main thread alone handles."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from threading import Lock
+from typing import Any
+
+Handler = Callable[[], None]
+
+
+class Newest:
+    """A slot that holds the newest sample of a stream and stands in the inbox at most once."""
+
+    def __init__(self, inbox: Inbox, handle: Callable[[Any], None]) -> None:
+        self._inbox, self._handle, self._lock = inbox, handle, Lock()
+        self._sample: Any = None
+
+    def offer(self, sample: Any) -> None:
+        """Called by Zenoh's thread."""
+        with self._lock:
+            waiting, self._sample = self._sample is not None, sample
+        if not waiting:
+            self._inbox.put(self._run)
+
+    def _run(self) -> None:
+        with self._lock:
+            sample, self._sample = self._sample, None
+        self._handle(sample)
+
+
+class Inbox:
+    """What is to be done, in order of arrival, and timers."""
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[Handler] = SimpleQueue()
+        self._timers: list[tuple[float, int, Handler]] = []
+        self._order = itertools.count()
+
+    def put(self, handler: Handler) -> None:
+        """Have the main thread run it; any thread may call this."""
+        self._queue.put(handler)
+
+    def at(self, when: float, handler: Handler) -> None:
+        """Have it run at a time of the monotonic clock; main thread only."""
+        heapq.heappush(self._timers, (when, next(self._order), handler))
+
+    def spin(self, until: float) -> None:
+        """Handle everything that comes until that time of the monotonic clock."""
+        while True:
+            now = time.monotonic()
+            if self._timers and self._timers[0][0] <= now:
+                heapq.heappop(self._timers)[2]()
+                continue
+            wake = min(until, self._timers[0][0]) if self._timers else until
+            try:
+                handler = self._queue.get(timeout=wake - now) if wake > now else self._queue.get_nowait()
+            except Empty:
+                if time.monotonic() >= until:
+                    return
+                continue
+            handler()

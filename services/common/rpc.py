@@ -1,0 +1,49 @@
+"""Calls with a time limit: an answer, or an error that says which."""
+
+from __future__ import annotations
+
+import uuid
+from typing import TypeVar
+
+import zenoh
+
+from bus_schema import VERSION, Refused, decode, encode, encoding_of
+from bus_schema.rpc import Failure, Reply, Request
+
+_R = TypeVar("_R", bound=Reply)
+TIMEOUT = 0.5  # s
+
+
+class CallFailed(Exception):
+    """A call without the wanted answer; `code` is the server's, or no_answer, or bad_answer."""
+
+    def __init__(self, code: str, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def call(
+    session: zenoh.Session, who: str, key: str, request: type[Request], reply: type[_R], *, timeout: float = TIMEOUT, **fields: object
+) -> _R:
+    """Ask the service behind `key`; raises CallFailed.  An empty answer means that nobody is there."""
+    message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
+    answers = session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout)
+    for answer in answers:
+        if answer.ok is None:
+            raise _failure(key, answer)
+        try:
+            return decode(reply, answer.ok.payload.to_bytes(), str(answer.ok.encoding))
+        except Refused as refused:
+            raise CallFailed("bad_answer", f"{key}: {refused}") from None
+    raise CallFailed("no_answer", f"{key}: nobody answers")
+
+
+def _failure(key: str, answer: zenoh.Reply) -> CallFailed:
+    error = answer.err
+    if error is None:
+        return CallFailed("no_answer", f"{key}: an answer without content")
+    try:
+        failure = decode(Failure, error.payload.to_bytes(), str(error.encoding))
+    except Refused:  # Zenoh's own errors are plain text, its timeout among them
+        return CallFailed("no_answer", f"{key}: {error.payload.to_bytes()[:200].decode(errors='replace')}")
+    return CallFailed(failure.code, failure.text)

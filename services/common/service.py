@@ -1,0 +1,246 @@
+"""The life of a service: session, inbox, requests, liveliness, and an end that is quick from every state."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import signal
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from types import FrameType, TracebackType
+from typing import Any, Self, TypeVar
+
+import msgspec
+import zenoh
+import zenoh.ext
+
+from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
+from bus_schema.messages import Clock, Message
+from bus_schema.rpc import Config, Done, Empty, Failure, Reply, Request, Stat
+from mobee.robot.robot import Robot
+from services.common import log, rpc
+from services.common.bus import NO_RUN, Bus
+from services.common.config import ServiceConfig
+from services.common.inbox import Inbox, Newest
+from services.common.session import open_client
+
+_M = TypeVar("_M", bound=Message)
+_Q = TypeVar("_Q", bound=Request)
+_R = TypeVar("_R", bound=Reply)
+
+ORPHANED = 10.0  # s without a router after which a service ends
+REMEMBERED = 256  # replies kept, so that a repeated call is harmless
+
+
+class CallRefused(Exception):
+    """Raised by a request's handler: the caller gets code and text."""
+
+    def __init__(self, code: str, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class Service:
+    """A process on the bus.  All handlers run in the main thread, inside `spin` or `run`."""
+
+    def __init__(self, who: str, config: ServiceConfig, robot: Robot | None = None, session: zenoh.Session | None = None) -> None:
+        self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
+        signal.signal(signal.SIGTERM, _end)
+        signal.signal(signal.SIGINT, _end)
+        self.log = log.set_up(who)
+        self.bus = Bus(session or open_client(config.endpoint), who, self.log)
+        if robot is not None:
+            self.bus.robot_size = len(robot.motors)
+            self.bus.part_sizes = {name: len(part) for name, part in robot.parts.items()}
+        self.inbox = Inbox()
+        self.alive: dict[str, set[str]] = {}
+        self.started = time.monotonic()
+        self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
+        self.mark: Callable[[], None] = lambda: None  # zero the counters of `describe`: a measurement begins
+        self._kept: list[Any] = []  # tokens die with their handles
+        self._replies: OrderedDict[str, tuple[type[Reply], bytes]] = OrderedDict()
+        self._on_alive: list[Callable[[str, str, bool], None]] = []
+        self._on_run: list[Callable[[], None]] = []
+        self._is_ready = False
+        self._router_seen = time.monotonic()
+        self._watch_liveliness()
+        self.on_request(keys.service_rpc(who, "stat"), Empty, self._stat)
+        self.on_request(keys.service_rpc(who, "mark"), Empty, self._mark)
+        self.on_request(keys.service_rpc(who, "config"), Empty, self._config)
+        self.on_request(keys.service_rpc(who, "shutdown"), Empty, self._shutdown)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if error is not None and not isinstance(error, SystemExit):
+            self.log.error("ended by %s", error, exc_info=error)
+        self.bus.session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
+
+    def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
+        """Have the newest message of a stream handled; older ones waiting are overwritten."""
+        slot = Newest(self.inbox, lambda sample: self._deliver(cls, sample, handler, part))
+        self._kept.append(self.bus.session.declare_subscriber(key, slot.offer))
+
+    def on_each(self, key: str, cls: type[_M], handler: Callable[[_M], None], *, history: bool = False, any_run: bool = False) -> None:
+        """Have every message of a stream handled, with `history` also those from before this service came."""
+
+        def enqueue(sample: zenoh.Sample) -> None:
+            self.inbox.put(lambda: self._deliver(cls, sample, handler, None, any_run))
+
+        if history:
+            settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+            self._kept.append(zenoh.ext.declare_advanced_subscriber(self.bus.session, key, enqueue, history=settings))
+        else:
+            self._kept.append(self.bus.session.declare_subscriber(key, enqueue))
+
+    def on_clock(self, handler: Callable[[Clock], None]) -> None:
+        """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
+
+        def tick(sample: zenoh.Sample) -> None:
+            clock = self.bus.receive(Clock, sample, any_run=True)
+            if clock is None:
+                return
+            self.bus.k, self.bus.t = clock.k, clock.t
+            if clock.run != self.bus.run:
+                known, self.bus.run = self.bus.run, clock.run
+                if known != NO_RUN:
+                    self.bus.event("warning", "new_run", f"robot_sim started run {clock.run} after {known}")
+                for announce in self._on_run:
+                    announce()
+            handler(clock)
+
+        slot = Newest(self.inbox, tick)
+        self._kept.append(self.bus.session.declare_subscriber(keys.CLOCK, slot.offer))
+
+    def on_run(self, handler: Callable[[], None]) -> None:
+        """Have it called at the first tick of every run."""
+        self._on_run.append(handler)
+
+    def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
+        """Have (who, instance, up) told for every process that comes or goes."""
+        self._on_alive.append(handler)
+
+    def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
+        """Answer calls: handler(request, key) -> reply, or CallRefused.  `part_of_key`: its first chunk names the part."""
+
+        def enqueue(query: zenoh.Query) -> None:
+            self.inbox.put(lambda: self._answer(query, cls, handler, part_of_key))
+
+        self._kept.append(self.bus.session.declare_queryable(key, enqueue))
+
+    def call(self, key: str, request: type[Request], reply: type[_R], *, timeout: float = rpc.TIMEOUT, **fields: object) -> _R:
+        """Ask another service; raises rpc.CallFailed."""
+        return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, **fields)
+
+    def ready(self) -> None:
+        """Tell the world: after every subscriber and queryable is declared."""
+        self._is_ready = True
+        self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
+        self.log.info("ready as %s", self.instance)
+
+    def spin(self, until: float) -> None:
+        """Handle what comes until that time of the monotonic clock."""
+        self.inbox.spin(until)
+
+    def run(self) -> None:
+        """Handle what comes until SIGTERM, a shutdown call, or ten seconds without a router."""
+        while True:
+            self.inbox.spin(time.monotonic() + 1.0)
+            self.check_router()
+
+    def check_router(self) -> None:
+        """End the process when nobody routes any more: an orphan must not outlive its system."""
+        if self.alive.get("router"):
+            self._router_seen = time.monotonic()
+        elif time.monotonic() - self._router_seen > ORPHANED:
+            self.log.error("no router at %s for %g s: ending", self.config.endpoint, ORPHANED)
+            raise SystemExit(3)
+
+    def _deliver(self, cls: type[_M], sample: zenoh.Sample, handler: Callable[[_M], None], part: str | None, any_run: bool = False) -> None:
+        message = self.bus.receive(cls, sample, part, any_run=any_run)
+        if message is not None:
+            handler(message)
+
+    def _watch_liveliness(self) -> None:
+        def enqueue(sample: zenoh.Sample) -> None:
+            _, who, instance = str(sample.key_expr).split("/")
+            up = sample.kind == zenoh.SampleKind.PUT
+            self.inbox.put(lambda: self._note_alive(who, instance, up))
+
+        liveliness = self.bus.session.liveliness()
+        self._kept.append(liveliness.declare_subscriber(keys.ALL_ALIVE, enqueue, history=True))
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        instances = self.alive.setdefault(who, set())
+        (instances.add if up else instances.discard)(instance)
+        for handler in self._on_alive:
+            handler(who, instance, up)
+
+    def _answer(self, query: zenoh.Query, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
+        key = str(query.key_expr)
+        with query:
+            try:
+                reply_type, payload = self._reply(query, cls, handler, key, part_of_key)
+            except (Refused, CallRefused) as refused:
+                code = refused.reason if isinstance(refused, Refused) else refused.code
+                self.bus.reject(code, f"{key}: {refused}")
+                query.reply_err(encode(Failure(v=VERSION, code=code, text=str(refused)[:2000])), encoding=encoding_of(Failure))
+                return
+            query.reply(key, payload, encoding=encoding_of(reply_type))
+
+    def _reply(
+        self, query: zenoh.Query, cls: type[_Q], handler: Callable[[_Q, str], Reply], key: str, part_of_key: bool
+    ) -> tuple[type[Reply], bytes]:
+        size = None
+        if part_of_key:
+            part = key.split("/")[0]
+            if part not in self.bus.part_sizes:
+                raise CallRefused("part", f"no part {part!r}; there are {', '.join(self.bus.part_sizes)}")
+            size = self.bus.part_sizes[part]
+        if query.payload is None or query.encoding is None:
+            raise Refused("decode", f"{cls.__name__}: an empty request")
+        request = decode(cls, query.payload.to_bytes(), str(query.encoding), part=size, robot=self.bus.robot_size)
+        if request.id not in self._replies:
+            reply = handler(request, key)
+            self._replies[request.id] = (type(reply), encode(reply))
+            if len(self._replies) > REMEMBERED:
+                self._replies.popitem(last=False)
+        return self._replies[request.id]
+
+    def _stat(self, request: Empty, key: str) -> Stat:
+        text, numbers = self.describe()
+        return Stat(
+            v=VERSION,
+            who=self.who,
+            instance=self.instance,
+            pid=os.getpid(),
+            uptime=time.monotonic() - self.started,
+            ready=self._is_ready,
+            text=text,
+            numbers={name: float(value) for name, value in numbers.items()},
+            rejected=dict(self.bus.rejected),
+        )
+
+    def _mark(self, request: Empty, key: str) -> Done:
+        self.mark()
+        return Done(v=VERSION)
+
+    def _config(self, request: Empty, key: str) -> Config:
+        return Config(v=VERSION, config=msgspec.json.encode(self.config).decode())
+
+    def _shutdown(self, request: Empty, key: str) -> Done:
+        self.log.info("asked by %s to end", request.who)
+        self.inbox.at(time.monotonic() + 0.05, _leave)  # after the reply is out
+        return Done(v=VERSION)
+
+
+def _leave() -> None:
+    raise SystemExit(0)
+
+
+def _end(signum: int, frame: FrameType | None) -> None:
+    raise SystemExit(0)

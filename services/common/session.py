@@ -1,0 +1,63 @@
+"""One way to open a Zenoh session: client of the launcher's router, or that router."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import zenoh
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+NAMESPACE = "icub"
+
+_COMMON = {
+    "namespace": NAMESPACE,
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "transport/shared_memory/enabled": False,
+    "transport/link/tx/lease": 1000,
+    "timestamping/enabled": {"router": True, "peer": True, "client": True},  # events keep a history
+}
+
+
+class BusUnreachable(Exception):
+    """No router where one was expected; the message names the endpoint and the remedy."""
+
+
+def _config(settings: dict[str, object]) -> zenoh.Config:
+    config = zenoh.Config()
+    for path, value in {**_COMMON, **settings}.items():
+        config.insert_json5(path, json.dumps(value))
+    return config
+
+
+def open_client(endpoint: str, patience: float = 10.0) -> zenoh.Session:
+    """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable."""
+    settings: dict[str, object] = {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+    }
+    give_up = time.monotonic() + patience
+    while True:
+        try:
+            return zenoh.open(_config(settings))
+        except zenoh.ZError as error:
+            if time.monotonic() >= give_up:
+                raise BusUnreachable(
+                    f"no router at {endpoint} within {patience:g} s ({error}). Is the system up? Start it with `mobee launch`, "
+                    "or name its endpoint with --endpoint."
+                ) from None
+            time.sleep(0.1)
+
+
+def open_router(endpoint: str) -> zenoh.Session:
+    """The router every service connects to, listening at `endpoint`; raises BusUnreachable when that is taken."""
+    settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint]}
+    try:
+        return zenoh.open(_config(settings))
+    except zenoh.ZError as error:
+        raise BusUnreachable(
+            f"cannot listen at {endpoint}: {error}. If another system runs there, `mobee stop` ends it; "
+            "or choose another endpoint with --endpoint."
+        ) from None
