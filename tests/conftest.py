@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import os
+import socket
+
+import hypothesis
+import numpy as np
+import pytest
+
+hypothesis.settings.register_profile("mobee", deadline=None, derandomize=True, max_examples=50)
+hypothesis.settings.load_profile("mobee")
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """The only source of chance in a test: the global state of numpy is never used."""
+    return np.random.default_rng(2014)
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What ./test found before pytest, repeated just above the closing line."""
+    if summary := os.environ.get("MOBEE_CHECKS"):
+        terminalreporter.write_line(summary, red="FAILED" in summary)
