@@ -25,6 +25,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """What ./test found before pytest, repeated just above the closing line."""
     if summary := os.environ.get("MOBEE_CHECKS"):
