@@ -122,6 +122,14 @@ def test_an_old_python_is_refused_in_one_line(bare_clone: Path) -> None:
     assert done.stderr.splitlines() == ["launch: needs Python 3.11 or newer, found Python 3.9.18: install python3.11 with its venv module."]
 
 
+def test_a_newer_python_says_in_one_line_what_is_lost(bare_clone: Path) -> None:
+    fake_python(bare_clone / "bin", "python3.11", "exit 127")
+    fake_python(bare_clone / "bin", "python3", '[[ "$1" == - ]] && echo "3.13 one two" && exit 0; [[ "$1" == -c ]]')
+    done = ensure(bare_clone)
+    assert "kinematic back-end only" in done.stderr.splitlines()[0]
+    assert done.stderr.count("PyBullet") == 1
+
+
 def fake_interpreter(clone: Path, pip: str) -> None:
     """A python3.11 whose venv holds a copy of itself and whose pip runs the command `pip`; both are logged."""
     body = f"""
