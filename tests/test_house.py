@@ -172,6 +172,13 @@ def test_a_changed_pyproject_installs_the_project_alone(bare_clone: Path) -> Non
     assert (bare_clone / "log").read_text() == before + "pip\n"
 
 
+def test_every_folder_with_code_is_a_package() -> None:
+    """The import contracts do not look into a folder without __init__.py."""
+    packages = ("mobee", "bus_schema", "services", "experiments", "mobee_cli")
+    folders = {path.parent for name in packages for path in (ROOT / name).rglob("*.py")}
+    assert [str(folder.relative_to(ROOT)) for folder in sorted(folders) if not (folder / "__init__.py").is_file()] == []
+
+
 def test_versions_agree() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["version"] == PROJECT["version"]
