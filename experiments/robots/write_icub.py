@@ -1,0 +1,219 @@
+"""Writes mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
+
+Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014;
+fields are ours. Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.robots.icub_fields import HEAD, LEFT_ARM, TRUNK, Field
+from experiments.robots.xml_writer import box_turn, element, number, vector, write
+from mobee.robot.robot import Array
+
+OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
+HEADING = """
+iCub v2.5 upper body, 41 motors. Written by experiments/robots/write_icub.py; do not edit by hand.
+Kinematics and solids derive from robotology/icub-models (Istituto Italiano di Tecnologia), licence CC BY-SA 4.0;
+this file is distributed under the same licence. Origin of every number: README.md beside this file.
+"""
+HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 50.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
+EYES = {"eyes_version": (-30.0, 30.0), "eyes_vergence": (0.0, 50.0)}  # version +- vergence / 2 just fills the URDF's pan limits
+# A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
+ANCHORS = {
+    "torso": (0.0, 0.0, 0.032),
+    "neck": (-0.0108093, 0.0, 0.254797),
+    "shoulder": (-0.0106198, -0.109391, 0.1748),
+    "elbow": (-0.0106198, -0.109391, 0.01574),
+    "wrist_prosup": (-0.0106198, -0.109391, 0.01574),
+    "wrist": (-0.0084698, -0.109398, -0.12656),
+}
+# finger axis -> joints that it drives; spread opens (0) to closed (60), so its joints end at 0
+SPREAD = {"index_0": (-20.0, 0.0), "ring_0": (20.0, 0.0), "little_0": (20.0, 0.0)}
+FINGERS = {
+    "hand_finger": ("index_0", "ring_0", "little_0"),
+    "thumb_oppose": ("thumb_0",),
+    "thumb_proximal": ("thumb_1",),
+    "thumb_distal": ("thumb_2", "thumb_3"),
+    "index_proximal": ("index_1",),
+    "index_distal": ("index_2", "index_3"),
+    "middle_proximal": ("middle_1",),
+    "middle_distal": ("middle_2", "middle_3"),
+    "pinky": ("ring_1", "ring_2", "ring_3", "little_1", "little_2", "little_3"),
+}
+RIGID = {"l_upper_arm": "l_shoulder_3", "r_upper_arm": "r_shoulder_3", "l_hand_middle_0": "l_hand", "r_hand_middle_0": "r_hand"}
+
+
+def main(data_path: str, out: str | Path = OUT) -> None:
+    data = json.loads(Path(data_path).read_text(encoding="utf-8"))
+    model = data["models"]["icub_v2_5"]
+    root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName="icub")
+    torso = element(root, "bodypart", name="torso")
+    declare_motors(torso, data, "torso")
+    base = element(torso, "link", name="root_link")
+    add_shapes(base, model, "root_link", np.zeros(3))
+    add_joints(torso, data, "root_link", np.zeros(3))
+    write(root, Path(out), HEADING)
+
+
+def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
+    """The joints mounted on a link, with all that they carry."""
+    joints = [j for j in data["models"]["icub_v2_5"]["joints"] if RIGID.get(j["parent_link"], j["parent_link"]) == link]
+    parts = ["torso", "head", "left_arm", "right_arm"]
+    for joint in sorted(joints, key=lambda j: parts.index(j["body_part"])):
+        if joint["child_link"] in RIGID:  # a joint without a motor: its link is one with the parent
+            add_joints(parent, data, joint["child_link"], point)
+            continue
+        place = parent
+        if link == "chest":
+            place = element(parent, "bodypart", name=joint["body_part"])
+            declare_motors(place, data, joint["body_part"])
+            if joint["body_part"].endswith("arm"):
+                add_constraints(place, data)
+        add_joint(place, data, joint, point)
+
+
+def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], point: Array) -> None:
+    axis = np.array(joint["axis_root"])
+    here = skeleton_point(joint["name"], np.array(joint["point_root"]), axis)
+    link, name = joint["child_link"], joint["name"].removesuffix("_joint")
+    step = element(parent, "link", **vector("x y z", here - point))
+    if name.endswith("eye_pan"):
+        side = 1 if name.startswith("l") else -1
+        version = element(step, "joint", name=f"{link}_version", motor="eyes_version", **vector("x y z", axis))
+        half = EYES["eyes_vergence"][1] / 2 * side
+        pan = element(version, "joint", name=f"{link}_vergence", moves=link, motor="eyes_vergence", **vector("x y z", axis))
+        pan.set("minPos", "0")
+        pan.set("maxPos", number(half))
+    else:
+        pan = element(step, "joint", name=name, moves=link, motor=motor_of(name), **vector("x y z", axis, 9))
+        interval = joint_interval(name, motor_of(name), joint["limits_deg"])
+        if interval:
+            pan.set("minPos", number(interval[0]))
+            pan.set("maxPos", number(interval[1]))
+    if name.endswith("wrist_pitch"):
+        pan.set("noSelfCollision", "true")
+    carried = [link, *(rigid for rigid, host in RIGID.items() if host == link)]
+    for source in carried:
+        add_shapes(pan, data["models"]["icub_v2_5"], source, here)
+    add_fields(pan, link, here)
+    add_markers(pan, data, link, here)
+    for source in carried if link.endswith("hand") else [link]:
+        add_joints(pan, data, source, here)
+
+
+def skeleton_point(name: str, point: Array, axis: Array) -> Array:
+    """The point on the joint's axis nearest to its cluster's anchor."""
+    plain = name.removeprefix("l_").removeprefix("r_")
+    key = next((key for key in (plain, plain.split("_")[0]) if key in ANCHORS), None)
+    if key is None:
+        return point
+    side = -1.0 if name.startswith("r_") else 1.0
+    return point + axis * float(axis @ (np.array(ANCHORS[key]) * (1.0, side, 1.0) - point))
+
+
+def motor_of(joint: str) -> str:
+    side, _, rest = joint.partition("_hand_")
+    finger = next((motor for motor, joints in FINGERS.items() if rest in joints), None)
+    return f"{side}_{finger}" if finger else joint
+
+
+def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, float] | None:
+    """The joint's interval [deg] where it is not the motor's own."""
+    finger = name.partition("_hand_")[2]
+    if finger in SPREAD:
+        return SPREAD[finger]
+    if motor.endswith(("distal", "pinky")):
+        return limits[0], limits[1]
+    return None
+
+
+def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
+    parts = data["yarp_parts"]
+    joints = {j["name"]: j for j in data["models"]["icub_v2_5"]["joints"]}
+    simulator = parts["limits_deg"]["icub_simulator"]["arm" if part.endswith("arm") else part]
+    for name, (low, high) in zip(parts["order"][part], simulator, strict=True):
+        if name in EYES:
+            low, high = EYES[name]
+        elif name in joints:
+            low, high = max(low, joints[name]["limits_deg"][0]), min(high, joints[name]["limits_deg"][1])
+        home = HOME.get(name[2:], 0.0) if part.endswith("arm") else 0.0
+        element(parent, "motor", name=name, minPos=low, maxPos=high, home=home)
+
+
+def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
+    for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
+        rows = element(parent, "constraintList")
+        for row in clause:
+            used = [(a, q) for a, q in zip(row["a"], row["motor_indices"], strict=True) if a]
+            factors, motors = " ".join(number(a) for a, _ in used), " ".join(str(q) for _, q in used)
+            element(rows, "constraint", a=factors, q=motors, b=row["b"])
+
+
+def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
+    for shape in model["primitives"]:
+        if shape["link"] != link:
+            continue
+        place = vector("px py pz", np.array(shape["center"]) - point)
+        if shape["shape"] == "sphere":
+            element(parent, "sphere", name=shape["name"], radius=shape["radius"], **place)
+        elif shape["shape"] == "cylinder":
+            turn = vector("hx hy hz", np.array(shape["axis"]))
+            element(parent, "cylinder", name=shape["name"], radius=shape["radius"], height=shape["height"], **place, **turn)
+        else:
+            width, height, depth = shape["size"]
+            turn = box_turn(np.array(shape["R"]))
+            element(parent, "box", name=shape["name"], width=width, height=height, depth=depth, **place, **turn)
+
+
+def add_fields(parent: ET.Element, link: str, point: Array) -> None:
+    for name, host, radius, first, second in fields():
+        if host != link:
+            continue
+        ends = np.array([first, second])
+        place = vector("px py pz", ends.mean(axis=0) - point)
+        span = ends[1] - ends[0]
+        if span.any():
+            height = float(np.linalg.norm(span))
+            turn = vector("hx hy hz", span / height)
+            element(parent, "capsule", name=name, radius=radius, height=height, field="true", **place, **turn)
+        else:
+            element(parent, "sphere", name=name, radius=radius, field="true", **place)
+
+
+def fields() -> list[Field]:
+    mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
+    arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
+    return TRUNK + HEAD + arms
+
+
+def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
+    model = data["models"]["icub_v2_5"]
+    palms = model["end_effector_zero_root"]
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        if link == f"{side[0]}_hand":
+            rotation = np.array(palms[side]["R"])
+            add_marker(parent, f"{side}_palm", np.array(palms[side]["p"]) - point, rotation, sign * rotation[:, 2])
+        if link == f"{side[0]}_elbow_1":
+            add_marker(parent, f"{side}_elbow", np.zeros(3), np.eye(3), np.array([1.0, 0.0, 0.0]))
+        if link == f"{side[0]}_eye":
+            add_marker(parent, f"{side}_eye", np.zeros(3), np.eye(3), np.array([-1.0, 0.0, 0.0]))
+    if link == "head":
+        head = model["head_zero_root"]
+        add_marker(parent, "head", np.array(head["p"]) - point, np.array(head["R"]), np.array([-1.0, 0.0, 0.0]))
+
+
+def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
+    rows = " ".join(number(value) for value in rotation.ravel())
+    element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

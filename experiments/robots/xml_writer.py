@@ -1,0 +1,47 @@
+"""What both robot writers share: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from mobee.robot.robot import Array
+from mobee.robot.xml_volume import Y, align
+
+
+def number(value: float, digits: int = 7) -> str:
+    """The shortest text of a number to so many decimals."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
+    """A child element; numbers become text."""
+    texts = {name: value if isinstance(value, str) else number(value) for name, value in attributes.items()}
+    return ET.SubElement(parent, tag, texts)
+
+
+def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
+    """Attributes for the components that are not zero, e.g. vector("px py pz", p)."""
+    texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
+    return {name: text for name, text in texts.items() if text != "0"}
+
+
+def box_turn(rotation: Array) -> dict[str, str]:
+    """The attributes hx, hy, hz and angle [deg] of a box whose orientation is `rotation` (3, 3)."""
+    left, _, right = np.linalg.svd(rotation)
+    exact = left @ right
+    axis = exact[:, 1]
+    plain = align(Y, axis)[:, 0]
+    angle = np.rad2deg(np.arctan2(axis @ np.cross(plain, exact[:, 0]), plain @ exact[:, 0]))
+    turn = {} if np.allclose(axis, Y, atol=1e-7) else vector("hx hy hz", axis)
+    return turn if abs(angle) < 1e-5 else turn | {"angle": number(float(angle), 5)}
+
+
+def write(root: ET.Element, path: Path, heading: str) -> None:
+    """Write the indented file, with a comment that says where it comes from."""
+    ET.indent(root, " ")
+    body = ET.tostring(root, encoding="unicode")
+    path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n<!--\n{heading.strip()}\n-->\n{body}\n', encoding="utf-8")
