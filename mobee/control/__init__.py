@@ -1,0 +1,9 @@
+"""Reactive control: squashing, constraint forces, the dynamical system, and when a motion has settled."""
+
+from mobee.control.controller import Controller as Controller
+from mobee.control.forces import Forces as Forces
+from mobee.control.forces import constraint_forces as constraint_forces
+from mobee.control.gains import Gains as Gains
+from mobee.control.modality import Command as Command
+from mobee.control.settle import Settle as Settle
+from mobee.control.settle import SettleTest as SettleTest

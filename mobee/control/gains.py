@@ -1,0 +1,109 @@
+"""The numbers of the control law, in two named sets (DESIGN section 6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Literal
+
+import numpy as np
+
+from mobee.control.settle import Settle
+from mobee.errors import InvalidValue, UnknownName
+from mobee.robot.robot import Array
+
+Law = Literal["default", "published_2014"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """A variant of the law of eq. 5.7 with its numbers; the mass is 1, so a force is an acceleration in rad/s^2.
+
+    `law`: how constraints and contacts become forces (see `constraints`, `collision`).  `damping` C in 1/s,
+    `stiffness` K in 1/s^2, each of the `max_` in rad/s^2.  `limit_width` in rad; `constraint_width` in rad along the
+    row's normal (published law: in units of a.q + b).  `contact_gain`: default law, rad/s^2 for a lever
+    and penetration of 1 m; published law, deg/s^2 before it is squared.  `contact_slope`, `client_slope`: the slope
+    of the squash at 0.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
+    none does; a motor of weight 0 is never moved.
+    """
+
+    law: Law
+    damping: float
+    stiffness: float
+    max_spring: float
+    limit_width: float
+    max_limit: float
+    constraint_width: float
+    max_constraint: float
+    contact_gain: float
+    contact_slope: float
+    max_contact: float
+    client_slope: float
+    max_client: float
+    settle: Settle
+    weights: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, float) and not (value > 0 and np.isfinite(value)):
+                raise InvalidValue(f"gain {name} {value}: must be a finite number above 0")
+        for pattern, weight in self.weights:
+            if weight not in (0, 1):
+                raise InvalidValue(f"weight {weight} of the motors {pattern!r}: must be 0 (never moved) or 1")
+
+    @classmethod
+    def default(cls) -> Gains:
+        """The thesis' equations with our own tuning: time constant C/K = 0.4 s, held within the fields."""
+        return cls(
+            law="default",
+            damping=40.0,
+            stiffness=100.0,
+            max_spring=28.0,
+            limit_width=np.deg2rad(5.0),
+            max_limit=40.0,
+            constraint_width=np.deg2rad(8.0),
+            max_constraint=40.0,
+            contact_gain=1000.0,
+            contact_slope=1.0,
+            max_contact=60.0,
+            client_slope=1.0,
+            max_client=20.0,
+            settle=Settle(speed=np.deg2rad(1.0), acceleration=np.deg2rad(100.0)),
+        )
+
+    @classmethod
+    def published_2014(cls) -> Gains:
+        """The 2014 program's numbers, given there in degrees: they carry the published findings.
+
+        Fingers and eyes do not move.  The fields of the robot model are penetrated by centimetres.
+        """
+        return cls(
+            law="published_2014",
+            damping=50.0,
+            stiffness=50.0,
+            max_spring=np.deg2rad(1000.0),
+            limit_width=np.deg2rad(10.0),
+            max_limit=np.deg2rad(1000.0),
+            constraint_width=np.deg2rad(40.0),
+            max_constraint=np.deg2rad(1500.0),
+            contact_gain=1000.0,
+            contact_slope=50.0,
+            max_contact=np.deg2rad(1200.0),
+            client_slope=50.0,
+            max_client=np.deg2rad(1000.0),
+            settle=Settle(speed=np.deg2rad(1.0), acceleration=np.deg2rad(50.0)),
+            weights=tuple((p, 0.0) for p in ("eyes_*", "?_hand_*", "?_thumb_*", "?_index_*", "?_middle_*", "?_pinky")),
+        )
+
+    @classmethod
+    def named(cls, name: str) -> Gains:
+        """The set of that name, "default" or "published_2014"; raises UnknownName."""
+        sets = {"default": cls.default, "published_2014": cls.published_2014}
+        if name not in sets:
+            raise UnknownName("gain set", name, sets)
+        return sets[name]()
+
+    def weight(self, motors: tuple[str, ...]) -> Array:
+        """The weight of each of the motors, shape (n,)."""
+        return np.array([next((w for pattern, w in self.weights if fnmatchcase(m, pattern)), 1.0) for m in motors])

@@ -1,0 +1,56 @@
+"""When an action is over: the motion of a part has died down, or its time is up (thesis 6.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array
+
+Verdict = Literal["moving", "settled", "timeout"]
+ROUNDING = 1e-9  # s, times are sums of ticks
+
+
+@dataclass(frozen=True, slots=True)
+class Settle:
+    """The thresholds of the settle test: physics, not bookkeeping (they set which states are hard to reach).
+
+    A part is settled when every motor is commanded at most `speed` and accelerated at most `acceleration`.
+    """
+
+    speed: float  # rad/s
+    acceleration: float  # rad/s^2
+    first_look: float = 1.0  # s after the start of the action
+    interval: float = 0.2  # s between looks
+    timeout: float = 20.0  # s
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "acceleration", "interval", "timeout"):
+            if not getattr(self, name) > 0:
+                raise InvalidValue(f"settle {name} {getattr(self, name)}: must be above 0")
+
+
+class SettleTest:
+    """One action's test: looks at the commanded motion now and then, as the original's poll did."""
+
+    def __init__(self, settle: Settle, start: float) -> None:
+        """Begin at time `start` [s]."""
+        self.settle = settle
+        self.start = start
+        self._next_look = start + settle.first_look
+
+    def look(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
+        """Judge the part's motion at time t [s]; between two looks the answer is always "moving".
+
+        `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,).
+        """
+        if t >= self._next_look - ROUNDING:
+            missed = np.floor((t - self._next_look + ROUNDING) / self.settle.interval)
+            self._next_look += (missed + 1) * self.settle.interval
+            slow = np.all(np.abs(speeds) <= self.settle.speed)
+            if slow and np.all(np.abs(accelerations) <= self.settle.acceleration):
+                return "settled"
+        return "timeout" if t - self.start >= self.settle.timeout - ROUNDING else "moving"
