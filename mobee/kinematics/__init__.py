@@ -1,0 +1,6 @@
+"""Forward kinematics, Jacobians and quaternions of a tree in zero-position form."""
+
+from mobee.kinematics.forward import link_transforms
+from mobee.kinematics.jacobian import joint_axes, point_jacobian
+
+__all__ = ["joint_axes", "link_transforms", "point_jacobian"]
