@@ -1,7 +1,7 @@
 """Our own force fields of the iCub: few spheres and capsules around the solids of each body section.
 
-Zero pose, root frame, [m]; the right arm mirrors the left in y. Margins beyond the solids: hand and fingers 6 cm, forearm 5 cm,
-upper arm, torso and head 4 cm or less where the arms hang beside the trunk.
+Zero pose, root frame, [m]; the right arm mirrors the left in y. Beyond the solids the fields of hand and fingers reach 5 to 7 cm,
+forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, for an arm at rest hangs there.
 """
 
 from __future__ import annotations
@@ -10,18 +10,33 @@ Point = tuple[float, float, float]
 Field = tuple[str, str, float, Point, Point]  # name, link, radius, one end, other end (equal: a sphere)
 
 TRUNK: list[Field] = [
-    ("lower_torso_field", "torso_1", 0.09, (0.02, -0.03, 0.02), (0.02, 0.03, 0.02)),
-    ("waist_field", "torso_2", 0.08, (0.0, -0.02, 0.06), (0.0, 0.02, 0.06)),
-    ("chest_front_field", "chest", 0.10, (-0.02, -0.04, 0.17), (-0.02, 0.04, 0.17)),
-    ("chest_back_field", "chest", 0.12, (0.12, -0.03, 0.17), (0.12, 0.03, 0.17)),
-    ("belly_field", "chest", 0.09, (-0.02, 0.0, 0.10), (-0.02, 0.0, 0.10)),
+    ("pelvis_field", "root_link", 0.095, (0.03, -0.045, -0.045), (0.03, 0.045, -0.045)),
+    ("pelvis_back_field", "root_link", 0.095, (0.06, 0.0, -0.03), (0.06, 0.0, -0.11)),
+    ("pelvis_front_field", "root_link", 0.085, (0.0, 0.0, -0.04), (0.0, 0.0, -0.12)),
+    ("lower_torso_field", "torso_1", 0.085, (0.0075, 0.0, 0.023), (0.0075, 0.0, 0.023)),
+    ("waist_field", "torso_2", 0.085, (0.0, 0.0, 0.04), (0.0, 0.0, 0.11)),
+    ("belly_field", "chest", 0.09, (-0.03, -0.025, 0.10), (-0.03, 0.025, 0.10)),
+    ("breast_field", "chest", 0.09, (-0.035, -0.04, 0.18), (-0.035, 0.04, 0.18)),
+    ("back_field", "chest", 0.11, (0.12, -0.02, 0.11), (0.12, 0.02, 0.11)),
+    ("shoulder_blades_field", "chest", 0.11, (0.12, -0.045, 0.185), (0.12, 0.045, 0.185)),
+    ("flank_field", "chest", 0.09, (0.035, -0.04, 0.10), (0.035, 0.04, 0.10)),
+    ("shoulder_girdle_field", "chest", 0.09, (0.035, -0.045, 0.19), (0.035, 0.045, 0.19)),
 ]
-HEAD: list[Field] = [("head_field", "head", 0.15, (0.0015, 0.0, 0.3474), (0.0015, 0.0, 0.3474))]
+HEAD: list[Field] = [
+    ("face_field", "head", 0.11, (-0.03, 0.0, 0.325), (-0.025, 0.0, 0.375)),
+    ("back_of_head_field", "head", 0.117, (0.03, 0.005, 0.33), (0.025, 0.005, 0.375)),
+]
 LEFT_ARM: list[Field] = [
-    ("upper_arm_field", "shoulder_3", 0.09, (-0.011, -0.1095, 0.11), (-0.011, -0.1095, 0.05)),
+    ("shoulder_field", "shoulder_1", 0.07, (-0.0106, -0.1094, 0.1748), (-0.0106, -0.1094, 0.1748)),
+    ("upper_arm_field", "shoulder_3", 0.085, (-0.011, -0.1095, 0.095), (-0.011, -0.1095, 0.045)),
     ("elbow_field", "shoulder_3", 0.085, (-0.021, -0.1064, 0.005), (-0.021, -0.1064, 0.005)),
-    ("forearm_field", "forearm", 0.095, (-0.006, -0.108, -0.03), (-0.006, -0.108, -0.11)),
-    ("palm_field", "hand", 0.085, (-0.011, -0.096, -0.14), (-0.011, -0.096, -0.175)),
-    ("fingers_field", "hand", 0.08, (-0.03, -0.093, -0.24), (0.012, -0.092, -0.24)),
-    ("thumb_field", "hand", 0.07, (-0.07, -0.083, -0.19), (-0.07, -0.083, -0.19)),
+    ("forearm_field", "forearm", 0.096, (-0.006, -0.108, -0.03), (-0.006, -0.108, -0.11)),
+    ("palm_field", "hand", 0.09, (-0.011, -0.096, -0.14), (-0.011, -0.096, -0.175)),
+    ("fingers_field", "hand", 0.085, (-0.03, -0.093, -0.245), (0.012, -0.092, -0.245)),
+    ("thumb_field", "hand", 0.08, (-0.08, -0.083, -0.192), (-0.08, -0.083, -0.192)),
+]
+# Fields only, the solids there are tested: an upper arm hangs beside the trunk, a bowed head comes near waist and shoulders.
+BESIDE = [
+    *((f"{side}_shoulder_3", trunk) for side in "lr" for trunk in ("root_link", "torso_1", "torso_2")),
+    *(("head", neighbour) for neighbour in ("torso_2", "l_shoulder_1", "r_shoulder_1")),
 ]

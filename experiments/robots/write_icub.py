@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.robots.icub_fields import HEAD, LEFT_ARM, TRUNK, Field
+from experiments.robots.icub_fields import BESIDE, HEAD, LEFT_ARM, TRUNK, Field
+from experiments.robots.icub_solids import BOXES
 from experiments.robots.xml_writer import box_turn, element, number, vector, write
 from mobee.robot.robot import Array
 
@@ -59,6 +60,9 @@ def main(data_path: str, out: str | Path = OUT) -> None:
     declare_motors(torso, data, "torso")
     base = element(torso, "link", name="root_link")
     add_shapes(base, model, "root_link", np.zeros(3))
+    add_fields(base, "root_link", np.zeros(3))
+    for first, second in BESIDE:
+        element(root, "ignore", first=first, second=second, role="field")
     add_joints(torso, data, "root_link", np.zeros(3))
     write(root, Path(out), HEADING)
 
@@ -158,8 +162,12 @@ def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
 
 
 def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
+    for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
+        width, height, depth = high - low
+        place = vector("px py pz", (low + high) / 2 - point)
+        element(parent, "box", name=f"{link}_{index}", width=width, height=height, depth=depth, **place)
     for shape in model["primitives"]:
-        if shape["link"] != link:
+        if shape["link"] != link or link in BOXES:
             continue
         place = vector("px py pz", np.array(shape["center"]) - point)
         if shape["shape"] == "sphere":

@@ -25,7 +25,7 @@ KNOWN = {
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
-    "ignore": frozenset({"first", "second"}),
+    "ignore": frozenset({"first", "second", "role"}),
 } | {tag: known | {"name", "field", "base"} for tag, known in VOLUME_TAGS.items()}
 
 
@@ -233,7 +233,7 @@ def _finish(root: Node, draft: _Draft, name: str) -> Robot:
         parts[part] = Part(part, names, next(k for k, motor in enumerate(motors) if motor.part == part))
     joints, table = finish_joints(draft.joints, draft.drives, motors)
     pairs = {
-        role: tested_pairs(draft.shapes, role, joined_links(joints), draft.subtree, _ignored(draft)) for role in ("field", "solid")
+        role: tested_pairs(draft.shapes, role, joined_links(joints), draft.subtree, _ignored(draft, role)) for role in ("field", "solid")
     }
     return Robot(
         name=name,
@@ -255,9 +255,11 @@ def _clauses(draft: _Draft, table: tuple[Motor, ...], parts: dict[str, Part]) ->
     return tuple(read_clauses(node, parts[part], names) for part, node in draft.constraints)
 
 
-def _ignored(draft: _Draft) -> set[LinkPair]:
+def _ignored(draft: _Draft, role: str) -> set[LinkPair]:
     pairs = set()
     for node in draft.ignores:
+        if node.choice("role", node.attributes.get("role", "both"), ("solid", "field", "both"), "role") not in (role, "both"):
+            continue
         ends = [node.choice(end, node.text(end), draft.links, "link") for end in ("first", "second")]
         pairs.add(frozenset(draft.links.index(end) for end in ends))
     return pairs
