@@ -37,6 +37,6 @@ LEFT_ARM: list[Field] = [
 ]
 # Fields only, the solids there are tested: an upper arm hangs beside the trunk, a bowed head comes near waist and shoulders.
 BESIDE = [
-    *((f"{side}_shoulder_3", trunk) for side in "lr" for trunk in ("root_link", "torso_1", "torso_2")),
+    *((f"{side}_shoulder_{k}", trunk) for side in "lr" for k in (1, 3) for trunk in ("root_link", "torso_1", "torso_2")),
     *(("head", neighbour) for neighbour in ("torso_2", "l_shoulder_1", "r_shoulder_1")),
 ]
