@@ -6,9 +6,9 @@ import difflib
 import re
 import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 import tyro
@@ -62,43 +62,72 @@ def read_toml(path: Path, cls: type[_C]) -> _C:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
-    _check_names(path, text, data, cls, "")
+
+    def where(field: str) -> str:
+        line = line_of(text, field)
+        return f"{path}:{line}" if line else str(path)
+
+    return convert(data, cls, where)
+
+
+def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], prefix: str = "") -> _C:
+    """The struct that the data describe; raises ConfigError, which names the field and, by `where(field)`, its place."""
+    check_names(data, cls, where, prefix)
     try:
         return msgspec.convert(data, cls)
     except msgspec.ValidationError as error:
-        field = re.search(r"\$\.([\w.]+)", str(error))
-        line = _line_of(text, field.group(1).rsplit(".", 1)[-1]) if field else None
-        raise ConfigError(f"{path}{f':{line}' if line else ''}: {error}") from None
+        text, _, place = str(error).partition(" - at `$.")
+        field = prefix + place.rstrip("`")
+        raise ConfigError(f"{where(field)}: {field}: {text}.{_nearest_choice(data, cls, place.rstrip('`'))}") from None
 
 
-def _check_names(path: Path, text: str, data: dict[str, Any], cls: type[Struct], prefix: str) -> None:
+def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], str], prefix: str = "") -> None:
+    """Raise ConfigError at the first name that the struct, or a struct in it, does not have."""
     hints = get_type_hints(cls)
     for name, value in data.items():
         if name not in hints:
-            near = difflib.get_close_matches(name, hints, n=1)
-            hint = f" Did you mean {near[0]!r}?" if near else ""
-            line = _line_of(text, name)
-            where = f"{path}:{line}" if line else str(path)
-            raise ConfigError(f"{where}: unknown field {prefix + name!r}.{hint} Valid: {', '.join(hints)}.")
+            raise ConfigError(f"{where(prefix + name)}: unknown field {prefix + name!r}.{nearest(name, hints)}")
         if isinstance(value, dict):
-            _check_table(path, text, value, hints[name], f"{prefix}{name}.")
+            _check_table(value, hints[name], where, f"{prefix}{name}.")
 
 
-def _check_table(path: Path, text: str, table: dict[str, Any], hint: Any, prefix: str) -> None:
+def nearest(given: str, valid: Iterable[str]) -> str:
+    """The end of a message about an unknown name: the most similar one, and all there are."""
+    names = list(valid)
+    near = difflib.get_close_matches(given, names, n=1)
+    return f"{f' Did you mean {near[0]!r}?' if near else ''} Valid: {', '.join(names) or 'none'}."
+
+
+def line_of(text: str, field: str) -> int | None:
+    """The line of a TOML text that sets a field, given with its tables' names; else of the innermost table around it."""
+    table, closest, found = "", -1, None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := re.match(r'\[+([\w."-]+)\]+\s*(#.*)?$', line):
+            name = table = header.group(1).replace('"', "")
+        elif key := re.match(r'\s*([\w."-]+)\s*=', line):
+            name = f"{table}.{key.group(1)}".lstrip(".").replace('"', "")
+        else:
+            continue
+        if f"{field}.".startswith(f"{name}.") and len(name) > closest:
+            closest, found = len(name), number
+    return found
+
+
+def _check_table(table: dict[str, Any], hint: Any, where: Callable[[str], str], prefix: str) -> None:
     """Descend into a struct, or into each value of a dict of structs."""
     if isinstance(hint, type) and issubclass(hint, Struct):
-        _check_names(path, text, table, hint, prefix)
+        check_names(table, hint, where, prefix)
         return
     inner = get_args(hint)
     if len(inner) == 2 and isinstance(inner[1], type) and issubclass(inner[1], Struct):
         for key, value in table.items():
             if isinstance(value, dict):
-                _check_names(path, text, value, inner[1], f"{prefix}{key}.")
+                check_names(value, inner[1], where, f"{prefix}{key}.")
 
 
-def _line_of(text: str, name: str) -> int | None:
-    pattern = re.compile(rf"^\s*(\[.*\b{re.escape(name)}\b.*\]|\"?{re.escape(name)}\"?\s*=)|[{{,]\s*{re.escape(name)}\s*=")
-    for number, line in enumerate(text.splitlines(), start=1):
-        if pattern.search(line):
-            return number
-    return None
+def _nearest_choice(data: dict[str, Any], cls: type[Struct], field: str) -> str:
+    """The nearest valid word for a field that takes one of a few words."""
+    hint, given = get_type_hints(cls).get(field), data.get(field)
+    if get_origin(hint) is Literal and isinstance(given, str):
+        return nearest(given, map(str, get_args(hint)))
+    return ""

@@ -49,9 +49,9 @@ class Inbox:
         """Have it run at a time of the monotonic clock; main thread only."""
         heapq.heappush(self._timers, (when, next(self._order), handler))
 
-    def spin(self, until: float) -> None:
-        """Handle everything that comes until that time of the monotonic clock."""
-        while True:
+    def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
+        """Handle everything that comes until that time of the monotonic clock, or until it was `enough`."""
+        while enough is None or not enough():
             now = time.monotonic()
             if self._timers and self._timers[0][0] <= now:
                 heapq.heappop(self._timers)[2]()

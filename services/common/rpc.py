@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable
 from typing import TypeVar
 
 import zenoh
+from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
-from bus_schema.rpc import Failure, Reply, Request
+from bus_schema.rpc import Empty, Failure, Reply, Request
 
 _R = TypeVar("_R", bound=Reply)
 TIMEOUT = 0.5  # s
@@ -27,15 +29,37 @@ def call(
 ) -> _R:
     """Ask the service behind `key`; raises CallFailed.  An empty answer means that nobody is there."""
     message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
-    answers = session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout)
-    for answer in answers:
-        if answer.ok is None:
-            raise _failure(key, answer)
-        try:
-            return decode(reply, answer.ok.payload.to_bytes(), str(answer.ok.encoding))
-        except Refused as refused:
-            raise CallFailed("bad_answer", f"{key}: {refused}") from None
+    for answer in session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout):
+        return _read(key, answer, reply)
     raise CallFailed("no_answer", f"{key}: nobody answers")
+
+
+def ask(
+    session: zenoh.Session, who: str, key: str, reply: type[_R], done: Callable[[_R | CallFailed], None], *, timeout: float = TIMEOUT
+) -> None:
+    """Call without arguments that does not wait: `done` gets the answer or the failure, once, on a thread of Zenoh."""
+    message = Empty(v=VERSION, id=uuid.uuid4().hex, who=who)
+    answers: list[zenoh.Reply] = []
+
+    def finish() -> None:
+        result: _R | CallFailed = CallFailed("no_answer", f"{key}: nobody answers")
+        if answers:
+            try:
+                result = _read(key, answers[0], reply)
+            except CallFailed as failed:
+                result = failed
+        done(result)
+
+    session.get(key, payload=encode(message), encoding=encoding_of(Empty), timeout=timeout, handler=Callback(answers.append, finish))
+
+
+def _read(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R:
+    if answer.ok is None:
+        raise _failure(key, answer)
+    try:
+        return decode(reply, answer.ok.payload.to_bytes(), str(answer.ok.encoding))
+    except Refused as refused:
+        raise CallFailed("bad_answer", f"{key}: {refused}") from None
 
 
 def _failure(key: str, answer: zenoh.Reply) -> CallFailed:

@@ -58,12 +58,13 @@ class Service:
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
         self.mark: Callable[[], None] = lambda: None  # zero the counters of `describe`: a measurement begins
+        self.end: Callable[[], None] = _leave  # what a shutdown call leads to
         self._kept: list[Any] = []  # tokens die with their handles
         self._replies: OrderedDict[str, tuple[type[Reply], bytes]] = OrderedDict()
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._on_run: list[Callable[[], None]] = []
         self._is_ready = False
-        self._router_seen = time.monotonic()
+        self._router, self._router_seen = "", time.monotonic()
         self._watch_liveliness()
         self.on_request(keys.service_rpc(who, "stat"), Empty, self._stat)
         self.on_request(keys.service_rpc(who, "mark"), Empty, self._mark)
@@ -136,15 +137,23 @@ class Service:
         """Ask another service; raises rpc.CallFailed."""
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, **fields)
 
+    def ask(self, key: str, reply: type[_R], done: Callable[[_R | rpc.CallFailed], None], *, timeout: float = rpc.TIMEOUT) -> None:
+        """Call without arguments that does not wait: `done` handles the answer or the failure in the main thread."""
+
+        def enqueue(answer: _R | rpc.CallFailed) -> None:
+            self.inbox.put(lambda: done(answer))
+
+        rpc.ask(self.bus.session, self.who, key, reply, enqueue, timeout=timeout)
+
     def ready(self) -> None:
         """Tell the world: after every subscriber and queryable is declared."""
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)
 
-    def spin(self, until: float) -> None:
-        """Handle what comes until that time of the monotonic clock."""
-        self.inbox.spin(until)
+    def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
+        """Handle what comes until that time of the monotonic clock, or until it was `enough`."""
+        self.inbox.spin(until, enough)
 
     def run(self) -> None:
         """Handle what comes until SIGTERM, a shutdown call, or ten seconds without a router."""
@@ -177,8 +186,17 @@ class Service:
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         instances = self.alive.setdefault(who, set())
         (instances.add if up else instances.discard)(instance)
+        if who == "router" and up:
+            self._join(instance)
         for handler in self._on_alive:
             handler(who, instance, up)
+
+    def _join(self, router: str) -> None:
+        """A service belongs to the system it was started in: a later one at the same endpoint must not inherit it."""
+        if self._router not in ("", router):
+            self.log.error("another router came to %s: ending", self.config.endpoint)
+            raise SystemExit(3)
+        self._router = router
 
     def _answer(self, query: zenoh.Query, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
         key = str(query.key_expr)
@@ -226,6 +244,7 @@ class Service:
         )
 
     def _mark(self, request: Empty, key: str) -> Done:
+        self.bus.rejected.clear()
         self.mark()
         return Done(v=VERSION)
 
@@ -234,7 +253,7 @@ class Service:
 
     def _shutdown(self, request: Empty, key: str) -> Done:
         self.log.info("asked by %s to end", request.who)
-        self.inbox.at(time.monotonic() + 0.05, _leave)  # after the reply is out
+        self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply is out
         return Done(v=VERSION)
 
 

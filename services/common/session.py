@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 
 import zenoh
@@ -45,7 +46,7 @@ def open_client(endpoint: str, patience: float = 10.0) -> zenoh.Session:
         except zenoh.ZError as error:
             if time.monotonic() >= give_up:
                 raise BusUnreachable(
-                    f"no router at {endpoint} within {patience:g} s ({error}). Is the system up? Start it with `mobee launch`, "
+                    f"no router at {endpoint} within {patience:g} s ({_reason(error)}). Is the system up? Start it with `mobee launch`, "
                     "or name its endpoint with --endpoint."
                 ) from None
             time.sleep(0.1)
@@ -58,6 +59,11 @@ def open_router(endpoint: str) -> zenoh.Session:
         return zenoh.open(_config(settings))
     except zenoh.ZError as error:
         raise BusUnreachable(
-            f"cannot listen at {endpoint}: {error}. If another system runs there, `mobee stop` ends it; "
+            f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop` ends it; "
             "or choose another endpoint with --endpoint."
         ) from None
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """Zenoh's message without the lines of its own source files."""
+    return re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
