@@ -10,6 +10,7 @@ ESTOP_RESET = "estop/rpc/reset"
 MODEL_FORCES = "model/forces"
 MODEL_POSE = "model/pose"
 MODEL_CONTACTS = "model/contacts"
+MODEL_JACOBIAN = "model/rpc/jacobian"
 SIM_TRUTH = "sim/truth"
 
 ALL_ALIVE = "alive/*/*"

@@ -124,6 +124,12 @@ class Driven(Reply, frozen=True, kw_only=True):
     gate: GateState
 
 
+class Started(Reply, frozen=True, kw_only=True):
+    """An action began at tick k; motion messages of later ticks tell of it."""
+
+    k: Count
+
+
 class PartMeta(Reply, frozen=True, kw_only=True):
     """What a part is made of."""
 

@@ -1,1 +1,6 @@
-"""A curious agent that explores the configuration space of one part."""
+"""A curious agent of one part as a process; torso, left arm and right arm are three of them.
+
+Reads: clock, {part}/motion.
+Writes: agents/{part}/transition.
+Calls: {part}/rpc/{take,goal} of the controller.
+"""

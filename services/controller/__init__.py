@@ -1,1 +1,7 @@
-"""The MoBeE controller: forces and goals in, motor commands out, once a tick."""
+"""The MoBeE controller as a process: goals and forces in, motor commands out.
+
+Reads: clock, {part}/state, model/forces.
+Writes: {part}/cmd, {part}/motion.
+Answers: {part}/rpc/{take,release,goal,force}.
+Calls: {part}/rpc/drive/{take,arm} of robot_sim.
+"""

@@ -1,1 +1,6 @@
-"""The egocentric model: whole-body state, contacts and constraint forces, once a tick."""
+"""The egocentric model as a process: whole-body state in, constraint forces out.
+
+Reads: clock, {part}/state, world/*.
+Writes: model/forces, model/pose, model/contacts.
+Answers: model/rpc/world/{add,move,remove,role,attach,detach,list}, model/rpc/jacobian.
+"""

@@ -1,0 +1,31 @@
+"""Which part of the body touches which object of the world."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from mobee.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from mobee.model import Pose
+
+
+def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
+    """For every part, the names of the world objects in contact (fields included) with a link that it moves; one pose."""
+    touching = [(c.first_link, c.second) for c in pose.contacts if c.second_link < 0]
+    return {part: tuple(sorted({name for link, name in touching if link in moved})) for part, moved in links_moved(pose.robot).items()}
+
+
+@lru_cache(maxsize=8)
+def links_moved(robot: Robot) -> dict[str, frozenset[int]]:
+    """For every part, the links that its motors move in the root frame: those they drive and all that are mounted on them."""
+    matrix, _ = robot.coupling
+    found: dict[str, frozenset[int]] = {}
+    for name, part in robot.parts.items():
+        moved: set[int] = set()
+        for index, joint in enumerate(robot.joints):
+            if joint.parent in moved or matrix[index, part.slice].any():
+                moved.add(index + 1)
+        found[name] = frozenset(moved)
+    return found

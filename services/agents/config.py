@@ -1,0 +1,34 @@
+"""What an agent is told."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from services.common.config import ServiceConfig
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """An agent's settings; the joints default to the published ones of its part (thesis 7.4)."""
+
+    part: str = "left_arm"
+    """The part it moves."""
+    joints: list[str] = []
+    """Motors that span its state space; empty: the torso's three, or an arm's shoulder and elbow."""
+    levels: list[float] = [0.25, 0.5, 0.75]
+    """Fractions of each joint's range at which the samples lie."""
+    neighbours: Annotated[int, Meta(ge=0)] = 0
+    """How many nearest states it can go to; 0: the published 8 of the torso, 16 of an arm."""
+    tie_seed: int = 0
+    """Seed of the draw among equally near neighbours."""
+    explorer: Literal["curious", "random", "least_tried"] = "curious"
+    """How it chooses."""
+    discount: Annotated[float, Meta(ge=0, lt=1)] = 0.9
+    """Of future rewards."""
+    initial: Literal["50-50", "60-40"] = "50-50"
+    """What it believes of an action before it has tried it."""
+    run_dir: str = ""
+    """Folder of the run, where its transitions are kept and found again; empty: they are not kept."""
+    transitions: Annotated[int, Meta(ge=0)] = 0
+    """End after so many in all; 0: go on for ever."""

@@ -1,0 +1,100 @@
+"""An agent at work: decide, act, observe, tell."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Literal
+
+from bus_schema import keys
+from bus_schema.messages import Transition as TransitionMessage
+from mobee import ActionInterrupted, CuriousAgent, Lattice
+from mobee.robot.robot import Robot
+from mobee.store import TransitionStore
+from services.agents.config import Config
+from services.common.bus_plant import BusPlant
+from services.common.delivery import EVENTS
+from services.common.service import Service
+
+ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
+
+
+def published_space(robot: Robot, config: Config) -> Lattice:
+    """The lattice of thesis 7.4 for the part, unless the settings say otherwise."""
+    part = robot.part(config.part)
+    is_arm = any(name.endswith("elbow") for name in part.motors)
+    joints = config.joints or [name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS)]
+    neighbours: int | Literal["equidistant"] = config.neighbours or (16 if is_arm else 8)
+    return Lattice(robot, joints, tuple(config.levels), neighbours, tie_seed=config.tie_seed)
+
+
+class AgentNode:
+    """A curious agent on the live plant; every transition is on disk before the next action."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        self._service, self._config = service, config
+        self._store = TransitionStore(Path(config.run_dir) / "transitions.sqlite", config.part) if config.run_dir else None
+        self._agent = CuriousAgent(
+            published_space(robot, config),
+            BusPlant(service, robot, (config.part,)),
+            explorer=config.explorer,
+            seed=config.seed,
+            discount=config.discount,
+            initial=config.initial,
+            store=self._store,
+        )
+        self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+
+    def run(self) -> None:
+        """Act until the wanted number of transitions is made."""
+        self._service.ready()
+        if self._agent.transitions:
+            self._service.bus.event("info", "resumed", f"{self._config.part} goes on after {self._agent.transitions} transitions")
+        while not self._config.transitions or self._agent.transitions < self._config.transitions:
+            try:
+                self._step()
+            except ActionInterrupted as interruption:
+                self._interrupted += 1
+                self._service.bus.event("warning", "interrupted", str(interruption))
+            self._service.spin(time.monotonic())
+
+    def _step(self) -> None:
+        state = self._agent.state
+        values, _ = self._agent.plan()
+        value = float(values[state])
+        self._agent.step()
+        made = self._agent.last
+        if made is None:
+            return
+        self._made += 1
+        self._timeouts += not made.settled
+        self._seconds += made.duration
+        self._stream.put(
+            agent=self._config.part,
+            n=made.n,
+            s=made.s,
+            a=made.a,
+            goal=int(self._agent.space.goal(made.s, made.a)),
+            s_next=made.s_next,
+            reward=made.reward,
+            value=value,
+            settled=made.settled,
+            duration=made.duration,
+            touched=list(made.touched),
+        )
+
+    def _mark(self) -> None:
+        self._made = self._timeouts = self._interrupted = 0
+        self._seconds = 0.0
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers = {
+            "transitions": self._made,
+            "transitions_ever": self._agent.transitions,
+            "timeouts": self._timeouts,
+            "interrupted": self._interrupted,
+            "action_time_mean": self._seconds / self._made if self._made else -1.0,
+        }
+        return f"{self._agent.transitions} transitions, {self._made} now", numbers

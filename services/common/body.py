@@ -1,0 +1,42 @@
+"""The whole-body state, assembled from parts that report each in its own time (thesis 2.3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import State
+from mobee.robot.robot import Array, Robot
+from services.common.bus import Bus
+
+
+class Body:
+    """The newest state of each part."""
+
+    def __init__(self, bus: Bus, robot: Robot) -> None:
+        self._streams = {name: bus.latest(keys.state(name), State, part=name) for name in robot.parts}
+        self._robot = robot
+        self.states: dict[str, State] = {}
+
+    def update(self) -> bool:
+        """Take what has come; True once every part has reported."""
+        for name, stream in self._streams.items():
+            state = stream.take()
+            if state is not None:
+                self.states[name] = state
+        return len(self.states) == len(self._streams)
+
+    def forget(self) -> None:
+        """A new run: nothing is known yet."""
+        self.states.clear()
+
+    def q(self) -> Array:
+        """Motor positions, shape (n,), in [rad]; only after `update` said True."""
+        q = np.empty(len(self._robot.motors))
+        for name, part in self._robot.parts.items():
+            q[part.slice] = self.states[name].q
+        return q
+
+    def ages(self, t: int) -> dict[str, int]:
+        """How old each part's sample is at bus time t, in [ns]."""
+        return {name: t - state.t for name, state in self.states.items()}

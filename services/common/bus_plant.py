@@ -1,0 +1,126 @@
+"""The live twin of the offline plant: acts on a part through the controller on the bus."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Clock, Motion
+from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
+from mobee.plant import Outcome
+from mobee.robot.robot import Array, Robot
+from services.common.rpc import CallFailed
+from services.common.service import Service
+
+POLL = 0.2  # s between attempts while the controller is away or the part is in hold
+
+
+class BusPlant:
+    """A Plant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile."""
+
+    def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
+        self._service, self.robot = service, robot
+        self._epochs: dict[str, int] = {}
+        self._motion: dict[str, Motion] = {}
+        self._tick = 0.0  # s
+        self._runs = 0
+        for part in parts:
+            robot.part(part)
+            service.on_newest(keys.motion(part), Motion, self._noter(part), part=part)
+        service.on_clock(self._note_clock)
+        service.on_run(self._new_run)
+
+    def measure(self, part: str) -> Array:
+        """The part's motor positions, (n_part,) rad, as soon as the part is under control and its goal is ours."""
+        while not (self._owns(part) and self._is_free(part)):
+            self._service.check_router()
+            self._take(part)
+            self._service.spin(time.monotonic() + POLL, lambda: self._owns(part) and self._is_free(part))
+        return np.array(self._motion[part].q)
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """See mobee.plant.Plant."""
+        if part not in self._motion or not self._owns(part):
+            self.measure(part)
+        run, action_id = self._runs, uuid.uuid4().hex
+        asked = self._ask(part, action_id, target)
+        while True:
+            self._service.check_router()
+            self._service.spin(time.monotonic() + POLL, lambda: run != self._runs or self._is_over(part, action_id, asked))
+            if run != self._runs:
+                raise ActionInterrupted(f"{part}: robot_sim started a new run")
+            if self._is_over(part, action_id, asked):
+                return self._outcome(part, action_id)
+            if not self._owns(part) or not self._service.alive.get("controller"):
+                self._epochs.pop(part, None)
+                raise ActionInterrupted(f"{part}: the controller is gone")
+
+    def release(self, part: str) -> None:
+        """Give the part's goal back."""
+        epoch = self._epochs.pop(part, None)
+        if epoch is not None:
+            self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
+
+    def _ask(self, part: str, action_id: str, target: Array) -> int:
+        """Start the action; returns the tick at which it began."""
+        q = [float(x) for x in target]
+        try:
+            reply = self._service.call(keys.goal(part, "goal"), Goal, Started, epoch=self._epochs[part], action_id=action_id, q=q)
+        except CallFailed as error:
+            if error.code == "limits":
+                raise InvalidValue(str(error)) from None
+            if error.code == "epoch":
+                del self._epochs[part]
+            raise ActionInterrupted(f"{part}: {error}") from None
+        return reply.k
+
+    def _outcome(self, part: str, action_id: str) -> Outcome:
+        motion = self._motion[part]
+        if motion.action_id != action_id or motion.status == "held":
+            raise ActionInterrupted(f"{part}: in hold before the action ended")
+        duration = (motion.since_k - motion.start_k) * self._tick
+        return Outcome(np.array(motion.q), motion.status == "settled", duration, tuple(motion.touched))
+
+    def _is_over(self, part: str, action_id: str, asked: int) -> bool:
+        motion = self._motion.get(part)
+        if motion is None or motion.k <= asked:
+            return False
+        return motion.action_id != action_id or motion.status != "moving"
+
+    def _is_free(self, part: str) -> bool:
+        motion = self._motion.get(part)
+        return motion is not None and motion.status != "held"
+
+    def _owns(self, part: str) -> bool:
+        motion = self._motion.get(part)
+        return part in self._epochs and motion is not None and motion.epoch == self._epochs[part]
+
+    def _take(self, part: str) -> None:
+        if self._owns(part) or not self._service.alive.get("controller"):
+            return
+        try:
+            reply = self._service.call(keys.goal(part, "take"), Take, Taken, instance=self._service.instance)
+        except CallFailed as error:
+            if error.code == "owned":
+                raise MobeeError(str(error)) from None
+            self._service.log.info("the goal of %s cannot be taken yet: %s", part, error)
+            return
+        self._epochs[part] = reply.epoch
+
+    def _noter(self, part: str) -> Callable[[Motion], None]:
+        def note(motion: Motion) -> None:
+            self._motion[part] = motion
+
+        return note
+
+    def _note_clock(self, clock: Clock) -> None:
+        self._tick = clock.dt * 1e-9
+
+    def _new_run(self) -> None:
+        self._runs += 1
+        self._motion.clear()

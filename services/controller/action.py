@@ -1,0 +1,61 @@
+"""The action of one part: who owns the goal, what was asked, and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bus_schema.messages import MotionStatus
+from mobee.control import Settle, SettleTest
+from mobee.robot.robot import Array
+
+
+@dataclass
+class Owner:
+    """One process, as long as its token lives."""
+
+    who: str
+    instance: str
+    epoch: int
+
+
+class Action:
+    """Goal ownership and action state of a part; times in s of the bus clock, ticks in k."""
+
+    def __init__(self, settle: Settle) -> None:
+        self._settle = settle
+        self._test: SettleTest | None = None
+        self.owner: Owner | None = None
+        self.id = ""
+        self.status: MotionStatus = "held"
+        self.since_k = self.start_k = 0
+
+    def start(self, action_id: str, k: int, t: float) -> None:
+        """A goal was set at tick k."""
+        self.id, self.start_k = action_id, k
+        self._test = SettleTest(self._settle, t)
+        self._become("moving", k)
+
+    def look(self, k: int, t: float, speeds: Array, accelerations: Array) -> None:
+        """See whether the motion has died down."""
+        if self._test is not None and self.status == "moving":
+            self._become(self._test.look(t, speeds, accelerations), k)
+
+    def hold(self, k: int) -> None:
+        """The part is not under control: whatever was going on ended without an outcome."""
+        self._test = None
+        self._become("held", k)
+
+    def resume(self, k: int) -> None:
+        """Under control again, at rest, with nothing to do."""
+        self.id = ""
+        self._become("idle", k)
+
+    def drop(self, k: int) -> None:
+        """The owner is gone: its action ends, the part stays."""
+        self.owner, self._test = None, None
+        if self.status != "held":
+            self.resume(k)
+
+    def _become(self, status: MotionStatus, k: int) -> None:
+        if status != self.status:
+            self.status, self.since_k = status, k

@@ -1,0 +1,118 @@
+"""What agents may ask: own a part's goal, set it, force the part."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from bus_schema import VERSION, keys
+from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
+from mobee import Controller
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array, Robot
+from services.common.service import CallRefused, Service
+from services.controller.action import Action, Owner
+
+DONE = Done(v=VERSION)
+
+
+_Q = TypeVar("_Q", bound=Request)
+
+
+def _by_part(handler: Callable[[str, _Q], Reply]) -> Callable[[_Q, str], Reply]:
+    return lambda request, key: handler(key.split("/")[0], request)
+
+
+class GoalDesk:
+    """Serves the goals of all parts; an epoch belongs to one owner, and dies with its token."""
+
+    def __init__(self, service: Service, robot: Robot, law: Controller, actions: dict[str, Action], rest: Callable[[str], None]) -> None:
+        self._service, self._robot, self._law, self._actions, self._rest = service, robot, law, actions, rest
+        self._forces = np.zeros(len(robot.motors))
+        self._pushed: dict[str, set[str]] = {}
+        self._epoch = time.time_ns() // 1_000_000  # newer than any epoch of a controller that died
+        service.on_request(keys.goal("*", "take"), Take, _by_part(self._take), part_of_key=True)
+        service.on_request(keys.goal("*", "release"), WithEpoch, _by_part(self._release), part_of_key=True)
+        service.on_request(keys.goal("*", "goal"), Goal, _by_part(self._goal), part_of_key=True)
+        service.on_request(keys.goal("*", "force"), Force, _by_part(self._force), part_of_key=True)
+        service.on_alive(self._note)
+
+    def _take(self, part: str, request: Take) -> Taken:
+        owner = self._actions[part].owner
+        if owner is not None and owner.instance != request.instance and owner.instance in self._service.alive.get(owner.who, ()):
+            raise CallRefused("owned", f"the goal of {part} belongs to {owner.who}; it must release it first")
+        if request.instance not in self._service.alive.get(request.who, ()):
+            raise CallRefused("token", f"no liveliness token alive/{request.who}/{request.instance}: declare it before taking a goal")
+        self._epoch += 1
+        self._actions[part].owner = Owner(request.who, request.instance, self._epoch)
+        return Taken(v=VERSION, epoch=self._epoch)
+
+    def _release(self, part: str, request: WithEpoch) -> Done:
+        self._check_epoch(part, request.epoch)
+        self._drop(part)
+        return DONE
+
+    def _goal(self, part: str, request: Goal) -> Started:
+        self._check_epoch(part, request.epoch)
+        target = np.array(request.q)
+        self._check_limits(part, target)
+        action = self._actions[part]
+        if action.status == "held":
+            raise CallRefused("held", f"{part} is in hold; wait until its motion says otherwise")
+        self._law.set_attractor(part, target)
+        action.start(request.action_id, self._service.bus.k, self._service.bus.t * 1e-9)
+        return Started(v=VERSION, k=self._service.bus.k)
+
+    def _force(self, part: str, request: Force) -> Done:
+        self._check_epoch(part, request.epoch)
+        try:
+            self._apply(part, request)
+        except MobeeError as error:
+            raise CallRefused("force", str(error)) from None
+        return DONE
+
+    def _apply(self, part: str, request: Force) -> None:
+        if request.f is not None:
+            self._forces[self._robot.part(part).slice] = request.f
+            self._law.force(self._forces)
+        if request.marker is not None:
+            self._law.push(request.marker, np.array(request.push or (0.0, 0.0, 0.0)))
+            self._pushed.setdefault(part, set()).add(request.marker)
+        if request.f is None and request.marker is None:
+            self._clear(part)
+
+    def _clear(self, part: str) -> None:
+        """End the forces of one part's client; those of the others go on."""
+        self._forces[self._robot.part(part).slice] = 0.0
+        self._law.force(self._forces)
+        for marker in self._pushed.pop(part, ()):
+            self._law.push(marker, np.zeros(3))
+
+    def _check_epoch(self, part: str, epoch: int) -> None:
+        owner = self._actions[part].owner
+        if owner is None or owner.epoch != epoch:
+            raise CallRefused("epoch", f"epoch {epoch} does not own the goal of {part}: take it first")
+
+    def _check_limits(self, part: str, target: Array) -> None:
+        limits = self._robot.limits[self._robot.part(part).slice]
+        outside = np.flatnonzero((target < limits[:, 0] - 1e-9) | (target > limits[:, 1] + 1e-9))
+        if len(outside):
+            i = int(outside[0])
+            raise CallRefused(
+                "limits",
+                f"{self._robot.part(part).motors[i]} to {target[i]:.4f} rad: its range is {limits[i, 0]:.4f} to {limits[i, 1]:.4f}",
+            )
+
+    def _note(self, who: str, instance: str, up: bool) -> None:
+        for part, action in self._actions.items():
+            if not up and action.owner is not None and action.owner.instance == instance:
+                self._service.bus.event("warning", "agent_gone", f"{who} is gone: {part} stays where it is")
+                self._drop(part)
+
+    def _drop(self, part: str) -> None:
+        self._actions[part].drop(self._service.bus.k)
+        self._clear(part)
+        self._rest(part)

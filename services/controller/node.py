@@ -1,0 +1,162 @@
+"""The controller at work: once a tick, from the parts' states and the model's forces to the commands."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Clock, Command, Motion, State
+from bus_schema.messages import Forces as ForcesMessage
+from mobee import Controller, Gains, Model
+from mobee.control import Forces
+from mobee.robot.robot import Robot
+from services.common.body import Body
+from services.common.delivery import LATEST
+from services.common.service import Service
+from services.controller.action import Action
+from services.controller.config import Config
+from services.controller.drives import Drives
+from services.controller.goals import GoalDesk
+
+OLDEST = 3  # ticks: with forces older than that the robot holds
+
+
+class ControllerNode:
+    """Waits for the forces of the tick, steps the law, commands the parts that obey."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        self._service, self._config, self._robot = service, config, robot
+        gains = Gains.named(config.gains)
+        self._law = Controller(Model(robot), gains, config.modality, speed_scale=config.speed_scale)
+        self._actions = {part: Action(gains.settle) for part in robot.parts}
+        self._drives = Drives(service, robot)
+        self._body = Body(service.bus, robot)
+        self._forces: ForcesMessage | None = None
+        self._clock: Clock | None = None  # of the tick that still waits for its forces
+        self._last_k = -1
+        bus = service.bus
+        self._commands = {part: bus.publisher(keys.command(part), Command, LATEST) for part in robot.parts}
+        self._motions = {part: bus.publisher(keys.motion(part), Motion, LATEST) for part in robot.parts}
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+        GoalDesk(service, robot, self._law, self._actions, self._rest)
+        service.on_run(self._new_run)
+        service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
+        service.on_clock(self._tick)
+
+    def _tick(self, clock: Clock) -> None:
+        self._clock = clock
+        if self._forces is not None and self._forces.re_k >= clock.k:
+            self._step()
+            return
+        k = clock.k
+        self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt, lambda: self._wait_is_over(k))
+
+    def _take_forces(self, forces: ForcesMessage) -> None:
+        self._forces = forces
+        if self._clock is not None and forces.re_k >= self._clock.k:
+            self._step()
+
+    def _wait_is_over(self, k: int) -> None:
+        if self._clock is not None and self._clock.k == k:
+            self._late_forces += 1
+            self._step()
+
+    def _step(self) -> None:
+        clock, self._clock = self._clock, None
+        if clock is None or not self._body.update():
+            return
+        fresh = self._forces is not None and clock.k - self._forces.re_k <= OLDEST
+        self._supervise(clock.k, fresh)
+        gap, self._last_k = max(clock.k - self._last_k, 1), clock.k
+        if fresh and self._forces is not None:
+            self._advance(clock, min(gap, OLDEST), self._forces)
+        else:
+            self._starve(clock.k)
+        self._publish_motion(clock)
+        self._ticks += 1
+
+    def _supervise(self, k: int, fresh: bool) -> None:
+        """Arm what can be armed; what is not under control has no action and rests where it is."""
+        for part, action in self._actions.items():
+            state = self._body.states[part]
+            armed = fresh and (self._drives.armed(part, state) or self._drives.arming(part, k) or self._drives.try_arm(part, state, k))
+            if not armed:
+                if action.status != "held":
+                    self._held(part, k, state)
+                self._law.hold(part, np.array(state.q))
+                self._held_ticks += 1
+            elif action.status == "held":
+                self._rest(part)
+                action.resume(k)
+
+    def _advance(self, clock: Clock, ticks: int, forces: ForcesMessage) -> None:
+        """Step the law over the ticks that have passed, and command what is armed."""
+        acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
+        q = self._body.q()
+        for _ in range(ticks):
+            command = self._law.step(q, clock.dt * 1e-9, acting)
+        reference = getattr(command, self._config.modality)
+        for part, action in self._actions.items():
+            if action.status != "held":
+                where = self._robot.part(part).slice
+                self._send(part, clock.k, self._config.modality, reference[where].tolist())
+                action.look(clock.k, clock.t * 1e-9, self._law.velocity[where], self._law.acceleration[where])
+
+    def _starve(self, k: int) -> None:
+        """No forces, no motion: tell every part that still obeys to hold."""
+        for part, state in self._body.states.items():
+            if self._drives.armed(part, state):
+                self._send(part, k, "hold", [0.0] * len(state.q))
+
+    def _send(self, part: str, k: int, mode: str, reference: list[float]) -> None:
+        self._commands[part].put(epoch=self._drives.epochs[part], re_k=k, mode=mode, ref=reference, ttl=self._config.ttl)
+
+    def _publish_motion(self, clock: Clock) -> None:
+        touched = self._forces.touched if self._forces is not None else {}
+        for part, action in self._actions.items():
+            where = self._robot.part(part).slice
+            self._motions[part].put(
+                k=clock.k,
+                t=clock.t,
+                action_id=action.id,
+                epoch=action.owner.epoch if action.owner is not None else 0,
+                status=action.status,
+                since_k=action.since_k,
+                start_k=action.start_k,
+                q=self._body.states[part].q,
+                dq=self._law.velocity[where].tolist(),
+                ddq=self._law.acceleration[where].tolist(),
+                goal=self._law.attractor[where].tolist(),
+                touched=touched.get(part, []),
+            )
+
+    def _held(self, part: str, k: int, state: State) -> None:
+        self._actions[part].hold(k)
+        self._service.bus.event("warning", "held", f"{part} is in hold (gate {state.gate})", epoch=float(self._drives.epochs[part]))
+
+    def _rest(self, part: str) -> None:
+        """At rest where it is, or on its way to its posture if nobody owns it and one is given."""
+        if part not in self._body.states:
+            return
+        self._law.hold(part, np.array(self._body.states[part].q))
+        if self._actions[part].owner is None and part in self._config.posture:
+            self._law.set_attractor(part, np.array(self._config.posture[part]))
+
+    def _new_run(self) -> None:
+        self._body.forget()
+        self._drives.forget()
+        self._forces, self._clock, self._last_k = None, None, -1
+        self._law.reset(self._robot.home)
+        for action in self._actions.values():
+            action.hold(self._service.bus.k)
+
+    def _mark(self) -> None:
+        self._ticks = self._late_forces = self._held_ticks = 0
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers: dict[str, float] = {"ticks": self._ticks, "late_forces": self._late_forces, "held_ticks": self._held_ticks}
+        under = [part for part, action in self._actions.items() if action.status != "held"]
+        return f"{len(under)} of {len(self._actions)} parts under control", numbers

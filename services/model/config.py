@@ -1,0 +1,20 @@
+"""What the model is told."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from services.common.config import ServiceConfig
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """The model's settings."""
+
+    world: str = "table"
+    """Shipped world, or path to a world file; objects of role target are left to be perceived."""
+    gains: Literal["default", "published_2014"] = "published_2014"
+    """Which set shapes the constraint forces; the controller must use the same."""
+    propagate: Literal["tree", "part"] = "tree"
+    """How far down the body a contact is felt."""
+    contact_forces: bool = True
+    """False: contacts are reported but exert no force, as a control experiment."""

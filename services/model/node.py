@@ -1,0 +1,118 @@
+"""The model at work: once a tick, from the newest state of every part to the forces that constrain them."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from bus_schema import VERSION, keys
+from bus_schema.messages import Clock, ContactItem, Contacts, Forces, MarkerPose, Pose
+from bus_schema.rpc import JacobianAt, JacobianReply
+from mobee import Gains, Model, load_world
+from mobee.collision.touch import touched
+from mobee.control import constraint_forces
+from mobee.errors import MobeeError
+from mobee.kinematics.quaternion import from_matrix
+from mobee.model import Pose as ModelPose
+from mobee.robot.robot import Array, Robot
+from services.common.body import Body
+from services.common.delivery import LATEST
+from services.common.figures import Percentiles
+from services.common.service import CallRefused, Service
+from services.model.config import Config
+from services.model.world import WorldDesk
+
+
+class ModelNode:
+    """Assembles q, evaluates, publishes."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        self._service, self._config, self._robot = service, config, robot
+        self._model = Model(robot, load_world(config.world))
+        for name, item in list(self._model.world.objects.items()):
+            if item.role == "target":
+                self._model.world.remove(name)
+        self._gains = Gains.named(config.gains)
+        self._body = Body(service.bus, robot)
+        self._q: Array = robot.home
+        self._desk = WorldDesk(service, self._model)
+        bus = service.bus
+        self._forces = bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
+        self._pose = bus.publisher(keys.MODEL_POSE, Pose, LATEST)
+        self._contacts = bus.publisher(keys.MODEL_CONTACTS, Contacts, LATEST)
+        self._last_k = -1
+        self._time = Percentiles()
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+        service.on_request(keys.MODEL_JACOBIAN, JacobianAt, lambda r, _: self._jacobian(r))
+        service.on_run(self._body.forget)
+        service.on_clock(self._tick)
+        self._model.evaluate(robot.home)  # everything that is built once is built before the robot moves
+
+    def _tick(self, clock: Clock) -> None:
+        if not self._body.update():
+            return
+        begin = time.perf_counter()
+        self._desk.expire(clock.t)
+        self._q = self._body.q()
+        pose = self._model.evaluate(self._q)
+        forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
+        touching = {part: list(names) for part, names in touched(pose).items() if names}
+        self._forces.put(
+            re_k=clock.k,
+            limits=forces.limits.tolist(),
+            constraints=forces.constraints.tolist(),
+            collision=forces.collision.tolist(),
+            part_age=self._body.ages(clock.t),
+            touched=touching,
+        )
+        self._time.add(1e3 * (time.perf_counter() - begin))
+        self._publish_pose(clock.k, pose)
+        self._count(clock.k, pose, touching)
+
+    def _publish_pose(self, k: int, pose: ModelPose) -> None:
+        markers = [
+            MarkerPose(name=name, position=pose.position(name).tolist(), quaternion=from_matrix(pose.rotation(name)).tolist())
+            for name in self._robot.markers
+        ]
+        self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)
+        items = [
+            ContactItem(first=c.first, second=c.second, kind=c.kind, depth=c.depth, point=c.point.tolist(), normal=c.normal.tolist())
+            for c in pose.contacts
+        ]
+        self._contacts.put(re_k=k, contacts=items)
+
+    def _count(self, k: int, pose: ModelPose, touching: dict[str, list[str]]) -> None:
+        self._ticks += 1
+        if 0 <= self._last_k < k:
+            self._skipped += k - self._last_k - 1
+        self._last_k = k
+        self._table_ticks += any("table" in names for names in touching.values())
+        self._field_ticks += any(c.kind == "field" for c in pose.contacts)
+        self._solid_ticks += any(c.kind == "solid" for c in pose.contacts)
+
+    def _mark(self) -> None:
+        self._ticks = self._skipped = self._table_ticks = self._field_ticks = self._solid_ticks = 0
+        self._time.clear()
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers = {
+            "ticks": self._ticks,
+            "skipped": self._skipped,
+            "table_ticks": self._table_ticks,
+            "field_ticks": self._field_ticks,
+            "solid_ticks": self._solid_ticks,
+            "objects": len(self._model.world.objects),
+            "evaluate_ms_p50": self._time.at(50),
+            "evaluate_ms_p99": self._time.at(99),
+        }
+        return f"{self._ticks} ticks, touching the table in {self._table_ticks}", numbers
+
+    def _jacobian(self, request: JacobianAt) -> JacobianReply:
+        q = self._q if request.q is None else np.array(request.q)
+        try:
+            jacobian = self._model.jacobian(q, request.marker)
+        except MobeeError as error:
+            raise CallRefused("marker", str(error)) from None
+        return JacobianReply(v=VERSION, rows=jacobian.shape[0], columns=jacobian.shape[1], data=jacobian.ravel().tolist())
