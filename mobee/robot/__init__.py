@@ -1,0 +1,1 @@
+"""What a robot is, and the files that describe robots and worlds."""

@@ -1,14 +1,17 @@
-"""Finds shipped robots by name, and reads any robot file by path."""
+"""Finds shipped robots and worlds by name, and reads any robot or world file by path."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from mobee.collision.world import World
 from mobee.errors import RobotFileError, UnknownName
 from mobee.robot.robot import Robot
+from mobee.robot.xml_world import read_world
 from mobee.robot.zero_position import read_robot
 
 ROBOTS = Path(__file__).parent / "robots"
+WORLDS = Path(__file__).parent / "worlds"
 
 
 def load_robot(name_or_path: str | Path) -> Robot:
@@ -22,6 +25,16 @@ def load_robot(name_or_path: str | Path) -> Robot:
 def shipped_robots() -> tuple[str, ...]:
     """Names of the robots that come with this library, sorted."""
     return shipped(ROBOTS)
+
+
+def load_world(name_or_path: str | Path) -> World:
+    """A shipped world by name (see shipped_worlds), or the world of an .xml file; errors as load_robot."""
+    return read_world(find_file(name_or_path, WORLDS, "world"))
+
+
+def shipped_worlds() -> tuple[str, ...]:
+    """Names of the worlds that come with this library, sorted."""
+    return shipped(WORLDS)
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:

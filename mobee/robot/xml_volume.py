@@ -67,7 +67,8 @@ def align(source: Array, target: Array) -> Array:
 def turn_about(axis: Array, angle: float) -> Array:
     """The rotation (3, 3) about a unit axis by an angle in [rad]."""
     cross = skew(axis)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return turn
 
 
 def skew(v: Array) -> Array:

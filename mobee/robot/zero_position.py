@@ -129,9 +129,7 @@ def _read_joint(node: Node, draft: _Draft, place: _Place) -> None:
     link = node.attributes.get("moves", name)
     if link in draft.links or any(name == joint.name for joint in draft.joints):
         node.fail("name", f"a second joint {name!r} or link {link!r}", "Give every joint its own name and every link it moves another")
-    draft.joints.append(
-        Joint(name, place.link, "revolute" if kind == "revolute" else "prismatic", axis, place.point, np.zeros(2))
-    )
+    draft.joints.append(Joint(name, place.link, "revolute" if kind == "revolute" else "prismatic", axis, place.point, np.zeros(2)))
     draft.drives.append((node, motor))
     draft.links.append(link)
     subtree = index + 1 if node.flag("noSelfCollision") and place.subtree < 0 else place.subtree

@@ -1,0 +1,85 @@
+"""Cuts the iCub's URDF of the icub-models package down to the upper body that the simulator and the viewer load."""
+
+from __future__ import annotations
+
+import importlib
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import defusedxml.ElementTree  # type: ignore[import-untyped]  # ships no type information
+
+from mobee.errors import MobeeError
+
+MODEL = "iCubGazeboV2_5"
+LEGS = ("l_hip_pitch", "r_hip_pitch")
+PALM_FRAMES = ("l_hand_dh_frame", "r_hand_dh_frame")
+DROPPED = ("gazebo", "sensor")
+# A frame without inertia counts as 1 kg in PyBullet, so the palm frames get next to nothing.
+NEXT_TO_NOTHING = {
+    "mass": {"value": "1e-4"},
+    "inertia": dict.fromkeys(("ixx", "iyy", "izz"), "1e-8") | dict.fromkeys(("ixy", "ixz", "iyz"), "0"),
+}
+
+
+def models_folder() -> Path:
+    """The folder `iCub` of the installed icub-models, which holds `robots` and `meshes`; raises MobeeError when it is missing."""
+    try:
+        package = importlib.import_module("icub_models")
+    except ModuleNotFoundError as error:
+        raise MobeeError("the iCub's meshes are missing (package icub-models). Install them: pip install 'mobee[sim]'") from error
+    folder = Path(package.get_models_path()).parent
+    if not (folder / "robots" / MODEL / "model.urdf").is_file():
+        raise MobeeError(f"{folder} holds no robots/{MODEL}/model.urdf. Install icub-models again: pip install 'mobee[sim]'")
+    return folder
+
+
+def write_upper_body_urdf(path: Path) -> Path:
+    """Write the upper body of iCub v2.5 (without fingers and eyes) to `path` and return it.
+
+    Legs, sensor frames and simulator tags are removed, mesh paths are absolute, link names are those of `load_robot("icub")`;
+    the frames l_hand_dh_frame and r_hand_dh_frame stay. Raises MobeeError when icub-models is not installed.
+    """
+    folder = models_folder()
+    root: ET.Element = defusedxml.ElementTree.parse(folder / "robots" / MODEL / "model.urdf").getroot()
+    for child in [child for child in root if child.tag in DROPPED]:
+        root.remove(child)
+    for leg in LEGS:
+        _remove_subtree(root, leg)
+    while frames := _empty_frames(root):
+        for joint in frames:
+            _remove_subtree(root, joint)
+    for link in root.iter("link"):
+        if link.find("inertial") is None:
+            inertial = ET.SubElement(link, "inertial")
+            for tag, attributes in NEXT_TO_NOTHING.items():
+                ET.SubElement(inertial, tag, attributes)
+    for mesh in root.iter("mesh"):
+        mesh.set("filename", mesh.attrib["filename"].replace("package://iCub", folder.as_posix()))
+    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+    return path
+
+
+def _remove_subtree(root: ET.Element, joint_name: str) -> None:
+    """Remove a joint, its child link and all beyond."""
+    joint = next(joint for joint in root.iter("joint") if joint.get("name") == joint_name)
+    link = _end(joint, "child")
+    root.remove(joint)
+    for below in [other.attrib["name"] for other in root.iter("joint") if _end(other, "parent") == link]:
+        _remove_subtree(root, below)
+    root.remove(next(other for other in root.iter("link") if other.get("name") == link))
+
+
+def _empty_frames(root: ET.Element) -> list[str]:
+    """Fixed joints whose child is an end of the tree without inertia, the palms' frames excepted."""
+    parents = {_end(joint, "parent") for joint in root.iter("joint")}
+    heavy = {link.get("name") for link in root.iter("link") if link.find("inertial") is not None}
+    return [
+        joint.attrib["name"]
+        for joint in root.iter("joint")
+        if joint.get("type") == "fixed" and _end(joint, "child") not in parents | heavy | set(PALM_FRAMES)
+    ]
+
+
+def _end(joint: ET.Element, which: str) -> str:
+    end = joint.find(which)
+    return "" if end is None else end.attrib["link"]

@@ -1,0 +1,54 @@
+"""Reads a world from XML; the grammar is written down in worlds/README.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mobee.collision.geometry import Geometry
+from mobee.collision.world import Role, World
+from mobee.robot.xml_node import Node, nearest, read_xml
+from mobee.robot.xml_volume import VOLUME_TAGS, read_volume
+
+ROLES: dict[str, Role] = {"obstacle": "obstacle", "target": "target", "ghost": "ghost"}
+
+
+def read_world(path: Path) -> World:
+    """The world described by an XML file; positions in [m] in the root frame, angles in [deg].
+
+    Raises RobotFileError with file, line, field and remedy; warns of tags and attributes that it ignores.
+    """
+    root = read_xml(path)
+    if root.tag != "world":
+        root.fail("root element", "this is not a world", "The root of a world file is <World>")
+    root.check_attributes({"name", "version"})
+    world = World()
+    for node in root:
+        if node.tag not in VOLUME_TAGS:
+            node.warn(f"unknown tag is ignored. {nearest(node.tag, VOLUME_TAGS)}Valid: {', '.join(sorted(VOLUME_TAGS))}")
+            continue
+        node.check_attributes(VOLUME_TAGS[node.tag] | {"name", "role", "color"})
+        _add(world, node)
+    return world
+
+
+def _add(world: World, node: Node) -> None:
+    volume, name = read_volume(node), node.text("name")
+    if name in world.objects:
+        node.fail("name", f"a second object {name!r}", "Rename one of the two")
+    world.add(
+        name,
+        Geometry(volume.kind, volume.size),
+        position=volume.centre,
+        rotation=volume.rotation,
+        role=ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")],
+        color=_color(node),
+    )
+
+
+def _color(node: Node) -> list[float] | None:
+    if "color" not in node.attributes:
+        return None
+    channels = node.numbers("color")
+    if len(channels) not in (3, 4) or not all(0 <= channel <= 1 for channel in channels):
+        node.fail("color", f"{node.attributes['color']!r} is no colour", "Write red, green, blue and optionally opacity, each 0 to 1")
+    return channels
