@@ -52,6 +52,11 @@ class Publisher(Generic[_M]):
         self._seq += 1
         self._publisher.put(encode(message))
 
+    @property
+    def heard(self) -> bool:
+        """Whether anybody subscribes: what is dear to make need not be made otherwise."""
+        return bool(self._publisher.matching_status.matching)
+
 
 class Latest(Generic[_M]):
     """The newest message of a stream, polled; older ones are overwritten, never queued."""

@@ -1,1 +1,5 @@
-"""The target locator: finds the ball in both eye images and puts it into the world of the model."""
+"""The target locator: finds the red ball in both eyes' pictures and says where it is in the root frame.
+
+Reads: clock (for the id of the run), vision/image/{left,right}, vision/camera/{left,right}.
+Writes: world/ball.
+"""

@@ -1,0 +1,107 @@
+"""The simulator's eyes: `python -m services.robot_sim.renderer`, a process of its own because drawing takes many ticks.
+
+Reads: clock, {part}/state, sim/truth (where the simulator has its objects).
+Writes: vision/image/{left,right}, vision/camera/{left,right}; nothing while nobody listens.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Camera, Clock, Image, Truth
+from mobee import load_robot, load_world
+from mobee.robot.robot import Robot
+from services.common.body import Body
+from services.common.config import load_config
+from services.common.delivery import BULK
+from services.common.figures import Percentiles
+from services.common.service import Service
+from services.robot_sim.renderer_config import RendererConfig
+from services.robot_sim.renderer_scene import Scene
+
+
+class RendererNode:
+    """Mirrors the state streams and draws both eyes at one posture."""
+
+    def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
+        self._service = service
+        self._period = round(1e9 / config.frame_rate)  # ns
+        self._scene = Scene(robot, load_world(config.world), config.width, config.height, config.view_deg)
+        self._body = Body(service.bus, robot)
+        self._truth = service.bus.latest(keys.SIM_TRUTH, Truth)
+        self._images = {eye: service.bus.publisher(keys.image(eye), Image, BULK) for eye in keys.EYES}
+        self._cameras = {eye: service.bus.publisher(keys.camera(eye), Camera, BULK) for eye in keys.EYES}
+        self._due = 0  # ns, bus clock
+        self._frame_time, self._pair_time = Percentiles(), Percentiles()
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+        service.on_run(self._new_run)
+        service.on_clock(self._tick)
+
+    def _tick(self, clock: Clock) -> None:
+        if clock.t < self._due:
+            return
+        if not any(stream.heard for stream in (*self._images.values(), *self._cameras.values())):
+            self._due = clock.t + self._period
+            return
+        # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
+        if self._body.update() and self._body.states["head"].k == self._body.states["torso"].k:
+            self._due = max(self._due + self._period, clock.t)
+            self._draw()
+
+    def _draw(self) -> None:
+        begin = time.perf_counter()
+        head, torso = self._body.states["head"], self._body.states["torso"]
+        truth = self._truth.take()
+        if truth is not None:
+            for thing in truth.objects:
+                self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
+        self._scene.pose(self._body.q())
+        intrinsics = self._scene.intrinsics.ravel().tolist()
+        for eye in keys.EYES:
+            start = time.perf_counter()
+            picture = self._scene.draw(eye)
+            self._frame_time.add(1e3 * (time.perf_counter() - start))
+            stamp = {"k": head.k, "t": head.t, "eye": eye, "k_capture": head.k}
+            self._cameras[eye].put(**stamp, intrinsics=intrinsics, q_head=head.q, q_torso=torso.q)
+            height, width, _ = picture.shape
+            self._images[eye].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
+        self._pairs += 1
+        self._pair_time.add(1e3 * (time.perf_counter() - begin))
+
+    def _new_run(self) -> None:
+        self._body.forget()
+        self._due = 0
+
+    def _mark(self) -> None:
+        self._pairs = 0
+        self._frame_time.clear()
+        self._pair_time.clear()
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers = {
+            "pairs": self._pairs,
+            "frame_ms_p50": self._frame_time.at(50),
+            "frame_ms_p99": self._frame_time.at(99),
+            "pair_ms_p50": self._pair_time.at(50),
+            "pair_ms_p99": self._pair_time.at(99),
+        }
+        return f"{self._pairs} pairs of pictures, {numbers['frame_ms_p50']:.0f} ms a picture", numbers
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the renderer until it is told to end."""
+    config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
+    robot = load_robot(config.robot)
+    with Service("renderer", config, robot) as service:
+        RendererNode(service, config, robot)
+        service.ready()
+        service.run()
+
+
+if __name__ == "__main__":
+    main()

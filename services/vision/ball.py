@@ -1,0 +1,100 @@
+"""A red ball in one picture: colour, then the cone of rays that touch a sphere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.robot.robot import Array
+
+Picture = NDArray[np.uint8]
+
+HUE_SPREAD, MIN_SATURATION, MIN_VALUE = 8, 130, 50  # OpenCV's units: hue 0..180, the rest 0..255
+MIN_AREA = 40.0  # px
+INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: still on it; certainly not of the ball
+MIN_ARC = 0.6  # of the outline must be seen
+MAX_OUTSIDE = 0.1  # of the blob's border may stick out
+FIT_ROUNDS = 8
+SECTORS = 36
+BORDER_INSET = 0.5  # px: the centres of border pixels lie half a pixel inside the outline
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """A ball as one eye sees it, in the camera's frame: columns right, rows down, depth forward."""
+
+    direction: Array  # (3,) unit vector to the ball's centre
+    half_angle: float  # rad, of the cone that touches the ball
+    arc: float  # how much of the outline is seen, 0..1
+
+    def distance(self, radius: float) -> float:
+        """How far away a ball of this radius [m] is, by its size, in m."""
+        return radius / math.sin(self.half_angle)
+
+
+def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
+    """Every round red thing in a picture (height, width, 3) of bytes red, green, blue; the largest first.
+
+    A sphere's outline is an ellipse that is not centred on its centre, but its rays form a circular cone about the
+    ray to its centre: the cone is fitted, so perspective leaves no bias.  Points hidden by something are trimmed.
+    """
+    height, width = picture.shape[:2]
+    found = []
+    for border, area in _red_blobs(picture):
+        inner = (border > 0).all(axis=1) & (border < (width - 1, height - 1)).all(axis=1)
+        if area >= MIN_AREA and inner.sum() >= 12:
+            sighting = _fit(_rays(border[inner], intrinsics), float(intrinsics[0, 0]))
+            if sighting is not None:
+                found.append(sighting)
+    return sorted(found, key=lambda s: -s.half_angle)
+
+
+def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
+    """Border pixels (m, 2) as column, row, and area [px] of each connected red region."""
+    hsv = cv2.cvtColor(picture, cv2.COLOR_RGB2HSV)
+    low = cv2.inRange(hsv, (0, MIN_SATURATION, MIN_VALUE), (HUE_SPREAD, 255, 255))
+    high = cv2.inRange(hsv, (180 - HUE_SPREAD, MIN_SATURATION, MIN_VALUE), (180, 255, 255))
+    contours, _ = cv2.findContours(cv2.bitwise_or(low, high), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return [(contour[:, 0, :].astype(np.float64), cv2.contourArea(contour)) for contour in contours]
+
+
+def _rays(points: Array, intrinsics: Array) -> Array:
+    """Unit vectors (m, 3) through pixels (m, 2)."""
+    homogeneous = np.column_stack([points, np.ones(len(points))])
+    rays = np.linalg.solve(intrinsics, homogeneous.T).T
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def _fit(rays: Array, focal: float) -> Sighting | None:
+    """The cone through most of the border, None if that is not what a ball looks like."""
+    keep = np.ones(len(rays), dtype=bool)
+    for _ in range(FIT_ROUNDS):
+        direction, half_angle = _cone(rays[keep])
+        error = focal * (np.arccos(np.clip(rays @ direction, -1.0, 1.0)) - half_angle)  # px
+        chosen = np.abs(error) <= max(INLIER, 1.5 * float(np.median(np.abs(error))))
+        if (chosen == keep).all() or chosen.sum() < 8:
+            break
+        keep = chosen
+    arc = _arc(rays[np.abs(error) <= INLIER], direction)
+    if arc < MIN_ARC or np.mean(error > OUTSIDE) > MAX_OUTSIDE:
+        return None
+    return Sighting(direction, half_angle + BORDER_INSET / focal, arc)
+
+
+def _cone(rays: Array) -> tuple[Array, float]:
+    """Axis and half angle of the cone nearest to unit rays: they lie in the plane w.r = 1 with w = axis / cos(angle)."""
+    w = np.linalg.lstsq(rays, np.ones(len(rays)), rcond=None)[0]
+    length = float(np.linalg.norm(w))
+    return w / length, math.acos(min(1.0, 1.0 / length))
+
+
+def _arc(rays: Array, direction: Array) -> float:
+    """Which share of the sectors around the axis holds a ray."""
+    side = np.cross(direction, (0.0, 1.0, 0.0))
+    up = np.cross(direction, side)
+    around = np.arctan2(rays @ up, rays @ side)
+    return len(np.unique(np.floor(SECTORS * (around + np.pi) / (2.0 * np.pi)).astype(int) % SECTORS)) / SECTORS

@@ -1,0 +1,18 @@
+"""What the target locator is told."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from services.common.config import ServiceConfig
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """The target locator's settings."""
+
+    radius: Annotated[float, Meta(gt=0, le=0.5)] = 0.03
+    """The ball's radius, in m."""
+    valid_for: Annotated[float, Meta(gt=0, le=60)] = 5.0
+    """How long a position may be used after the picture was taken, in s of simulated time."""

@@ -1,0 +1,114 @@
+"""The target locator at work: a pair of pictures in, the ball's place out."""
+
+from __future__ import annotations
+
+import time
+
+import cv2
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Camera, Geometry, Image, WorldObject
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
+from services.common.delivery import DATA
+from services.common.eyes import frame_at_capture
+from services.common.figures import Percentiles
+from services.common.service import Service
+from services.vision.ball import Sighting, find_balls
+from services.vision.config import Config
+from services.vision.triangulate import Frame, locate
+
+BALL = "ball"
+
+
+class VisionNode:
+    """Waits for both pictures and both cameras of one tick; reads nothing else of the robot."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        cv2.setNumThreads(1)
+        self._service, self._config, self._robot = service, config, robot
+        self._images: dict[str, Image] = {}
+        self._cameras: dict[str, Camera] = {}
+        self._place = service.bus.publisher(keys.world(BALL), WorldObject, DATA)
+        self._time = Percentiles()
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+        service.on_run(self._forget)
+        service.on_clock(lambda clock: None)  # the service keeps the run's id
+        for eye in keys.EYES:
+            service.on_newest(keys.camera(eye), Camera, self._take_camera)
+            service.on_newest(keys.image(eye), Image, self._take_image)
+
+    def _take_camera(self, camera: Camera) -> None:
+        self._cameras[camera.eye] = camera
+        self._look()
+
+    def _take_image(self, image: Image) -> None:
+        if len(image.data) != image.width * image.height * 3:
+            self._service.bus.reject("length", f"picture of the {image.eye} eye: {len(image.data)} bytes for {image.width} x {image.height}")
+            return
+        self._images[image.eye] = image
+        self._look()
+
+    def _look(self) -> None:
+        """Locate the ball, once all four messages of a tick are here."""
+        parts = [*self._images.values(), *self._cameras.values()]
+        if len(parts) < 2 * len(keys.EYES) or len({part.k_capture for part in parts}) > 1:
+            return
+        begin = time.perf_counter()
+        self._pairs += 1
+        try:
+            self._locate()
+        except (InvalidValue, np.linalg.LinAlgError) as error:
+            self._service.bus.reject("camera", f"camera of tick {parts[0].k_capture}: {error}")
+        self._forget()
+        self._time.add(1e3 * (time.perf_counter() - begin))
+
+    def _locate(self) -> None:
+        left, right = (self._sightings(eye) for eye in keys.EYES)
+        self._seen += bool(left) + bool(right)
+        fix = locate(left, right, (self._frame("left"), self._frame("right")), self._config.radius)
+        if fix is None:
+            self._mismatched += bool(left and right)
+            return
+        self._located += 1
+        camera = self._cameras["left"]
+        self._place.put(
+            name=BALL,
+            geometry=Geometry("sphere", [self._config.radius]),
+            position=fix.position.tolist(),
+            quaternion=[1.0, 0.0, 0.0, 0.0],
+            covariance=fix.covariance.ravel().tolist(),
+            role="target",
+            t_capture=camera.t,
+            valid_until=camera.t + round(1e9 * self._config.valid_for),
+        )
+
+    def _sightings(self, eye: str) -> list[Sighting]:
+        image = self._images[eye]
+        picture = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
+        return find_balls(picture, np.array(self._cameras[eye].intrinsics).reshape(3, 3))
+
+    def _frame(self, eye: str) -> Frame:
+        camera = self._cameras[eye]
+        return frame_at_capture(self._robot, eye, np.array(camera.q_head), np.array(camera.q_torso))
+
+    def _forget(self) -> None:
+        self._images.clear()
+        self._cameras.clear()
+
+    def _mark(self) -> None:
+        self._pairs = self._seen = self._located = self._mismatched = 0
+        self._time.clear()
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers = {
+            "pairs": self._pairs,
+            "seen": self._seen,
+            "located": self._located,
+            "mismatched": self._mismatched,
+            "look_ms_p50": self._time.at(50),
+            "look_ms_p99": self._time.at(99),
+        }
+        return f"located the ball in {self._located} of {self._pairs} pairs", numbers
