@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.kinematics.vectors import cross
 from mobee.robot.robot import Array, Ints
 
 _TOUCHING = 1e-10  # m: below it a distance is no direction
@@ -115,7 +116,7 @@ def _least_face(c: Array, h: Array, half: Array) -> tuple[Array, Array]:
     """How deep segments that pierce their boxes are, and the way out: (p,) m, (p, 3) unit, over the six face normals."""
     ways = np.zeros((len(c), 6, 3))
     ways[:, :3] = np.eye(3)
-    edges = np.cross(h[:, None, :], np.eye(3))
+    edges = cross(h[:, None, :], np.eye(3))
     length = np.sqrt((edges * edges).sum(axis=2))
     usable = length > 1e-9
     ways[:, 3:] = edges / np.where(usable, length, 1.0)[:, :, None]
@@ -129,11 +130,11 @@ def _least_face(c: Array, h: Array, half: Array) -> tuple[Array, Array]:
 
 def _across(u: Array, v: Array) -> Array:
     """Unit vectors perpendicular to both of two crossing segments (any such vector if they are parallel or points)."""
-    normal = np.cross(u, v)
+    normal = cross(u, v)
     for axis in np.eye(3):
         parallel = (normal * normal).sum(axis=1) <= _PARALLEL * (u * u).sum(axis=1) * (v * v).sum(axis=1)
         longer = np.where((u * u).sum(axis=1) >= (v * v).sum(axis=1), u.T, v.T).T
-        normal = np.where(parallel[:, None], np.cross(longer, axis), normal)
+        normal = np.where(parallel[:, None], cross(longer, axis), normal)
     return _normalised(normal)
 
 

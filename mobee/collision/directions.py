@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.collision.closed_form import Overlaps
-from mobee.collision.volumes import CYLINDER, Placed
+from mobee.collision.volumes import BOX, CYLINDER, Placed
+from mobee.kinematics.vectors import cross
 from mobee.robot.robot import Array, Ints
 
 _ALIGNED = 1e-5  # rad: a normal this close to a face's or an edge's counts as square to it
@@ -35,7 +36,7 @@ _EVERYWHERE = _spiral(160)
 def axis_overlaps(placed: Placed, first: Ints, second: Ints) -> tuple[Array, Array]:
     """The least overlap over the axes of both volumes and their cross products: (p,) m, (p, 3) unit; exact for boxes."""
     axes_a, axes_b = np.swapaxes(placed.rotation[first], 1, 2), np.swapaxes(placed.rotation[second], 1, 2)
-    crossed = np.cross(axes_a[:, :, None, :], axes_b[:, None, :, :]).reshape(-1, 9, 3)
+    crossed = cross(axes_a[:, :, None, :], axes_b[:, None, :, :]).reshape(-1, 9, 3)
     length = np.sqrt((crossed * crossed).sum(axis=2, keepdims=True))
     # Nearly parallel edges span no face; their place is taken by an axis that is a candidate anyway.
     crossed = np.where(length > 1e-9, crossed / np.maximum(length, 1e-9), axes_a[:, :1])
@@ -44,8 +45,15 @@ def axis_overlaps(placed: Placed, first: Ints, second: Ints) -> tuple[Array, Arr
 
 def searched_overlaps(placed: Placed, first: Ints, second: Ints) -> tuple[Array, Array]:
     """The least overlap over great circles and over all directions, refined: (p,) m, (p, 3) unit."""
-    candidates = [_on_circles(placed, first, second), _anywhere(placed, first, second)]
-    return _least(placed, first, second, np.concatenate(candidates, axis=1))
+    depth, direction = _least(placed, first, second, _on_circles(placed, first, second))
+    # Only two curved volumes have a smooth minimum off the circles: the way out never leads over a corner or an edge.
+    kind = placed.volumes.kind
+    rows = np.flatnonzero((kind[first] != BOX) & (kind[second] != BOX))
+    if rows.size:
+        smooth, way = _anywhere(placed, first[rows], second[rows])
+        better = smooth < depth[rows]
+        depth[rows[better]], direction[rows[better]] = smooth[better], way[better]
+    return depth, direction
 
 
 def with_points(placed: Placed, first: Ints, second: Ints, depth: Array, direction: Array) -> Overlaps:
@@ -102,23 +110,23 @@ def _on_circles(placed: Placed, first: Ints, second: Ints) -> Array:
         best = overlap.argmin(axis=2)[:, :, None]
         angle = np.take_along_axis(tried, best, axis=2)
         offsets, step = step * _ZOOM, step / 8.0
-    return np.cos(angle) * u + np.sin(angle) * v
+    found: Array = np.cos(angle) * u + np.sin(angle) * v
+    return found
 
 
-def _anywhere(placed: Placed, first: Ints, second: Ints) -> Array:
-    """The best direction of all, (p, 1, 3), where the overlap is smooth."""
+def _anywhere(placed: Placed, first: Ints, second: Ints) -> tuple[Array, Array]:
+    """The least overlap and its direction among all, where the overlap is smooth: (p,) m, (p, 3)."""
     step = 0.2
-    center = _least(placed, first, second, np.broadcast_to(_EVERYWHERE, (len(first), *_EVERYWHERE.shape)))[1]
+    depth, center = _least(placed, first, second, np.broadcast_to(_EVERYWHERE, (len(first), *_EVERYWHERE.shape)))
     for _ in range(8):
-        away = np.eye(3)[np.abs(center).argmin(axis=1)]
-        u = np.cross(center, away)
+        u = cross(center, np.eye(3)[np.abs(center).argmin(axis=1)])
         u /= np.sqrt((u * u).sum(axis=1, keepdims=True))
-        v = np.cross(center, u)
+        v = cross(center, u)
         near = center[:, None] + step * (_PATCH[:, :1] * u[:, None] + _PATCH[:, 1:] * v[:, None])
         near /= np.sqrt((near * near).sum(axis=2, keepdims=True))
-        center = _least(placed, first, second, near)[1]
+        depth, center = _least(placed, first, second, near)
         step /= 2.5
-    return center[:, None]
+    return depth, center
 
 
 def _deepest(placed: Placed, which: Ints, direction: Array) -> tuple[Array, Array]:
