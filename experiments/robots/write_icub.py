@@ -25,7 +25,7 @@ iCub v2.5 upper body, 41 motors. Written by experiments/robots/write_icub.py; do
 Kinematics and solids derive from robotology/icub-models (Istituto Italiano di Tecnologia), licence CC BY-SA 4.0;
 this file is distributed under the same licence. Origin of every number: README.md beside this file.
 """
-HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 50.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
+HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 60.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
 EYES = {"eyes_version": (-30.0, 30.0), "eyes_vergence": (0.0, 50.0)}  # version +- vergence / 2 just fills the URDF's pan limits
 # A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
 ANCHORS = {
@@ -53,6 +53,7 @@ RIGID = {"l_upper_arm": "l_shoulder_3", "r_upper_arm": "r_shoulder_3", "l_hand_m
 
 
 def main(data_path: str, out: str | Path = OUT) -> None:
+    """Write the file."""
     data = json.loads(Path(data_path).read_text(encoding="utf-8"))
     model = data["models"]["icub_v2_5"]
     root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName="icub")
@@ -85,6 +86,7 @@ def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array
 
 
 def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], point: Array) -> None:
+    """A joint, after the displacement that leads to it, with shapes, fields, markers and all that it carries."""
     axis = np.array(joint["axis_root"])
     here = skeleton_point(joint["name"], np.array(joint["point_root"]), axis)
     link, name = joint["child_link"], joint["name"].removesuffix("_joint")
@@ -124,6 +126,7 @@ def skeleton_point(name: str, point: Array, axis: Array) -> Array:
 
 
 def motor_of(joint: str) -> str:
+    """The motor that drives a joint: the joint's namesake, except in the hands."""
     side, _, rest = joint.partition("_hand_")
     finger = next((motor for motor, joints in FINGERS.items() if rest in joints), None)
     return f"{side}_{finger}" if finger else joint
@@ -140,6 +143,7 @@ def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, f
 
 
 def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
+    """A part's motors in YARP order; limits are the narrower of URDF and iCub simulator."""
     parts = data["yarp_parts"]
     joints = {j["name"]: j for j in data["models"]["icub_v2_5"]["joints"]}
     simulator = parts["limits_deg"]["icub_simulator"]["arm" if part.endswith("arm") else part]
@@ -153,6 +157,7 @@ def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
 
 
 def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
+    """The cable and forearm clauses of an arm, as in MoBeE 2014."""
     for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
         rows = element(parent, "constraintList")
         for row in clause:
@@ -162,6 +167,7 @@ def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
 
 
 def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
+    """The solids of a link, relative to a point."""
     for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
         width, height, depth = high - low
         place = vector("px py pz", (low + high) / 2 - point)
@@ -182,6 +188,7 @@ def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Arra
 
 
 def add_fields(parent: ET.Element, link: str, point: Array) -> None:
+    """The fields of a link, relative to a point."""
     for name, host, radius, first, second in fields():
         if host != link:
             continue
@@ -197,12 +204,14 @@ def add_fields(parent: ET.Element, link: str, point: Array) -> None:
 
 
 def fields() -> list[Field]:
+    """All fields, with link names in full."""
     mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
     arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
     return TRUNK + HEAD + arms
 
 
 def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
+    """The markers of a link, relative to a point."""
     model = data["models"]["icub_v2_5"]
     palms = model["end_effector_zero_root"]
     for side, sign in (("left", -1.0), ("right", 1.0)):
@@ -219,6 +228,7 @@ def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Arra
 
 
 def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
+    """One marker."""
     rows = " ".join(number(value) for value in rotation.ravel())
     element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))
 

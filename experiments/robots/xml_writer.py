@@ -24,7 +24,7 @@ def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Eleme
 
 
 def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
-    """Attributes for the components that are not zero, e.g. vector("px py pz", p)."""
+    """Attributes such as px, py, pz for the components that are not zero."""
     texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
     return {name: text for name, text in texts.items() if text != "0"}
 

@@ -6,8 +6,8 @@ Solids and fields follow one rule; a pair is left out when
 - the file says so: <ignore first="link" second="link"/>;
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
-Joined: a cluster is a run of joints, each within 5 cm of the one that carries it (shoulder, elbow and pro-supination, wrist,
-neck, torso), for a shape there fills the whole cluster. The link that carries a cluster and all links that its joints move are
+Joined: a cluster is a group of joints, each within 5 cm of the one that carries it or of one beside it (shoulder, elbow and
+pro-supination, wrist, neck, torso), for a shape there fills the whole cluster. The link that carries a cluster and all links that its joints move are
 joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with wrist and hand.
 So hands and forearms are tested against torso, head and the other arm, and only what overlaps in every pose is left out.
 """
@@ -31,9 +31,10 @@ def joined_links(joints: Sequence[Joint]) -> set[LinkPair]:
     cluster: dict[int, int] = {}  # joint -> first joint of its cluster
     members: dict[int, set[int]] = {}
     for index, joint in enumerate(joints):
-        carrier = joint.parent - 1  # the joint that moves the parent link
-        near = carrier >= 0 and float(np.linalg.norm(joint.point - joints[carrier].point)) < CLUSTER
-        cluster[index] = cluster[carrier] if near else index
+        before = [k for k in range(index) if k == joint.parent - 1 or joints[k].parent == joint.parent]
+        near = (k for k in before if float(np.linalg.norm(joint.point - joints[k].point)) < CLUSTER)
+        first = next(near, None)
+        cluster[index] = index if first is None else cluster[first]
         members.setdefault(cluster[index], {joint.parent}).add(index + 1)
     return {frozenset(pair) for links in members.values() for pair in combinations(sorted(links), 2)}
 

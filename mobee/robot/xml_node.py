@@ -20,6 +20,7 @@ import numpy as np
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Array
 
+DEEPEST = 200  # elements; a reader that recurses must not be led into its own limit
 FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
 
@@ -172,6 +173,8 @@ class _Builder(xml.sax.handler.ContentHandler):
 
     def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:  # noqa: N802
         node = Node(self.path, self.line, name.lower(), dict(attrs.items()))
+        if len(self.open) >= DEEPEST:
+            node.fail("position in the file", f"is nested more than {DEEPEST} elements deep", "Close the elements before it")
         if self.open:
             self.open[-1].children.append(node)
         else:

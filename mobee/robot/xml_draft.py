@@ -1,0 +1,48 @@
+"""What has been read of a robot file so far, and where in its tree the reader stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from mobee.robot.pairs_2014 import Element
+from mobee.robot.robot import Array, Joint, Marker, Shape
+from mobee.robot.xml_motors import MotorDraft
+from mobee.robot.xml_node import Node
+
+
+@dataclass(slots=True)
+class Draft:
+    """What has been read so far."""
+
+    links: list[str] = field(default_factory=lambda: ["base"])
+    subtree: list[int] = field(default_factory=lambda: [-1])
+    joints: list[Joint] = field(default_factory=list)
+    drives: list[tuple[Node, str]] = field(default_factory=list)  # for each joint its element and the name of its motor
+    motors: dict[str, MotorDraft] = field(default_factory=dict)
+    parts: dict[str, list[Node]] = field(default_factory=dict)
+    elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
+    shapes: list[Shape] = field(default_factory=list)
+    hosts: list[int] = field(default_factory=list)  # for each shape its element
+    base_shapes: set[int] = field(default_factory=set)
+    markers: dict[str, Marker] = field(default_factory=dict)
+    constraints: list[tuple[str, Node]] = field(default_factory=list)
+    ignores: list[Node] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in the tree a child stands: the current point [m], the link it is on, its part, motor and hand subtree."""
+
+    point: Array
+    link: int = 0
+    part: str = ""
+    motor: str = ""
+    subtree: int = -1
+    base: bool = True
+    element: int = 0
+
+
+def enter(node: Node, draft: Draft, place: Place) -> Place:
+    """The place inside a link or joint."""
+    draft.elements.append(Element(place.element, node.tag, place.part, place.subtree))
+    return replace(place, element=len(draft.elements) - 1)
