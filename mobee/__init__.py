@@ -1,28 +1,50 @@
 """A humanoid that learns by curiosity to plan and to reach, while a reactive layer keeps it safe."""
 
 from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
+from mobee.control import Command, Controller, Forces, Gains, constraint_forces
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
+from mobee.learning.agent import CuriousAgent
+from mobee.learning.lattice import Lattice
+from mobee.learning.parallel import run
+from mobee.learning.transitions import TransitionModel
+from mobee.learning.value_iteration import value_iteration
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
+from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
+from mobee.simulation import MotorParameters, OfflinePlant
 
 __all__ = [
     "ActionInterrupted",
+    "Command",
     "Contact",
+    "Controller",
+    "CuriousAgent",
+    "Forces",
+    "Gains",
     "Geometry",
     "InvalidValue",
+    "Lattice",
     "MobeeError",
     "Model",
+    "MotorParameters",
+    "OfflinePlant",
     "Outcome",
     "Plant",
     "Pose",
     "Robot",
     "RobotFileError",
+    "TransitionModel",
     "UnknownName",
     "World",
     "WorldObject",
     "box",
     "capsule",
+    "constraint_forces",
     "cylinder",
+    "load_robot",
+    "load_world",
+    "run",
     "sphere",
+    "value_iteration",
 ]

@@ -11,7 +11,6 @@ from collections.abc import Callable
 import numpy as np
 
 import mobee
-from mobee.robot.load import load_robot
 
 POSES, SEED = 300, 0
 
@@ -28,10 +27,8 @@ def median_us(function: Callable[[int], object]) -> float:
 
 def main() -> None:
     """Print the medians."""
-    robot = load_robot("icub")
-    world = mobee.World()
-    world.add("table", mobee.box(0.6, 1.5, 0.5), position=(-0.44, 0.0, -0.35))
-    world.add("ball", mobee.sphere(0.03), position=(-0.35, 0.0, -0.07))
+    robot = mobee.load_robot("icub")
+    world = mobee.load_world("table")
     model = mobee.Model(robot, world)
     rng = np.random.default_rng(SEED)
     low, high = robot.limits.T

@@ -79,7 +79,7 @@ def _width(placed: Placed, which: Ints, directions: Array) -> Array:
     cosines = np.abs(directions @ placed.rotation[which])
     along: Array = (cosines @ _extent(placed, which)[:, :, None])[:, :, 0]
     disc = v.kind[which] == CYLINDER
-    rim = np.sqrt(np.maximum(1.0 - cosines[:, :, 2] ** 2, 0.0))
+    rim = np.hypot(cosines[:, :, 0], cosines[:, :, 1])
     return along + _round(placed, which)[:, None] * np.where(disc[:, None], rim, 1.0)
 
 

@@ -62,35 +62,39 @@ def _edged(placed: Placed, first: Ints, second: Ints, rows: Ints, out: Overlaps)
     depth, direction = axis_overlaps(placed, first[rows], second[rows])
     kept = depth > 0.0
     rows, depth, direction = rows[kept], depth[kept], direction[kept]
+    a, b = first[rows], second[rows]
     kind = placed.volumes.kind
-    rounds = (kind[first[rows]] == CYLINDER) | (kind[second[rows]] == CYLINDER)
-    for i in np.flatnonzero(rounds):
-        touching = fcl_contact(placed, first[rows[i]], second[rows[i]])
-        if touching is None:
-            depth[i] = 0.0
-        elif SPHERE in (kind[first[rows[i]]], kind[second[rows[i]]]):
-            rounds[i] = False
-            depth[i], direction[i] = touching
-    hard = np.flatnonzero(rounds & (depth > 0.0))
+    disc = (kind[a] == CYLINDER) | (kind[b] == CYLINDER)
+    with_ball = disc & ((kind[a] == SPHERE) | (kind[b] == SPHERE))
+    for i in np.flatnonzero(with_ball):
+        depth[i], direction[i] = fcl_contact(placed, a[i], b[i])
+    for i in np.flatnonzero(disc & ~with_ball):
+        depth[i] *= fcl_touching(placed, a[i], b[i])
+    hard = np.flatnonzero(disc & ~with_ball & (depth > 0.0))
     if hard.size:
-        least, way = searched_overlaps(placed, first[rows[hard]], second[rows[hard]])
+        least, way = searched_overlaps(placed, a[hard], b[hard])
         better = least < depth[hard]
         depth[hard[better]], direction[hard[better]] = least[better], way[better]
-    _store(out, rows, with_points(placed, first[rows], second[rows], depth, direction))
+    _store(out, rows, with_points(placed, a, b, depth, direction))
 
 
-def fcl_contact(placed: Placed, first: int, second: int) -> tuple[float, Array] | None:
-    """One pair by python-fcl: depth [m] and the way `first` must move (3,); None when they are apart."""
-    # The objects are made anew so that no two threads ever share one; the geometries never change.
+def fcl_touching(placed: Placed, first: int, second: int) -> bool:
+    """Whether one pair overlaps, by python-fcl."""
+    return bool(fcl.collide(_object(placed, first), _object(placed, second), fcl.CollisionRequest(), fcl.CollisionResult()))
+
+
+def fcl_contact(placed: Placed, first: int, second: int) -> tuple[float, Array]:
+    """Depth [m] of one pair by python-fcl (0: apart), and the way `first` must move (3,)."""
     result = fcl.CollisionResult()
-    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=True)
-    if not fcl.collide(_object(placed, first), _object(placed, second), request, result):
-        return None
+    fcl.collide(_object(placed, first), _object(placed, second), fcl.CollisionRequest(enable_contact=True), result)
+    if not result.contacts:
+        return 0.0, np.zeros(3)
     contact = result.contacts[0]
     return contact.penetration_depth, -contact.normal  # fcl's normal points from the first to the second
 
 
 def _object(placed: Placed, index: int) -> Any:
+    # Made anew each time, so that no two threads ever share one; only the geometries, which never change, are kept.
     geometry = _geometry(int(placed.volumes.kind[index]), placed.volumes.size[index])
     return fcl.CollisionObject(geometry, fcl.Transform(placed.rotation[index], placed.center[index]))
 

@@ -1,0 +1,18 @@
+from __future__ import annotations
+
+import pytest
+
+import mobee
+
+
+def test_sizes_are_kept_in_the_order_given():
+    assert mobee.box(1, 2, 3).size == (1.0, 2.0, 3.0)
+    assert mobee.cylinder(0.1, 0.5) == mobee.cylinder(radius=0.1, height=0.5)
+    assert mobee.sphere(0.1) == mobee.Geometry("sphere", (0.1,))
+    assert mobee.capsule(0.1, 0.5).kind == "capsule"
+
+
+@pytest.mark.parametrize("length", [0.0, -0.1, float("nan"), float("inf")])
+def test_a_length_that_is_none_is_refused_by_name(length):
+    with pytest.raises(mobee.InvalidValue, match="cylinder: height"):
+        mobee.cylinder(0.1, length)

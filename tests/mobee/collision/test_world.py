@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mobee
+
+HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+
+
+@pytest.fixture
+def world():
+    made = mobee.World()
+    made.add("cup", mobee.cylinder(0.03, 0.1), position=(0.1, 0.2, 0.3), color=(1.0, 0.0, 0.0))
+    return made
+
+
+def test_objects_are_listed_in_the_order_in_which_they_came(world):
+    world.add("ball", mobee.sphere(0.03))
+    world.move("cup", position=(0.0, 0.0, 0.0))
+    assert list(world.objects) == ["cup", "ball"]
+    assert world.objects["cup"].color == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_a_snapshot_never_changes(world):
+    before, version = world.objects, world.version
+    world.move("cup", position=(1.0, 1.0, 1.0), rotation=HALF_TURN)
+    world.add("ball", mobee.sphere(0.03))
+    world.remove("cup")
+    assert list(before) == ["cup"]
+    assert np.array_equal(before["cup"].position, [0.1, 0.2, 0.3])
+    assert world.version == version + 3
+    with pytest.raises(TypeError):
+        world.objects["cup"] = before["cup"]
+
+
+def test_the_callers_array_is_not_kept(world):
+    place = np.array([1.0, 2.0, 3.0])
+    world.move("cup", position=place)
+    place[:] = 0.0
+    assert np.array_equal(world.objects["cup"].position, [1.0, 2.0, 3.0])
+
+
+def test_move_leaves_what_is_not_given(world):
+    world.move("cup", rotation=HALF_TURN)
+    assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
+    assert np.array_equal(world.objects["cup"].rotation, HALF_TURN)
+
+
+def test_roles_change(world):
+    world.set_role("cup", "target")
+    assert world.objects["cup"].role == "target"
+
+
+def test_names_are_unique_and_errors_name_the_nearest(world):
+    with pytest.raises(mobee.InvalidValue, match="'cup' exists already"):
+        world.add("cup", mobee.sphere(0.1))
+    for edit in (world.remove, world.move, world.detach, lambda name: world.set_role(name, "ghost")):
+        with pytest.raises(mobee.UnknownName, match="Did you mean 'cup'"):
+            edit("cap")
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"position": (0.0, 0.0)}, "three finite numbers"),
+        ({"position": (0.0, 0.0, float("nan"))}, "three finite numbers"),
+        ({"rotation": 2 * np.eye(3)}, "rotation matrix"),
+        ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation matrix"),
+        ({"role": "enemy"}, "obstacle, target, ghost"),
+        ({"color": (255, 0, 0)}, "each 0 to 1"),
+    ],
+)
+def test_what_is_no_pose_role_or_color_is_refused(world, given, complaint):
+    with pytest.raises(mobee.InvalidValue, match=complaint):
+        world.add("thing", mobee.sphere(0.1), **given)
+    assert list(world.objects) == ["cup"]
+
+
+def test_attaching_needs_to_know_where_the_link_is(world):
+    with pytest.raises(mobee.InvalidValue, match="evaluate a pose first"):
+        world.attach("cup", "hand")
+
+
+def test_an_attached_object_moves_only_with_its_link(world):
+    world.attach("cup", "hand", ((0.0, 0.0, 0.1), np.eye(3)))
+    assert world.objects["cup"].link == "hand"
+    with pytest.raises(mobee.InvalidValue, match="detach it first"):
+        world.move("cup", position=(0.0, 0.0, 0.0))
+
+
+def test_what_is_not_attached_cannot_be_detached(world):
+    with pytest.raises(mobee.InvalidValue, match="not attached"):
+        world.detach("cup")
