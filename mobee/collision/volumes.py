@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -60,30 +61,30 @@ class Placed:
 def volumes(items: Sequence[Volume], links: Sequence[int]) -> Volumes:
     """The arrays of these shapes or objects, item i riding on links[i]."""
     k = len(items)
-    core, half = np.zeros((k, 3)), np.zeros((k, 3))
+    core, half = np.zeros((k, 3)), np.zeros((k, 3))  # whole lengths until the end
     radius, bound = np.zeros(k), np.zeros(k)
     frame = np.tile(np.eye(4), (k, 1, 1))
     for i, item in enumerate(items):
         frame[i, :3, :3], frame[i, :3, 3] = item.rotation, item.position
         if item.kind == "box":
-            half[i] = np.array(item.size) / 2.0
-            longest = int(np.argmax(half[i]))
-            core[i, longest] = half[i, longest]
-            radius[i] = np.linalg.norm(np.delete(half[i], longest))
-            bound[i] = np.linalg.norm(half[i])
+            longest = max(range(3), key=item.size.__getitem__)
+            half[i] = item.size
+            core[i, longest] = item.size[longest]
+            radius[i] = math.hypot(item.size[longest - 1], item.size[longest - 2])
+            bound[i] = math.hypot(*item.size)
         else:
-            radius[i] = item.size[0]
-            core[i, 2] = item.size[1] / 2.0 if len(item.size) > 1 else 0.0
-            bound[i] = np.hypot(radius[i], core[i, 2]) if item.kind == "cylinder" else radius[i] + core[i, 2]
+            breadth, height = 2.0 * item.size[0], item.size[1] if len(item.size) > 1 else 0.0
+            radius[i], core[i, 2] = breadth, height
+            bound[i] = math.hypot(breadth, height) if item.kind == "cylinder" else breadth + height
     return Volumes(
         kind=np.array([_CODES[item.kind] for item in items], dtype=np.intp),
         link=np.array(links, dtype=np.intp),
         frame=frame,
         size=tuple(tuple(item.size) for item in items),
-        core=core,
-        radius=radius,
-        half=half,
-        bound=bound,
+        core=core / 2.0,
+        radius=radius / 2.0,
+        half=half / 2.0,
+        bound=bound / 2.0,
     )
 
 
