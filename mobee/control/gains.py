@@ -54,22 +54,26 @@ class Gains:
 
     @classmethod
     def default(cls) -> Gains:
-        """The thesis' equations with our own tuning: time constant C/K = 0.4 s, held within the fields."""
+        """The thesis' equations with our own tuning: time constant C/K = 0.4 s, contacts held within the fields.
+
+        A faster spring or a stiffer contact does not help: with the lag and delay of the motors and commands up to
+        three ticks old at 100 Hz, the contact begins to oscillate (experiments/control/press.py).
+        """
         return cls(
             law="default",
             damping=40.0,
             stiffness=100.0,
-            max_spring=28.0,
-            limit_width=np.deg2rad(5.0),
-            max_limit=40.0,
-            constraint_width=np.deg2rad(8.0),
-            max_constraint=40.0,
-            contact_gain=1000.0,
+            max_spring=20.0,
+            limit_width=np.deg2rad(10.0),
+            max_limit=30.0,
+            constraint_width=np.deg2rad(12.0),
+            max_constraint=45.0,
+            contact_gain=900.0,
             contact_slope=1.0,
-            max_contact=60.0,
+            max_contact=100.0,
             client_slope=1.0,
             max_client=20.0,
-            settle=Settle(speed=np.deg2rad(1.0), acceleration=np.deg2rad(100.0)),
+            settle=Settle(speed=np.deg2rad(3.0), acceleration=np.deg2rad(300.0)),
         )
 
     @classmethod

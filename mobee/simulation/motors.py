@@ -77,6 +77,11 @@ class Motors:
         self._set_masks()
         self._rng = np.random.default_rng(seed)
 
+    @property
+    def motor_velocities(self) -> Array:
+        """Velocities [rad/s] on the motor side of the play, (n,); a copy is not needed, every substep makes a new array."""
+        return self._motor_v
+
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
         """Set what is in force for the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
 
@@ -131,7 +136,8 @@ class Motors:
         if noise == 0.0:
             return self.q[where].copy()
         q = self.q[where]
-        return q + self._rng.standard_normal(len(q)) * (noise * np.sqrt(NOISE_PERIOD / dt))
+        noisy: Array = q + self._rng.standard_normal(len(q)) * (noise * np.sqrt(NOISE_PERIOD / dt))
+        return noisy
 
     def _set_masks(self) -> None:
         self._is_hold = self._mode == "hold"

@@ -60,7 +60,7 @@ class OfflinePlant:
         self._command: Command | None = None
         self._moved_by = {name: _links_moved(self.robot, part.slice) for name, part in self.robot.parts.items()}
         self._q = self.motors.encoders(dt)
-        self._pose: Pose | None = None
+        self.pose: Pose | None = None  # the model at the last tick
 
     @property
     def time(self) -> float:
@@ -83,11 +83,13 @@ class OfflinePlant:
 
     def begin(self, part: str, target: Array) -> None:
         """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test."""
-        limits = self.robot.limits[self.robot.part(part).slice]
-        if np.shape(target) == (len(limits),) and not np.all((target >= limits[:, 0]) & (target <= limits[:, 1])):
-            bad = int(np.argmax((target < limits[:, 0]) | (target > limits[:, 1])))
-            name, (low, high) = self.robot.parts[part].motors[bad], limits[bad]
-            raise InvalidValue(f"target {target[bad]:.4g} rad for {name}: must be within {low:.4g} to {high:.4g} rad")
+        where = self.robot.part(part)
+        limits = self.robot.limits[where.slice]
+        if np.shape(target) == (len(where),):
+            outside = ~((target >= limits[:, 0]) & (target <= limits[:, 1]))
+            for i in np.flatnonzero(outside)[:1]:
+                low, high = limits[i]
+                raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
         self.controller.set_attractor(part, target)
         self._actions[part] = _Action(self.time, SettleTest(self.controller.gains.settle, self.time))
 
@@ -108,8 +110,8 @@ class OfflinePlant:
         if not np.all(np.isfinite(self._q)):
             self._actions.clear()
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
-        self._pose = self.model.evaluate(self._q)
-        self._command = self.controller.step(self._q, self.dt, self.controller.forces(self._pose))
+        self.pose = self.model.evaluate(self._q)
+        self._command = self.controller.step(self._q, self.dt, self.controller.forces(self.pose))
         step = self.dt / self._substeps
         for _ in range(self._substeps):
             self.motors.drive(step)
@@ -131,10 +133,10 @@ class OfflinePlant:
 
     def _touched(self, part: str) -> tuple[str, ...]:
         """World objects in contact with a link that the part moves, fields included."""
-        if self._pose is None:
+        if self.pose is None:
             return ()
         moved = self._moved_by[part]
-        return tuple(sorted({c.second for c in self._pose.contacts if c.second_link < 0 and c.first_link in moved}))
+        return tuple(sorted({c.second for c in self.pose.contacts if c.second_link < 0 and c.first_link in moved}))
 
 
 def _links_moved(robot: Robot, motors: slice) -> frozenset[int]:

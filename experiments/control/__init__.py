@@ -1,0 +1,1 @@
+"""How the control law was tuned."""

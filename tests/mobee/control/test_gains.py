@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mobee.control.gains import Gains
+from mobee.errors import InvalidValue, UnknownName
+
+
+def test_the_published_numbers() -> None:
+    g = Gains.published_2014()
+    degrees = np.rad2deg([g.max_spring, g.max_limit, g.limit_width, g.max_constraint, g.constraint_width, g.max_contact, g.max_client])
+    assert degrees == pytest.approx([1000.0, 1000.0, 10.0, 1500.0, 40.0, 1200.0, 1000.0])
+    assert (g.damping, g.stiffness, g.contact_gain, g.contact_slope, g.client_slope) == (50.0, 50.0, 1000.0, 50.0, 50.0)
+    assert np.rad2deg([g.settle.speed, g.settle.acceleration]) == pytest.approx([1.0, 50.0])
+    assert (g.settle.first_look, g.settle.interval, g.settle.timeout) == (1.0, 0.2, 20.0)
+
+
+def test_published_fingers_and_eyes_do_not_move_and_the_rest_does() -> None:
+    names = ("torso_yaw", "neck_yaw", "eyes_tilt", "eyes_vergence", "l_elbow", "r_wrist_yaw", "l_hand_finger", "r_thumb_oppose", "l_pinky")
+    assert Gains.published_2014().weight(names).tolist() == [1, 1, 0, 0, 1, 1, 0, 0, 0]
+    assert Gains.default().weight(names).tolist() == [1] * 9
+
+
+def test_the_first_pattern_that_matches_counts() -> None:
+    gains = replace(Gains.default(), weights=(("joint_1", 1.0), ("joint_*", 0.0)))
+    assert gains.weight(("joint_1", "joint_2", "other")).tolist() == [1, 0, 1]
+
+
+def test_named_sets() -> None:
+    assert Gains.named("published_2014") == Gains.published_2014()
+    assert Gains.named("default") == Gains.default()
+    with pytest.raises(UnknownName, match="published_2014"):
+        Gains.named("published_2013")
+
+
+@pytest.mark.parametrize("change", [{"damping": 0.0}, {"stiffness": np.inf}, {"weights": (("a", 0.5),)}])
+def test_nonsense_is_refused_with_its_name(change: dict[str, object]) -> None:
+    with pytest.raises(InvalidValue, match=next(iter(change)).rstrip("s")):
+        replace(Gains.default(), **change)

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mobee.control.limits import limit_forces
+
+LIMITS = np.array([[-3.0, 3.0]])
+
+
+def at(q: float, width: float = 1.0, maximum: float = 1.0) -> float:
+    return float(limit_forces(np.array([q]), LIMITS, width, maximum)[0])
+
+
+@given(st.floats(-2.0, 2.0))
+def test_no_force_inside(q: float) -> None:
+    assert at(q) == 0.0
+
+
+@given(st.floats(0.01, 1.0), st.floats(0.1, 100.0))
+def test_the_force_at_the_limit_is_the_maximum_and_points_inward(width: float, maximum: float) -> None:
+    assert at(-3.0, width, maximum) == pytest.approx(maximum)
+    assert at(3.0, width, maximum) == pytest.approx(-maximum)
+
+
+@given(st.floats(-5.0, 5.0), st.floats(0.1, 1.5))
+def test_continuous_with_the_slope_of_the_ramp(q: float, width: float) -> None:
+    step = 1e-6
+    assert abs(at(q + step, width) - at(q, width)) <= 1.001 * step / width
+
+
+@given(st.floats(0.0, 2.0))
+def test_the_ramp_goes_on_beyond_the_limit(beyond: float) -> None:
+    assert at(3.0 + beyond) == pytest.approx(-1.0 - beyond)
+    assert at(-3.0 - beyond) == pytest.approx(1.0 + beyond)
+
+
+def test_a_range_narrower_than_the_ramps_is_pushed_to_its_middle() -> None:
+    limits = np.array([[0.0, 0.5]])
+    force = [float(limit_forces(np.array([q]), limits, 1.0, 1.0)[0]) for q in (0.1, 0.25, 0.4)]
+    assert force[0] > 0 and force[1] == pytest.approx(0.0) and force[2] < 0

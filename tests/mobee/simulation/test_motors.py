@@ -1,0 +1,173 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mobee.control.modality import FRICTION, INERTIA
+from mobee.errors import InvalidValue
+from mobee.simulation.motors import MotorParameters, Motors
+from tests.mobee.control.two_parts import two_part_arm
+
+STEP = 0.005
+ALL = slice(None)
+IDEAL = MotorParameters.ideal()
+
+
+def motors(parameters: MotorParameters = IDEAL, seed: int = 0, q: np.ndarray | None = None) -> Motors:
+    return Motors(two_part_arm(), parameters, seed, np.zeros(3) if q is None else q)
+
+
+def run(m: Motors, seconds: float) -> np.ndarray:
+    path = []
+    for _ in range(round(seconds / STEP)):
+        m.drive(STEP)
+        m.integrate()
+        path.append(m.q)
+    return np.array(path)
+
+
+def test_ideal_motors_do_what_they_are_told_at_once() -> None:
+    m = motors()
+    m.command(ALL, "velocity", np.array([0.5, -0.2, 0.0]))
+    assert run(m, 0.1)[-1] == pytest.approx([0.05, -0.02, 0.0])
+    assert m.velocities == pytest.approx([0.5, -0.2, 0.0])
+    assert np.array_equal(m.encoders(0.01), m.q)
+
+
+def test_the_lag_is_a_first_order_response() -> None:
+    m = motors(replace(IDEAL, lag=0.05))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    run(m, 0.05)
+    assert m.velocities == pytest.approx(np.full(3, 0.5 * (1 - np.exp(-1))))
+
+
+@pytest.mark.parametrize("step", [0.001, 0.005])
+def test_nothing_happens_before_the_delay_is_over(step: float) -> None:
+    m = motors(replace(IDEAL, delay=0.02))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    moved = []
+    for _ in range(round(0.03 / step)):
+        m.drive(step)
+        m.integrate()
+        moved.append(m.q[0] > 0)
+    assert moved.index(True) == round(0.02 / step)
+
+
+def test_a_reversal_loses_the_play() -> None:
+    m = motors(replace(IDEAL, backlash=0.01))
+    m.command(ALL, "velocity", np.full(3, 0.1))
+    forth = run(m, 1.0)[-1]
+    assert forth == pytest.approx(np.full(3, 0.1 - 0.005))
+    m.command(ALL, "velocity", np.full(3, -0.1))
+    assert run(m, 0.09)[-1] == pytest.approx(forth)
+    assert run(m, 0.91)[-1] == pytest.approx(np.full(3, 0.005))
+
+
+def test_encoder_noise_is_white_seeded_and_independent_of_the_tick() -> None:
+    noisy = replace(IDEAL, encoder_noise=0.002)
+    for dt in (0.02, 0.005):
+        m = motors(noisy)
+        readings = np.array([m.encoders(dt) for _ in range(20_000)])
+        assert readings.std(axis=0) * np.sqrt(dt / 0.02) == pytest.approx(np.full(3, 0.002), rel=0.02)
+        assert np.abs(np.mean(readings[1:] * readings[:-1], axis=0)).max() < 0.03 * readings.var()
+    assert np.array_equal(motors(noisy, seed=5).encoders(0.01), motors(noisy, seed=5).encoders(0.01))
+    assert not np.array_equal(motors(noisy, seed=5).encoders(0.01), motors(noisy, seed=6).encoders(0.01))
+
+
+def test_parts_can_be_read_one_by_one() -> None:
+    m = motors(q=np.array([0.1, 0.2, 0.3]))
+    assert m.encoders(0.01, slice(1, 3)).tolist() == [0.2, 0.3]
+
+
+def test_hard_stops_stop_and_nothing_winds_up_behind_them() -> None:
+    m = motors(replace(IDEAL, backlash=0.01), q=np.full(3, 2.9))
+    m.command(ALL, "velocity", np.full(3, 1.0))
+    assert run(m, 1.0).max() == 3.0
+    assert not m.velocities.any()
+    m.command(ALL, "velocity", np.full(3, -1.0))
+    assert run(m, 0.1)[-1] == pytest.approx(np.full(3, 2.91))
+
+
+def test_a_joint_blocked_by_physics_does_not_wind_up_either() -> None:
+    m = motors(replace(IDEAL, backlash=0.01))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    for _ in range(200):
+        asked = m.drive(STEP)
+        m.adopt(np.zeros(3))
+    assert asked == pytest.approx(np.full(3, 0.5))
+    m.command(ALL, "velocity", np.full(3, -0.5))
+    assert run(m, 0.1)[-1] == pytest.approx(np.full(3, -0.04))
+
+
+def test_position_mode_goes_to_the_reference_no_faster_than_the_motor_can() -> None:
+    m = motors(MotorParameters(encoder_noise=0.0, backlash=0.0))
+    m.command(ALL, "position", np.array([1.5, -0.3, 0.0]))
+    path = run(m, 3.0)
+    assert path[-1] == pytest.approx([1.5, -0.3, 0.0], abs=1e-3)
+    assert np.abs(np.diff(path, axis=0)).max() / STEP <= two_part_arm().motor_table[0].max_velocity + 1e-9
+
+
+def test_torque_mode_is_inertia_and_viscous_friction() -> None:
+    m = motors()
+    m.command(ALL, "torque", np.array([2.0, 0.0, -1.0]))
+    run(m, STEP)
+    assert m.velocities == pytest.approx(np.array([2.0, 0.0, -1.0]) * STEP / INERTIA)
+    run(m, 2.0)
+    assert m.velocities == pytest.approx(np.array([2.0, 0.0, -1.0]) / FRICTION)
+    assert m.efforts == pytest.approx([2.0, 0.0, -1.0])
+
+
+def test_hold_brakes_at_the_acceleration_limit_and_keeps_the_place() -> None:
+    m = motors(MotorParameters(encoder_noise=0.0))
+    m.command(ALL, "velocity", np.full(3, 1.0))
+    start = run(m, 1.0)[-1]
+    m.command(ALL, "hold")
+    path = run(m, 2.0)
+    limit = two_part_arm().motor_table[0].max_acceleration
+    assert path[-1] - start == pytest.approx(np.full(3, 1.0 / (2 * limit)), abs=1.0 * STEP)
+    assert path[60:] == pytest.approx(np.tile(path[-1], (len(path) - 60, 1)), abs=1e-9)
+
+
+def test_a_held_motor_that_is_pushed_away_returns() -> None:
+    m = motors()
+    m.drive(STEP)
+    m.adopt(np.full(3, 0.1))
+    assert run(m, 2.0)[-1] == pytest.approx(np.zeros(3), abs=1e-6)
+
+
+def test_parts_can_be_in_different_modes() -> None:
+    m = motors()
+    m.command(slice(0, 1), "position", np.array([0.2]))
+    m.command(slice(1, 3), "velocity", np.array([0.1, -0.1]))
+    assert run(m, 2.0)[-1] == pytest.approx([0.2, 0.2, -0.2], abs=1e-6)
+    m.command(slice(1, 2), "hold")
+    assert run(m, 1.0)[-1] == pytest.approx([0.2, 0.2, -0.3], abs=1e-3)
+
+
+def test_what_is_on_its_way_when_the_mode_changes_is_not_read_in_the_wrong_unit() -> None:
+    m = motors(replace(IDEAL, delay=0.02))
+    m.command(ALL, "torque", np.full(3, 1.0))
+    run(m, 0.1)
+    speed = m.velocities[0]
+    m.command(ALL, "velocity", np.zeros(3))
+    run(m, 0.02)
+    assert m.velocities == pytest.approx(np.full(3, speed))
+    run(m, 0.005)
+    assert m.velocities == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+def test_substeps_cover_the_tick() -> None:
+    assert [MotorParameters().substeps(dt) for dt in (0.001, 0.005, 0.01, 0.012, 0.02)] == [1, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("change", [{"lag": -0.1}, {"encoder_noise": np.nan}, {"substep": 0.0}])
+def test_nonsense_parameters_are_refused_by_name(change: dict[str, float]) -> None:
+    with pytest.raises(InvalidValue, match=next(iter(change))):
+        MotorParameters(**change)
+
+
+def test_a_posture_of_the_wrong_length_is_refused() -> None:
+    with pytest.raises(InvalidValue, match="planar"):
+        motors(q=np.zeros(2))

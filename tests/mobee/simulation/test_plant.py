@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mobee.control import Gains, Settle
+from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.model import Model
+from mobee.robot.load import load_robot, load_world
+from mobee.robot.robot import Array, Robot
+from mobee.simulation import MotorParameters, OfflinePlant
+from tests.mobee.control.two_parts import touching, two_part_arm
+
+ICUB = load_robot("icub")
+BOTH = pytest.mark.parametrize("gains", [Gains.default(), Gains.published_2014()], ids=lambda g: g.law)
+
+
+def arm_plant(**options: Any) -> OfflinePlant:
+    return OfflinePlant(Model(two_part_arm()), **options)
+
+
+def lattice_target(robot: Robot, part: str, levels: tuple[float, ...]) -> Array:
+    """The first motors of the part at these shares of their ranges, the others at half."""
+    limits = robot.limits[robot.parts[part].slice]
+    share = np.full(len(limits), 0.5)
+    share[: len(levels)] = levels
+    return limits[:, 0] + share * (limits[:, 1] - limits[:, 0])
+
+
+@BOTH
+def test_an_action_ends_settled_near_its_target(gains: Gains) -> None:
+    plant = arm_plant(gains=gains)
+    outcome = plant.act("arm", np.array([0.4, -0.3]))
+    assert outcome.settled and outcome.touched == ()
+    assert outcome.q == pytest.approx([0.4, -0.3], abs=0.05)
+    assert outcome.duration == pytest.approx(plant.time - plant.dt)
+    assert np.array_equal(outcome.q, plant.measure("arm"))
+
+
+def test_the_seed_decides_everything() -> None:
+    def states(seed: int) -> list[float]:
+        plant = OfflinePlant(Model(ICUB, load_world("table")), seed=seed)
+        return [x for level in (0.25, 0.75) for x in plant.act("left_arm", lattice_target(ICUB, "left_arm", (level,) * 4)).q]
+
+    assert states(3) == states(3)
+    assert states(3) != states(4)
+
+
+def test_a_command_acts_one_tick_after_the_encoders_it_answers() -> None:
+    plant = arm_plant(motors=MotorParameters.ideal())
+    plant.begin("arm", np.array([1.0, 0.0]))
+    plant.tick()
+    commanded = plant.controller.velocity[1]
+    assert commanded > 0 and plant.motors.q[1] == 0.0
+    plant.tick()
+    assert plant.motors.q[1] == pytest.approx(commanded * plant.dt)
+
+
+def test_published_arm_actions_on_the_rank_3_lattice_take_as_long_as_published() -> None:
+    plant = OfflinePlant(Model(ICUB), gains=Gains.published_2014())
+    plant.act("left_arm", lattice_target(ICUB, "left_arm", (0.5, 0.5, 0.5, 0.5)))
+    goals = [(0.25, 0.5, 0.5, 0.5), (0.25, 0.5, 0.25, 0.5), (0.5, 0.5, 0.25, 0.75), (0.5, 0.25, 0.25, 0.75), (0.75, 0.25, 0.5, 0.75)]
+    outcomes = [plant.act("left_arm", lattice_target(ICUB, "left_arm", goal)) for goal in goals]
+    assert all(outcome.settled for outcome in outcomes)
+    assert 3.0 <= np.median([outcome.duration for outcome in outcomes]) <= 6.5
+
+
+def test_parts_act_asynchronously_and_the_others_stay_at_their_attractors() -> None:
+    plant = arm_plant()
+    plant.begin("trunk", np.array([0.2]))
+    plant.begin("arm", np.array([1.5, 0.0]))
+    (first,) = plant.advance()
+    assert first[0] == "trunk"
+    (second,) = plant.advance()
+    assert second[0] == "arm" and second[1].duration > first[1].duration
+    plant.act("arm", np.array([0.5, 0.0]))
+    assert plant.measure("trunk") == pytest.approx([0.2], abs=0.02)
+
+
+def test_acting_while_another_part_acts_is_refused() -> None:
+    plant = arm_plant()
+    plant.begin("trunk", np.array([0.2]))
+    with pytest.raises(InvalidValue, match="trunk is acting"):
+        plant.act("arm", np.zeros(2))
+
+
+def test_what_the_part_touches_is_in_the_outcome() -> None:
+    model = touching(+0.1)
+    plant = OfflinePlant(model)
+    outcome = plant.act("trunk", np.array([-0.3]))
+    assert outcome.touched == ("ball",)
+    assert plant.act("trunk", np.array([0.3])).touched == ()
+
+
+def test_without_contact_forces_the_part_goes_through() -> None:
+    target = np.array([-0.6])
+    through = OfflinePlant(touching(+0.1), contact_forces=False).act("trunk", target)
+    stopped = OfflinePlant(touching(+0.1)).act("trunk", target)
+    assert through.q == pytest.approx(target, abs=0.05)
+    assert stopped.q[0] > -0.4
+
+
+def test_a_timeout_is_an_outcome() -> None:
+    never = Settle(speed=1e-9, acceleration=1e-9, timeout=2.0)
+    outcome = arm_plant(gains=replace(Gains.default(), settle=never)).act("arm", np.array([0.1, 0.1]))
+    assert not outcome.settled
+    assert outcome.duration == pytest.approx(2.0)
+
+
+@BOTH
+@pytest.mark.parametrize("modality", ["position", "torque"])
+def test_other_modalities_reach_the_same_target(gains: Gains, modality: str) -> None:
+    plant = arm_plant(gains=gains, modality=modality)
+    outcome = plant.act("arm", np.array([0.6, -0.5]))
+    assert outcome.settled
+    assert outcome.q == pytest.approx([0.6, -0.5], abs=0.06)
+
+
+def test_default_gains_hold_the_hand_above_the_table_that_it_is_sent_into() -> None:
+    plant = OfflinePlant(Model(ICUB, load_world("table")))
+    plant.begin("torso", np.array([0.0, 0.0, 0.7]))
+    plant.begin("left_arm", lattice_target(ICUB, "left_arm", (0.5, 0.25, 0.5, 0.5)))
+    fields, solids = 0.0, 0.0
+    for _ in range(500):
+        plant.tick()
+        for contact in plant.pose.contacts:
+            if contact.second == "table":
+                fields = max(fields, contact.depth if contact.kind == "field" else 0.0)
+                solids = max(solids, contact.depth if contact.kind == "solid" else 0.0)
+    assert fields > 0.005
+    assert solids == 0.0
+
+
+def test_a_plant_that_is_not_finite_interrupts_the_action() -> None:
+    plant = arm_plant()
+    plant.begin("arm", np.array([0.5, 0.0]))
+    plant.tick()
+    plant.motors.adopt(np.array([0.0, np.nan, 0.0]))
+    with pytest.raises(ActionInterrupted, match="not finite"):
+        plant.advance()
+
+
+def test_bad_input_is_refused() -> None:
+    plant = arm_plant()
+    with pytest.raises(InvalidValue, match="m2"):
+        plant.act("arm", np.array([0.0, 3.5]))
+    with pytest.raises(InvalidValue, match="attractor of arm"):
+        plant.act("arm", np.zeros(3))
+    with pytest.raises(InvalidValue, match="begin first"):
+        plant.advance()
+    with pytest.raises(UnknownName, match="trunk"):
+        plant.measure("trunc")
+    with pytest.raises(InvalidValue, match="tick"):
+        arm_plant(gains=Gains.published_2014(), dt=0.04)
