@@ -1,0 +1,1 @@
+"""Learning by curiosity: the state-action space, the transition model, the plan, the agent (thesis chapters 6 and 7)."""

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
+from mobee.learning.agent import CuriousAgent
+from mobee.learning.lattice import Lattice
+from mobee.learning.transitions import kl_divergence
+from mobee.plant import Outcome
+from mobee.store import TransitionStore
+from tests.mobee.learning.toys import TORSO, FickleDice, InstantPlant, Interrupting, arm, torso, toy_robot
+
+
+def test_a_step_decides_acts_and_observes():
+    space = arm(neighbours="equidistant")
+    agent = CuriousAgent(space, InstantPlant(space.robot))
+    assert agent.state == 40
+    reward = agent.step()
+    assert reward == pytest.approx(kl_divergence((2, 3), (2, 2)))
+    assert agent.transitions == agent.model.tries.sum() == 1
+    assert agent.last.s == 40
+    assert agent.state == agent.last.s_next == space.goal(40, agent.last.a)
+
+
+def test_deciding_and_observing_are_two_plain_steps():
+    space = torso()
+    agent = CuriousAgent(space, InstantPlant(space.robot))
+    action = agent.decide(0)
+    assert np.array_equal(agent.target(action), space.target(space.goal(0, action)))
+    assert agent.observe(Outcome(space.target(0), settled=False, duration=20.0, touched=("table",))) > 0
+    assert (agent.last.s, agent.last.s_next, agent.last.settled, agent.last.touched) == (0, 0, False, ("table",))
+    with pytest.raises(MobeeError, match=r"call decide\(state\) first"):
+        agent.observe(Outcome(space.target(0), True, 1.0))
+
+
+def test_the_state_is_read_in_the_part_s_order_whatever_the_lattice_s():
+    robot = toy_robot()
+    space = Lattice(robot, list(TORSO)[::-1], neighbours=8)
+    agent = CuriousAgent(space, InstantPlant(robot, {"torso": space.target(2)}))
+    assert agent.state == 2
+
+
+def hypercube_transitions(seed, discount):
+    """Transitions until every state-action of the hypercube was tried five times (thesis 7.1)."""
+    space = arm((0.25, 0.75), "equidistant")
+    start = space.target(int(np.random.default_rng(seed).integers(16)))
+    agent = CuriousAgent(space, InstantPlant(space.robot, {"left_arm": start}), seed=seed, discount=discount)
+    while agent.model.tries.min() < 5 and agent.transitions < 1000:
+        agent.step()
+    return agent.transitions
+
+
+@pytest.mark.parametrize("discount", [0.5, 0.9, 0.99])
+def test_the_hypercube_takes_the_320_transitions_of_the_thesis(discount):
+    taken = [hypercube_transitions(seed, discount) for seed in range(4)]
+    assert min(taken) >= 320 and max(taken) <= 326
+
+
+def test_the_hypercube_s_values_grow_with_the_discount_and_spread_evenly():
+    space = arm((0.25, 0.75), "equidistant")
+    values = []
+    for discount in (0.5, 0.9):
+        agent = CuriousAgent(space, InstantPlant(space.robot), discount=discount)
+        agent.run(320)
+        values.append(agent.plan()[0])
+        assert np.ptp(values[-1]) < 0.5 * values[-1].mean()
+    assert values[1].mean() > 2 * values[0].mean()
+
+
+def test_curiosity_covers_the_lattice_in_fewer_transitions_than_its_rivals():
+    space = arm(neighbours="equidistant")
+    taken = {}
+    for explorer in ("curious", "least_tried", "random"):
+        agent = CuriousAgent(space, InstantPlant(space.robot), explorer)
+        while agent.model.tries[space.goals >= 0].min() == 0 and agent.transitions < 5000:
+            agent.step()
+        taken[explorer] = agent.transitions
+    assert 432 <= taken["curious"] <= 460
+    assert taken["curious"] < taken["least_tried"] < taken["random"]
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another():
+    def run(seed):
+        agent = CuriousAgent(arm(), FickleDice(toy_robot(), seed=5), seed=seed)
+        agent.run(50)
+        return [agent.last, agent.model.tries.tolist()]
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)
+
+
+def test_agents_of_different_parts_draw_differently_under_one_seed():
+    def actions(side):
+        space = arm(side=side)
+        agent = CuriousAgent(space, InstantPlant(space.robot))
+        chosen = []
+        for _ in range(10):
+            agent.step()
+            chosen.append(agent.last.a)
+        return chosen
+
+    assert actions("l") != actions("r")
+
+
+@pytest.mark.parametrize("explorer", ["curious", "random", "least_tried"])
+def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, explorer):
+    def make(name, plant):
+        return CuriousAgent(arm(), plant, explorer, seed=3, store=TransitionStore(tmp_path / name, "left_arm"))
+
+    whole = make("whole.sqlite", FickleDice(toy_robot(), seed=9))
+    whole.run(90)
+
+    first = make("parts.sqlite", FickleDice(toy_robot(), seed=9))
+    first.run(37)
+    first.store.close()
+    first.plant.q["left_arm"] = np.array(first.last.q)
+    again = make("parts.sqlite", FickleDice(toy_robot(), seed=9, actions=37, start={"left_arm": np.array(first.last.q)}))
+    assert again.transitions == 37 and again.last == first.last
+    assert np.array_equal(again.model.reward, first.model.reward)
+    again.run(53)
+
+    assert again.store.load() == whole.store.load()
+    assert np.array_equal(again.model.probabilities, whole.model.probabilities)
+    assert np.array_equal(again.model.tries, whole.model.tries)
+
+
+def test_a_transition_is_on_disk_before_the_next_action(tmp_path):
+    path = tmp_path / "run.sqlite"
+    seen = []
+
+    class Looking(InstantPlant):
+        def act(self, part, target):
+            with TransitionStore(path, part) as other:
+                seen.append(len(other.load()))
+            return super().act(part, target)
+
+    CuriousAgent(torso(), Looking(toy_robot()), store=TransitionStore(path, "torso")).run(5)
+    assert seen == [0, 1, 2, 3, 4]
+
+
+def test_a_transition_that_cannot_be_written_is_not_learnt(tmp_path):
+    agent = CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(tmp_path / "run.sqlite", "torso"))
+    agent.run(3)
+    agent.store.close()
+    with pytest.raises(MobeeError, match=r"run\.sqlite"):
+        agent.step()
+    assert agent.transitions == agent.model.tries.sum() == 3
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [({"seed": 1}, "seed"), ({"discount": 0.5}, "discount"), ({"initial": "60-40"}, "initial"), ({"explorer": "random"}, "explorer")],
+)
+def test_a_store_made_under_other_settings_is_refused(tmp_path, changed, key):
+    def make(**options):
+        return CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(tmp_path / "run.sqlite", "torso"), **options)
+
+    make().run(2)
+    with pytest.raises(MobeeError, match=rf"run\.sqlite: torso has {key} = .* on record.*another file"):
+        make(**changed)
+
+
+def test_a_store_of_another_space_is_refused(tmp_path):
+    path = tmp_path / "run.sqlite"
+    CuriousAgent(arm(), InstantPlant(toy_robot()), store=TransitionStore(path, "left_arm")).run(1)
+    with pytest.raises(MobeeError, match="left_arm has space = .* on record"):
+        CuriousAgent(arm(tie_seed=1), InstantPlant(toy_robot()), store=TransitionStore(path, "left_arm"))
+
+
+def test_an_interrupted_action_is_not_observed_and_the_agent_measures_again(tmp_path):
+    agent = CuriousAgent(torso(), Interrupting(toy_robot(), {2}), store=TransitionStore(tmp_path / "run.sqlite", "torso"))
+    agent.step()
+    with pytest.raises(ActionInterrupted):
+        agent.step()
+    assert agent.transitions == len(agent.store.load()) == 1
+    assert agent.state == 0 != agent.last.s_next
+    agent.step()
+    assert agent.last.s == 0 and agent.transitions == 2
+
+
+def test_a_run_goes_on_after_interruptions():
+    agent = CuriousAgent(torso(), Interrupting(toy_robot(), {1, 3, 4}))
+    agent.run(5)
+    assert agent.transitions == 5 and agent.plant.actions == 8
+
+
+def test_a_plant_of_another_robot_is_refused():
+    class Other:
+        name, motors = "katana", ("base",)
+
+    plant = InstantPlant(toy_robot())
+    plant.robot = Other
+    with pytest.raises(InvalidValue, match="'katana', the space is of 'toy'"):
+        CuriousAgent(torso(), plant)

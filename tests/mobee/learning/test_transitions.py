@@ -1,0 +1,162 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.learning.transitions import TransitionModel, kail_update, kl_divergence
+from tests.mobee.learning.toys import arm
+
+PRINTED = 5e-5
+S, ACTION, GOAL = 0, 0, 1  # the first action of state 0 aims at state 1
+OTHERS = (5, 6, 7)
+
+
+def rewards(observations: list[int], initial: str = "50-50") -> list[float]:
+    model = TransitionModel(arm(neighbours="equidistant"), initial)
+    assert model.space.goal(S, ACTION) == GOAL
+    return [model.reward[S, ACTION]] + [model.observe(S, ACTION, s) for s in observations]
+
+
+@pytest.mark.parametrize(
+    ("p", "t", "printed"),
+    [
+        ((1, 2, 1), (1, 1, 1), 0.0589),
+        ((2, 1, 1), (1, 1, 1), 0.0589),
+        ((1, 1, 2, 1, 1), (1,) * 5, 0.0487),
+        ((1, 1, 1, 2, 1, 1, 1), (1,) * 7, 0.0398),
+    ],
+    ids=["6.6", "6.7", "6.8", "6.9"],
+)
+def test_equations_6_6_to_6_9(p, t, printed):
+    assert kl_divergence(p, t) == pytest.approx(printed, abs=PRINTED)
+
+
+@pytest.mark.parametrize(
+    ("bins", "counts", "printed"),
+    [((0, 1), ([2], [2, 2]), (0, 0.0589)), ((0, 1, 1), ([2], [2, 2], [2, 3]), (0, 0.0589, 0.0201))],
+    ids=["table 6.1", "table 7.1"],
+)
+def test_initialisation_is_two_or_three_imagined_observations(bins, counts, printed):
+    known = np.empty(0)
+    for chosen, expected, reward in zip(bins, counts, printed, strict=True):
+        known, gained = kail_update(known, chosen)
+        assert known.tolist() == expected
+        assert gained == pytest.approx(reward, abs=PRINTED)
+
+
+def test_a_predictable_action_that_succeeds_bores_as_in_table_6_2():
+    assert rewards([GOAL] * 3) == pytest.approx([0.0589, 0.0201, 0.0095, 0.0052], abs=PRINTED)
+
+
+def test_a_predictable_action_that_surprises_stays_interesting_as_in_table_6_3():
+    assert rewards([OTHERS[0]] * 3) == pytest.approx([0.0589, 0.0487, 0.0196, 0.0103], abs=PRINTED)
+
+
+TABLE_6_4 = [*OTHERS, GOAL, *OTHERS[:2]]
+
+
+def test_an_unpredictable_action_by_algorithm_6():
+    assert rewards(TABLE_6_4) == pytest.approx([0.0589, 0.0487, 0.0398, 0.0333, 0.0153, 0.0144, 0.0135], abs=PRINTED)
+
+
+def test_table_6_4_as_printed_is_the_reverse_divergence_from_its_third_row_on():
+    # Erratum: KL(T || P) instead of eq. 6.5's KL(P || T).
+    counts, reverse = np.array([2.0, 2.0]), []
+    for chosen in (2, 3, 4, 1, 2, 3):
+        after, _ = kail_update(counts, chosen)
+        before = after.copy()
+        before[chosen] -= 1
+        reverse.append(kl_divergence(before, after))
+        counts = after
+    assert reverse[1:] == pytest.approx([0.0345, 0.0283, 0.0142, 0.0133, 0.0125], abs=PRINTED)
+    assert reverse[0] != pytest.approx(0.0487, abs=PRINTED)
+
+
+def test_success_decays_below_a_thousandth_after_eight_tries():
+    decay = rewards([GOAL] * 19)
+    assert decay[1:9] == pytest.approx([0.0201, 0.0095, 0.0052, 0.0032, 0.0021, 0.0015, 0.0011, 0.0008], abs=PRINTED)
+    assert decay[7] > 1e-3 > decay[8]
+    assert decay[19] < 1e-4
+
+
+def test_60_40_makes_failure_more_interesting_than_success():
+    initial, success = rewards([GOAL], "60-40")
+    failure = rewards([S], "60-40")[1]
+    assert initial == pytest.approx(0.0201, abs=PRINTED)
+    assert failure > success
+    model = TransitionModel(arm(), "60-40")
+    assert np.allclose(model.probabilities, [0.4, 0.6])
+
+
+def test_bins_keep_the_order_of_first_observation():
+    model = TransitionModel(arm(neighbours="equidistant"))
+    for s in (7, 5, 7, GOAL):
+        model.observe(S, ACTION, s)
+    states, counts = model.bins(S, ACTION)
+    assert states.tolist() == [S, GOAL, 7, 5]
+    assert counts.tolist() == [2, 3, 3, 2]
+    assert model.probabilities[S, ACTION] == pytest.approx(np.array([2, 3, 3, 2]) / 10)
+
+
+def test_reward_has_no_finite_entry_where_there_is_no_action():
+    space = arm(neighbours="equidistant")
+    model = TransitionModel(space)
+    assert model.reward.shape == (81, 8)
+    assert np.array_equal(model.reward == -np.inf, space.goals == -1)
+    assert np.array_equal(model.probabilities.sum(axis=-1), np.where(space.goals == -1, 0.0, 1.0))
+
+
+def test_what_the_model_shows_cannot_be_written_to():
+    model = TransitionModel(arm())
+    for array in (model.reward, model.tries, model.outcomes):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 0
+
+
+def test_tries_count_real_observations_only():
+    model = TransitionModel(arm())
+    assert model.tries.sum() == 0
+    model.observe(3, 2, 9)
+    model.observe(3, 2, 9)
+    assert model.tries[3, 2] == model.tries.sum() == 2
+
+
+@given(st.lists(st.tuples(st.integers(0, 80), st.integers(0, 3), st.integers(0, 80)), max_size=60))
+def test_probabilities_follow_the_counts_and_gain_foretells_the_reward(observations):
+    model = TransitionModel(arm(neighbours="equidistant"))
+    reference: dict[tuple[int, int], dict[int, int]] = {}
+    for s, a, outcome in observations:
+        bins = reference.setdefault((s, a), {s: 2, model.space.goal(s, a): 2})
+        bins[outcome] = bins.get(outcome, 1) + 1
+        foretold = model.gain(s, a, outcome)
+        assert model.observe(s, a, outcome) == foretold == model.reward[s, a] > 0
+    for (s, a), expected in reference.items():
+        states, counts = model.bins(s, a)
+        assert dict(zip(states.tolist(), counts.tolist(), strict=True)) == expected
+    assert model.probabilities.sum(axis=-1)[model.space.goals != -1] == pytest.approx(1.0)
+    assert model.tries.sum() == len(observations)
+
+
+def test_gain_changes_nothing():
+    model = TransitionModel(arm())
+    model.gain(0, 0, 40)
+    assert model.tries.sum() == 0 and len(model.bins(0, 0)[0]) == 2
+
+
+def test_unknown_states_actions_and_initialisations_are_refused():
+    model = TransitionModel(arm())
+    for s, a, outcome in ((81, 0, 0), (0, 16, 0), (0, 0, 81), (0, 0, -1)):
+        with pytest.raises(InvalidValue, match="valid are 0 to"):
+            model.observe(s, a, outcome)
+    assert model.tries.sum() == 0
+    with pytest.raises(UnknownName, match="Did you mean '50-50'"):
+        TransitionModel(arm(), "50-5")
+
+
+@pytest.mark.parametrize(("p", "t"), [((1, 0), (1, 1)), ((1, 1), (1, 0)), ((1,), (1, 1)), ((), ()), ((1, np.nan), (1, 1))])
+def test_divergence_is_refused_where_it_is_undefined(p, t):
+    with pytest.raises(InvalidValue, match="bins"):
+        kl_divergence(p, t)

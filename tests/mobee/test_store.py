@@ -1,0 +1,235 @@
+from __future__ import annotations
+
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mobee.errors import MobeeError
+from mobee.store import Transition, TransitionStore
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def transition(n: int) -> Transition:
+    return Transition(n, n % 81, n % 16, (n + 1) % 81, 0.1 / n, n % 7 > 0, 4.0 + n / 3, (n / 7, -0.1), ("table",) * (n % 2))
+
+
+# Appends without end and reports each number only once `append` has returned.
+APPENDER = """
+import sys
+from mobee.store import TransitionStore
+from tests.mobee.test_store import transition
+with TransitionStore(sys.argv[1], sys.argv[2]) as store:
+    n = len(store.load())
+    while n < int(sys.argv[3]):
+        n += 1
+        store.append(transition(n))
+        print(n, flush=True)
+"""
+
+
+def appender(path, agent, until=10**9, **options):
+    command = [sys.executable, "-c", APPENDER, str(path), agent, str(until)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT, **options)
+
+
+def test_what_was_appended_is_loaded_as_it_was(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, "torso") as store:
+        for n in range(1, 30):
+            store.append(transition(n))
+        assert store.load() == [transition(n) for n in range(1, 30)]
+    with TransitionStore(path, "torso") as store:
+        assert store.load() == [transition(n) for n in range(1, 30)]
+        store.append(transition(30))
+        assert store.load()[-1] == transition(30)
+
+
+def test_agents_in_one_file_have_their_own_numbers(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as torso, TransitionStore(tmp_path / "run.sqlite", "left_arm") as arm:
+        torso.append(transition(1))
+        torso.append(transition(2))
+        arm.append(transition(1))
+        assert len(torso.load()) == 2 and len(arm.load()) == 1
+        assert arm.load("torso") == torso.load()
+        assert arm.agents() == ("left_arm", "torso")
+
+
+def test_commits_are_synchronous_and_ahead_of_the_file(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        assert store._db.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert store._db.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_a_kill_at_any_time_leaves_all_that_was_reported_without_a_gap(tmp_path):
+    path = tmp_path / "run.sqlite"
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        child = appender(path, "torso")
+        reported = int(child.stdout.readline())
+        time.sleep(rng.uniform(0.0, 0.15))
+        child.send_signal(signal.SIGKILL)
+        rest, _ = child.communicate()
+        whole_lines = rest.split("\n")[:-1]
+        reported = int(whole_lines[-1]) if whole_lines else reported
+        with TransitionStore(path, "torso") as store:
+            loaded = store.load()
+        assert reported <= len(loaded) <= reported + 1
+        assert loaded == [transition(n) for n in range(1, len(loaded) + 1)]
+    assert len(loaded) > 10
+
+
+def test_several_processes_start_and_append_at_once(tmp_path):
+    path = tmp_path / "run.sqlite"
+    children = [appender(path, agent, until=40) for agent in ("torso", "left_arm", "right_arm")]
+    for child in children:
+        _, errors = child.communicate(timeout=60)
+        assert child.returncode == 0, errors
+    with TransitionStore(path, "monitor") as store:
+        for agent in store.agents():
+            assert store.load(agent) == [transition(n) for n in range(1, 41)]
+        assert len(store.agents()) == 3
+
+
+def test_settings_are_kept_and_only_the_same_are_taken(tmp_path):
+    path = tmp_path / "run.sqlite"
+    settings = {"seed": 3, "space": {"levels": [0.25, 0.75]}}
+    with TransitionStore(path, "torso") as store:
+        assert store.settings() == {}
+        store.bind(settings)
+    with TransitionStore(path, "torso") as store:
+        store.bind(settings)
+        assert store.settings() == settings
+        for other in ({**settings, "seed": 4}, {"seed": 3}, {**settings, "discount": 0.9}):
+            with pytest.raises(MobeeError, match="torso has .* on record.*or another file"):
+                store.bind(other)
+        assert store.settings() == settings
+    with TransitionStore(path, "left_arm") as store:
+        store.bind({"seed": 4})
+
+
+def test_a_number_out_of_order_is_refused(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        store.append(transition(1))
+        for n in (1, 3):
+            with pytest.raises(MobeeError, match=f"has 1 transitions: append number 2, not {n}"):
+                store.append(transition(n))
+        assert len(store.load()) == 1
+
+
+def one_line(error: pytest.ExceptionInfo[MobeeError]) -> str:
+    message = str(error.value)
+    assert "\n" not in message and "run.sqlite: " in message
+    return message
+
+
+def test_two_processes_with_the_name_of_one_agent_are_told(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as first, TransitionStore(tmp_path / "run.sqlite", "torso") as second:
+        first.append(transition(1))
+        with pytest.raises(MobeeError) as error:
+            second.append(transition(1))
+        assert "another process writes transitions of the same agent" in one_line(error)
+
+
+def test_an_edited_file_with_a_gap_is_refused(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, "torso") as store:
+        for n in (1, 2, 3):
+            store.append(transition(n))
+    with sqlite3.connect(path) as db:
+        db.execute("DELETE FROM transitions WHERE n = 2")
+    db.close()
+    with TransitionStore(path, "torso") as store, pytest.raises(MobeeError) as error:
+        store.load()
+    assert "transition 2 of torso is missing" in one_line(error)
+
+
+def set_version(path):
+    TransitionStore(path, "torso").close()
+    with sqlite3.connect(path) as db:
+        db.execute("PRAGMA user_version = 99")
+    db.close()
+
+
+def other_program(path):
+    with sqlite3.connect(path) as db:
+        db.execute("CREATE TABLE recipes (name TEXT)")
+    db.close()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (set_version, "written with schema 99, this mobee reads 1"),
+        (other_program, "a database of another program"),
+        (lambda path: path.write_text("<robot/>" * 200), "not a database; give another path"),
+        (lambda path: path.mkdir(), "cannot be opened"),
+    ],
+    ids=["other schema", "other program", "no database", "folder"],
+)
+def test_a_file_that_is_not_a_store_of_this_schema_is_refused_and_left_as_it_was(tmp_path, make, message):
+    path = tmp_path / "run.sqlite"
+    make(path)
+    before = path.read_bytes() if path.is_file() else None
+    with pytest.raises(MobeeError) as error:
+        TransitionStore(path, "torso")
+    assert message in one_line(error)
+    assert before is None or path.read_bytes() == before
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(MobeeError) as error:
+        TransitionStore(tmp_path / "runs" / "run.sqlite", "torso")
+    assert "check that its folder exists" in one_line(error)
+
+
+def test_a_file_locked_by_another_process_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("mobee.store.BUSY_TIMEOUT", 0.2)
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, "torso") as store:
+        other = sqlite3.connect(path, isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(MobeeError) as error:
+            store.append(transition(1))
+        assert "another process kept it locked" in one_line(error)
+        other.execute("ROLLBACK")
+        other.close()
+        store.append(transition(1))
+
+
+def test_a_full_disk_is_named_and_costs_nothing_that_was_committed(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, "torso") as store:
+        store._db.execute("PRAGMA max_page_count = 12")  # the database's own disk of 48 kB
+        committed = 0
+        with pytest.raises(MobeeError) as error:
+            for n in range(1, 10_000):
+                store.append(transition(n))
+                committed = n
+        assert "the disk is full; make room" in one_line(error)
+        store._db.execute("PRAGMA max_page_count = 1000000")
+        assert len(store.load()) == committed
+        store.append(transition(committed + 1))
+
+
+def test_a_write_that_the_system_refuses_is_named(tmp_path):
+    path = tmp_path / "run.sqlite"
+
+    def limit_file_size():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+    child = appender(path, "torso", preexec_fn=limit_file_size)
+    output, errors = child.communicate(timeout=60)
+    assert child.returncode == 1
+    assert "run.sqlite: the disk refused the write" in errors.strip().split("\n")[-1]
+    with TransitionStore(path, "torso") as store:
+        assert len(store.load()) >= int(output.split()[-1])
