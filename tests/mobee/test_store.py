@@ -14,7 +14,6 @@ import pytest
 from mobee.errors import MobeeError
 from mobee.store import Transition, TransitionStore
 
-
 ROOT = Path(__file__).parents[2]
 
 
