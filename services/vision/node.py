@@ -46,7 +46,9 @@ class VisionNode:
 
     def _take_image(self, image: Image) -> None:
         if len(image.data) != image.width * image.height * 3:
-            self._service.bus.reject("length", f"picture of the {image.eye} eye: {len(image.data)} bytes for {image.width} x {image.height}")
+            self._service.bus.reject(
+                "length", f"picture of the {image.eye} eye: {len(image.data)} bytes for {image.width} x {image.height}"
+            )
             return
         self._images[image.eye] = image
         self._look()
