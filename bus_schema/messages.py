@@ -18,7 +18,7 @@ Quaternion = Annotated[list[float], Meta(min_length=4, max_length=4)]
 Matrix3 = Annotated[list[float], Meta(min_length=9, max_length=9)]  # row-major
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Text = Annotated[str, Meta(max_length=2000)]
-Count = Annotated[int, Meta(ge=0)]
+Count = Annotated[int, Meta(ge=0, le=2**62)]  # differences of two still fit into msgpack
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
