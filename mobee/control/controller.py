@@ -110,6 +110,16 @@ class Controller:
         self.velocity = np.where(still, 0.0, self.velocity)
         self.acceleration = np.where(still, 0.0, self.acceleration)
 
+    def rest(self, part: str, q: Array) -> None:
+        """Have a part that something else keeps still begin anew, as `reset` does for all; q (n_part,) rad measured.
+
+        Unlike `hold` the commanded velocity starts from 0 and the position reference from q.
+        """
+        self.hold(part, q)
+        where = self.robot.part(part).slice
+        self._sent, self._reference = self._sent.copy(), self._reference.copy()
+        self._sent[where], self._reference[where] = 0.0, self._attractor[where]
+
     def forces(self, pose: Pose) -> Forces:
         """The constraint forces at a pose, as `step` computes them when it is given none."""
         return constraint_forces(pose, self.gains, self.propagate, self.contact_forces)
