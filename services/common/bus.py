@@ -92,7 +92,12 @@ class Bus:
         return Latest(self, key, cls, part)
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """The message in a sample; None if it was refused, which is counted and told."""
+        """The message in a sample; None if it was refused, which is counted and told.
+
+        Before the first clock message nobody knows which run it is: then None, and nothing is counted.
+        """
+        if self.run == NO_RUN and not any_run:
+            return None
         try:
             size = None if part is None else self.part_sizes[part]
             message = decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.robot_size)

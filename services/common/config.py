@@ -55,9 +55,11 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
 def read_toml(path: Path, cls: type[_C]) -> _C:
     """The struct that a TOML file describes; raises ConfigError in one line."""
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: not TOML: not UTF-8 at byte {error.start}") from None
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

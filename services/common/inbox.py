@@ -11,6 +11,8 @@ from threading import Lock
 from typing import Any
 
 Handler = Callable[[], None]
+CROWDED = 1000  # waiting messages and calls at which further ones are dropped
+GRACE = 0.002  # s for which `spin` goes on with what is waiting when its time is up
 
 
 class Newest:
@@ -40,19 +42,34 @@ class Inbox:
         self._queue: SimpleQueue[Handler] = SimpleQueue()
         self._timers: list[tuple[float, int, Handler]] = []
         self._order = itertools.count()
+        self.dropped = 0  # what came while the inbox was crowded
 
     def put(self, handler: Handler) -> None:
         """Have the main thread run it; any thread may call this."""
         self._queue.put(handler)
+
+    def offer(self, handler: Handler) -> bool:
+        """As put, but False, and counted, while too much is waiting: a flood must not fill the memory."""
+        if self._queue.qsize() >= CROWDED:
+            self.dropped += 1
+            return False
+        self._queue.put(handler)
+        return True
 
     def at(self, when: float, handler: Handler) -> None:
         """Have it run at a time of the monotonic clock; main thread only."""
         heapq.heappush(self._timers, (when, next(self._order), handler))
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
-        """Handle everything that comes until that time of the monotonic clock, or until it was `enough`."""
+        """Handle what comes until that time of the monotonic clock, or until it was `enough`.
+
+        What is waiting then is handled too, as far as a short grace allows: no flood keeps the caller here.
+        """
+        last = max(until, time.monotonic()) + GRACE
         while enough is None or not enough():
             now = time.monotonic()
+            if now > last:
+                return
             if self._timers and self._timers[0][0] <= now:
                 heapq.heappop(self._timers)[2]()
                 continue

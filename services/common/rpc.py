@@ -25,12 +25,28 @@ class CallFailed(Exception):
 
 
 def call(
-    session: zenoh.Session, who: str, key: str, request: type[Request], reply: type[_R], *, timeout: float = TIMEOUT, **fields: object
+    session: zenoh.Session,
+    who: str,
+    key: str,
+    request: type[Request],
+    reply: type[_R],
+    *,
+    timeout: float = TIMEOUT,
+    tries: int = 1,
+    **fields: object,
 ) -> _R:
-    """Ask the service behind `key`; raises CallFailed.  An empty answer means that nobody is there."""
-    message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
-    for answer in session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout):
-        return _read(key, answer, reply)
+    """Ask the service behind `key`; raises CallFailed.  An empty answer means that nobody is there.
+
+    `tries`: how often a call that nobody answers is sent; with one id, so that it happens once.
+    """
+    payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
+    for left in reversed(range(tries)):
+        try:
+            for answer in session.get(key, payload=payload, encoding=encoding_of(request), timeout=timeout):
+                return _read(key, answer, reply)
+        except CallFailed as failed:
+            if failed.code != "no_answer" or not left:
+                raise
     raise CallFailed("no_answer", f"{key}: nobody answers")
 
 

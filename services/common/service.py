@@ -18,6 +18,7 @@ import zenoh.ext
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Message
 from bus_schema.rpc import Config, Done, Empty, Failure, Reply, Request, Stat
+from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common import log, rpc
 from services.common.bus import NO_RUN, Bus
@@ -49,7 +50,15 @@ class Service:
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
         self.log = log.set_up(who)
-        self.bus = Bus(session or open_client(config.endpoint), who, self.log)
+        session = session or open_client(config.endpoint)
+        try:
+            self._begin(session, robot)
+        except BaseException:
+            session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
+            raise
+
+    def _begin(self, session: zenoh.Session, robot: Robot | None) -> None:
+        self.bus = Bus(session, self.who, self.log)
         if robot is not None:
             self.bus.robot_size = len(robot.motors)
             self.bus.part_sizes = {name: len(part) for name, part in robot.parts.items()}
@@ -60,26 +69,29 @@ class Service:
         self.mark: Callable[[], None] = lambda: None  # zero the counters of `describe`: a measurement begins
         self.end: Callable[[], None] = _leave  # what a shutdown call leads to
         self._kept: list[Any] = []  # tokens die with their handles
-        self._replies: OrderedDict[str, tuple[type[Reply], bytes]] = OrderedDict()
+        self._replies: OrderedDict[tuple[str, str], tuple[type[Reply], bytes]] = OrderedDict()
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._on_run: list[Callable[[], None]] = []
         self._is_ready = False
         self._router, self._router_seen = "", time.monotonic()
         self._watch_liveliness()
-        self.on_request(keys.service_rpc(who, "stat"), Empty, self._stat)
-        self.on_request(keys.service_rpc(who, "mark"), Empty, self._mark)
-        self.on_request(keys.service_rpc(who, "config"), Empty, self._config)
-        self.on_request(keys.service_rpc(who, "shutdown"), Empty, self._shutdown)
+        self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
+        self.on_request(keys.service_rpc(self.who, "mark"), Empty, self._mark)
+        self.on_request(keys.service_rpc(self.who, "config"), Empty, self._config)
+        self.on_request(keys.service_rpc(self.who, "shutdown"), Empty, self._shutdown)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        if error is not None and not isinstance(error, SystemExit):
-            self.log.error("ended by %s", error, exc_info=error)
-        self.bus.session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
+        try:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            if error is not None and not isinstance(error, SystemExit):
+                is_mistake = isinstance(error, MobeeError) and not self._is_ready  # its text says all; see entry.py
+                self.log.error("ended by %s", error, exc_info=None if is_mistake else error)
+        finally:  # even if a signal came in between
+            self.bus.session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
 
     def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
         """Have the newest message of a stream handled; older ones waiting are overwritten."""
@@ -90,7 +102,7 @@ class Service:
         """Have every message of a stream handled, with `history` also those from before this service came."""
 
         def enqueue(sample: zenoh.Sample) -> None:
-            self.inbox.put(lambda: self._deliver(cls, sample, handler, None, any_run))
+            self.inbox.offer(lambda: self._deliver(cls, sample, handler, None, any_run))
 
         if history:
             settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)
@@ -129,13 +141,15 @@ class Service:
         """Answer calls: handler(request, key) -> reply, or CallRefused.  `part_of_key`: its first chunk names the part."""
 
         def enqueue(query: zenoh.Query) -> None:
-            self.inbox.put(lambda: self._answer(query, cls, handler, part_of_key))
+            self.inbox.offer(lambda: self._answer(query, key, cls, handler, part_of_key))
 
         self._kept.append(self.bus.session.declare_queryable(key, enqueue))
 
-    def call(self, key: str, request: type[Request], reply: type[_R], *, timeout: float = rpc.TIMEOUT, **fields: object) -> _R:
-        """Ask another service; raises rpc.CallFailed."""
-        return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, **fields)
+    def call(
+        self, key: str, request: type[Request], reply: type[_R], *, timeout: float = rpc.TIMEOUT, tries: int = 1, **fields: object
+    ) -> _R:
+        """Ask another service, as rpc.call; raises rpc.CallFailed."""
+        return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, tries=tries, **fields)
 
     def ask(self, key: str, reply: type[_R], done: Callable[[_R | rpc.CallFailed], None], *, timeout: float = rpc.TIMEOUT) -> None:
         """Call without arguments that does not wait: `done` handles the answer or the failure in the main thread."""
@@ -198,8 +212,8 @@ class Service:
             raise SystemExit(3)
         self._router = router
 
-    def _answer(self, query: zenoh.Query, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
-        key = str(query.key_expr)
+    def _answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
+        key = str(query.key_expr) if "*" in declared else declared  # a caller may ask with wildcards, a reply may have none
         with query:
             try:
                 reply_type, payload = self._reply(query, cls, handler, key, part_of_key)
@@ -222,12 +236,13 @@ class Service:
         if query.payload is None or query.encoding is None:
             raise Refused("decode", f"{cls.__name__}: an empty request")
         request = decode(cls, query.payload.to_bytes(), str(query.encoding), part=size, robot=self.bus.robot_size)
-        if request.id not in self._replies:
+        call = (key, request.id)
+        if call not in self._replies:
             reply = handler(request, key)
-            self._replies[request.id] = (type(reply), encode(reply))
+            self._replies[call] = (type(reply), encode(reply))
             if len(self._replies) > REMEMBERED:
                 self._replies.popitem(last=False)
-        return self._replies[request.id]
+        return self._replies[call]
 
     def _stat(self, request: Empty, key: str) -> Stat:
         text, numbers = self.describe()
@@ -240,11 +255,12 @@ class Service:
             ready=self._is_ready,
             text=text,
             numbers={name: float(value) for name, value in numbers.items()},
-            rejected=dict(self.bus.rejected),
+            rejected={**self.bus.rejected, **({"flood": self.inbox.dropped} if self.inbox.dropped else {})},
         )
 
     def _mark(self, request: Empty, key: str) -> Done:
         self.bus.rejected.clear()
+        self.inbox.dropped = 0
         self.mark()
         return Done(v=VERSION)
 
