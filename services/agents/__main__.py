@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
-from mobee import MobeeError, load_robot
+from mobee import load_robot
 from services.agents.config import Config
 from services.agents.node import AgentNode
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Run an agent until it is told to end, or has made its transitions."""
     config = load_config(Config, argv, "services.agents")
-    try:
+    with explained("services.agents"):
         robot = load_robot(config.robot)
         robot.part(config.part)
         with Service(f"agent_{config.part}", config, robot) as service:
             AgentNode(service, config, robot).run()
-    except MobeeError as error:
-        print(f"services.agents: {error}", file=sys.stderr)
-        raise SystemExit(1) from None
 
 
 if __name__ == "__main__":

@@ -18,6 +18,8 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 
 POLL = 0.2  # s between attempts while the controller is away or the part is in hold
+TRIES = 3  # of a call that starts an action: whether it did must be known
+OWNED = 3.0  # s for which a goal may belong to somebody else: the tokens of the dead last up to a second
 
 
 class BusPlant:
@@ -26,6 +28,7 @@ class BusPlant:
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
         self._service, self.robot = service, robot
         self._epochs: dict[str, int] = {}
+        self._refused_since: dict[str, float] = {}  # monotonic clock
         self._motion: dict[str, Motion] = {}
         self._tick = 0.0  # s
         self._runs = 0
@@ -45,8 +48,11 @@ class BusPlant:
 
     def act(self, part: str, target: Array) -> Outcome:
         """See mobee.plant.Plant."""
-        if part not in self._motion or not self._owns(part):
+        if part not in self._epochs:
             self.measure(part)
+        elif part in self._motion and not self._owns(part):
+            del self._epochs[part]
+            raise ActionInterrupted(f"{part}: its goal is not ours any more, so where it is must be measured anew")
         run, action_id = self._runs, uuid.uuid4().hex
         asked = self._ask(part, action_id, target)
         while True:
@@ -70,7 +76,9 @@ class BusPlant:
         """Start the action; returns the tick at which it began."""
         q = [float(x) for x in target]
         try:
-            reply = self._service.call(keys.goal(part, "goal"), Goal, Started, epoch=self._epochs[part], action_id=action_id, q=q)
+            reply = self._service.call(
+                keys.goal(part, "goal"), Goal, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, q=q
+            )
         except CallFailed as error:
             if error.code == "limits":
                 raise InvalidValue(str(error)) from None
@@ -107,10 +115,17 @@ class BusPlant:
             reply = self._service.call(keys.goal(part, "take"), Take, Taken, instance=self._service.instance)
         except CallFailed as error:
             if error.code == "owned":
-                raise MobeeError(str(error)) from None
+                self._bear(part, str(error))
             self._service.log.info("the goal of %s cannot be taken yet: %s", part, error)
             return
+        self._refused_since.pop(part, None)
         self._epochs[part] = reply.epoch
+
+    def _bear(self, part: str, refusal: str) -> None:
+        """The goal belongs to somebody else: perhaps a process that has just died, else there is one agent too many."""
+        now = time.monotonic()
+        if now - self._refused_since.setdefault(part, now) > OWNED:
+            raise MobeeError(refusal)
 
     def _noter(self, part: str) -> Callable[[Motion], None]:
         def note(motion: Motion) -> None:
