@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from mobee import load_robot
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
 from services.model.config import Config
 from services.model.node import ModelNode
@@ -14,11 +15,12 @@ from services.model.node import ModelNode
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the model until it is told to end."""
     config = load_config(Config, argv, "services.model")
-    robot = load_robot(config.robot)
-    with Service("model", config, robot) as service:
-        ModelNode(service, config, robot)
-        service.ready()
-        service.run()
+    with explained("services.model"):
+        robot = load_robot(config.robot)
+        with Service("model", config, robot) as service:
+            ModelNode(service, config, robot)
+            service.ready()
+            service.run()
 
 
 if __name__ == "__main__":

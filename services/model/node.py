@@ -46,9 +46,14 @@ class ModelNode:
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         service.on_request(keys.MODEL_JACOBIAN, JacobianAt, lambda r, _: self._jacobian(r))
-        service.on_run(self._body.forget)
+        service.on_run(self._new_run)
         service.on_clock(self._tick)
-        self._model.evaluate(robot.home)  # everything that is built once is built before the robot moves
+        constraint_forces(self._desk.pose, self._gains, config.propagate)  # what is built once is built before the robot moves
+
+    def _new_run(self) -> None:
+        self._body.forget()
+        self._desk.forget()
+        self._last_k = -1
 
     def _tick(self, clock: Clock) -> None:
         if not self._body.update():
@@ -56,7 +61,7 @@ class ModelNode:
         begin = time.perf_counter()
         self._desk.expire(clock.t)
         self._q = self._body.q()
-        pose = self._model.evaluate(self._q)
+        pose = self._desk.pose = self._model.evaluate(self._q)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         touching = {part: list(names) for part, names in touched(pose).items() if names}
         self._forces.put(

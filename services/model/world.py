@@ -11,9 +11,12 @@ from bus_schema.messages import Geometry, WorldObject
 from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, ObjectState, OneName, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee import Model, World
+from mobee.collision import WorldObject as Thing
 from mobee.collision import geometry
-from mobee.errors import MobeeError
+from mobee.collision.world import placed
+from mobee.errors import InvalidValue, MobeeError
 from mobee.kinematics.quaternion import from_matrix, to_matrix
+from mobee.robot.robot import Array
 from services.common.service import CallRefused, Service
 
 DONE = Done(v=VERSION)
@@ -24,31 +27,38 @@ class WorldDesk:
 
     def __init__(self, service: Service, model: Model) -> None:
         self._service, self._model = service, model
-        self._expiry: dict[str, int] = {}  # ns of the bus clock
+        self.pose = model.evaluate(model.robot.home)  # the newest, for what is attached to a link
+        self._expiry: dict[str, int] = {}  # of what only perception put there, ns of the bus clock
         service.on_each(keys.ALL_WORLD, WorldObject, self._perceive)
-        service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._put(w, r)))
+        service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._add(w, r)))
         service.on_request(keys.world_rpc("move"), MoveObject, lambda r, _: self._edit(lambda w: self._move(w, r)))
-        service.on_request(keys.world_rpc("remove"), OneName, lambda r, _: self._edit(lambda w: w.remove(r.name)))
+        service.on_request(keys.world_rpc("remove"), OneName, lambda r, _: self._edit(lambda w: self._remove(w, r.name)))
         service.on_request(keys.world_rpc("role"), SetRole, lambda r, _: self._edit(lambda w: w.set_role(r.name, r.role)))
-        service.on_request(keys.world_rpc("attach"), Attach, lambda r, _: self._edit(lambda w: w.attach(r.name, r.link)))
+        service.on_request(keys.world_rpc("attach"), Attach, lambda r, _: self._edit(lambda w: self._attach(w, r)))
         service.on_request(keys.world_rpc("detach"), OneName, lambda r, _: self._edit(lambda w: w.detach(r.name)))
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
 
     def expire(self, t: int) -> None:
         """Forget what was perceived and not seen again in time; t in ns of the bus clock."""
         for name in [name for name, until in self._expiry.items() if until < t]:
-            del self._expiry[name]
-            if name in self._model.world.objects:
-                self._model.world.remove(name)
-                self._service.bus.event("info", "expired", f"{name} was not seen again in time")
+            self._remove(self._model.world, name)
+            self._service.bus.event("info", "expired", f"{name} was not seen again in time")
+
+    def forget(self) -> None:
+        """A new run: what was perceived in the last one is not known any more."""
+        for name in list(self._expiry):
+            self._remove(self._model.world, name)
 
     def _perceive(self, seen: WorldObject) -> None:
+        world = self._model.world
+        is_new = seen.name not in world.objects
         try:
-            self._put(self._model.world, seen)
+            self._put(world, seen)
         except MobeeError as error:
             self._service.bus.reject("world", str(error))
             return
-        self._expiry[seen.name] = seen.valid_until
+        if is_new or seen.name in self._expiry:
+            self._expiry[seen.name] = seen.valid_until
 
     def _edit(self, change: Callable[[World], object]) -> Done:
         try:
@@ -57,21 +67,33 @@ class WorldDesk:
             raise CallRefused("world", str(error)) from None
         return DONE
 
+    def _add(self, world: World, request: AddObject) -> None:
+        self._put(world, request)
+        self._expiry.pop(request.name, None)  # whoever added it removes it
+
+    def _attach(self, world: World, request: Attach) -> None:
+        world.attach(request.name, request.link)
+        self._expiry.pop(request.name, None)  # what is in a hand may be hidden from the eyes
+
+    def _remove(self, world: World, name: str) -> None:
+        world.remove(name)
+        self._expiry.pop(name, None)
+
     def _put(self, world: World, seen: WorldObject | AddObject) -> None:
         known = world.objects.get(seen.name)
-        rotation = to_matrix(np.array(seen.quaternion))
+        rotation = _rotation(seen.quaternion)
         if known is not None and known.kind == seen.geometry.kind and list(known.size) == seen.geometry.size:
             world.move(seen.name, position=seen.position, rotation=rotation)
             if known.role != seen.role:
                 world.set_role(seen.name, seen.role)
             return
-        shape = geometry.Geometry(seen.geometry.kind, tuple(seen.geometry.size))
+        shape = _shape(seen.geometry)
         if known is not None:
             world.remove(seen.name)
         world.add(seen.name, shape, position=seen.position, rotation=rotation, role=seen.role)
 
     def _move(self, world: World, request: MoveObject) -> None:
-        rotation = None if request.quaternion is None else to_matrix(np.array(request.quaternion))
+        rotation = None if request.quaternion is None else _rotation(request.quaternion)
         world.move(request.name, position=request.position, rotation=rotation)
 
     def _list(self) -> WorldReply:
@@ -79,11 +101,31 @@ class WorldDesk:
             ObjectState(
                 name=o.name,
                 geometry=Geometry(kind=o.kind, size=list(o.size)),
-                position=o.position.tolist(),
-                quaternion=from_matrix(o.rotation).tolist(),
+                position=here.position.tolist(),
+                quaternion=from_matrix(here.rotation).tolist(),
                 role=o.role,
                 link=o.link or "",
             )
-            for o in self._model.world.objects.values()
+            for o, here in ((o, self._in_root_frame(o)) for o in self._model.world.objects.values())
         ]
         return WorldReply(v=VERSION, objects=objects)
+
+    def _in_root_frame(self, thing: Thing) -> Thing:
+        if thing.link is None:
+            return thing
+        return placed(thing, self.pose.transforms[self._model.robot.links.index(thing.link)])
+
+
+def _shape(given: Geometry) -> geometry.Geometry:
+    """The library's shape, which checks the number of sizes that the message leaves open."""
+    expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[given.kind]
+    if len(given.size) != expected:
+        raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
+    return geometry.Geometry(given.kind, tuple(given.size))
+
+
+def _rotation(quaternion: list[float]) -> Array:
+    """The matrix (3, 3) of a quaternion wxyz that may need normalising, but not inventing."""
+    if not 0.5 < np.linalg.norm(quaternion) < 2.0:
+        raise InvalidValue(f"quaternion {quaternion}: must be of length 1")
+    return to_matrix(np.array(quaternion))
