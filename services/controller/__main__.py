@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from mobee import load_robot
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
 from services.controller.config import Config
 from services.controller.node import ControllerNode
@@ -14,11 +15,12 @@ from services.controller.node import ControllerNode
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the controller until it is told to end."""
     config = load_config(Config, argv, "services.controller")
-    robot = load_robot(config.robot)
-    with Service("controller", config, robot) as service:
-        ControllerNode(service, config, robot)
-        service.ready()
-        service.run()
+    with explained("services.controller"):
+        robot = load_robot(config.robot)
+        with Service("controller", config, robot) as service:
+            ControllerNode(service, config, robot)
+            service.ready()
+            service.run()
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 
 RETRY = 0.2  # s between attempts to arm a part
+SHOWS = 0.1  # s after which the state of a part must show that it was armed
 
 
 class Drives:
@@ -21,22 +22,23 @@ class Drives:
         self._service = service
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         self._next_try = dict.fromkeys(robot.parts, 0.0)
-        self._armed_at = dict.fromkeys(robot.parts, -1)  # tick
+        self._shows_by = dict.fromkeys(robot.parts, 0.0)
 
     def armed(self, part: str, state: State) -> bool:
-        """Whether the part does what this controller commands, as of its newest state."""
-        return self.epochs[part] > 0 and state.gate == "armed" and state.epoch == self.epochs[part]
-
-    def arming(self, part: str, k: int) -> bool:
-        """Whether the part was armed so recently that its state cannot show it yet."""
-        return 0 <= k - self._armed_at[part] <= 2
+        """Whether the part does what this controller commands, as of its newest state; or will have, if it was armed just now."""
+        if self.epochs[part] == 0:
+            return False
+        if state.epoch == self.epochs[part] and state.gate == "armed":
+            self._shows_by[part] = 0.0
+            return True
+        return time.monotonic() < self._shows_by[part]
 
     def forget(self) -> None:
         """A new run of robot_sim: all epochs are void."""
         self.epochs = dict.fromkeys(self.epochs, 0)
-        self._armed_at = dict.fromkeys(self._armed_at, -1)
+        self._next_try = dict.fromkeys(self._next_try, 0.0)
 
-    def try_arm(self, part: str, state: State, k: int) -> bool:
+    def try_arm(self, part: str, state: State) -> bool:
         """Take and arm a part that is idle or in hold; True when it is armed now."""
         now = time.monotonic()
         if state.gate not in ("idle", "hold", "armed") or now < self._next_try[part]:
@@ -50,6 +52,6 @@ class Drives:
             self._service.log.info("%s cannot be armed yet: %s", part, error)
             return False
         if reply.gate == "armed":
-            self._armed_at[part] = k
+            self._shows_by[part] = time.monotonic() + SHOWS
             self._service.bus.event("info", "armed", f"{part} is under control, epoch {self.epochs[part]}")
         return reply.gate == "armed"

@@ -11,7 +11,7 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
@@ -32,7 +32,7 @@ class GoalDesk:
     def __init__(self, service: Service, robot: Robot, law: Controller, actions: dict[str, Action], rest: Callable[[str], None]) -> None:
         self._service, self._robot, self._law, self._actions, self._rest = service, robot, law, actions, rest
         self._forces = np.zeros(len(robot.motors))
-        self._pushed: dict[str, set[str]] = {}
+        self._pushes: dict[str, dict[str, Array]] = {}  # part -> marker -> (3,)
         self._epoch = time.time_ns() // 1_000_000  # newer than any epoch of a controller that died
         service.on_request(keys.goal("*", "take"), Take, _by_part(self._take), part_of_key=True)
         service.on_request(keys.goal("*", "release"), WithEpoch, _by_part(self._release), part_of_key=True)
@@ -75,21 +75,34 @@ class GoalDesk:
         return DONE
 
     def _apply(self, part: str, request: Force) -> None:
+        if (request.marker is None) != (request.push is None):
+            raise InvalidValue("a push needs both, the marker and the force")
+        if request.f is None and request.marker is None:
+            self.clear(part)
+            return
+        if request.marker is not None:
+            self._robot.marker(request.marker)
+            self._pushes.setdefault(part, {})[request.marker] = np.array(request.push)
         if request.f is not None:
             self._forces[self._robot.part(part).slice] = request.f
-            self._law.force(self._forces)
-        if request.marker is not None:
-            self._law.push(request.marker, np.array(request.push or (0.0, 0.0, 0.0)))
-            self._pushed.setdefault(part, set()).add(request.marker)
-        if request.f is None and request.marker is None:
-            self._clear(part)
+        self._exert()
 
-    def _clear(self, part: str) -> None:
+    def clear(self, part: str) -> None:
         """End the forces of one part's client; those of the others go on."""
         self._forces[self._robot.part(part).slice] = 0.0
+        self._pushes.pop(part, None)
+        self._exert()
+
+    def _exert(self) -> None:
+        """Tell the law the sum of what the clients want; several may push at one marker."""
+        self._law.clear()
         self._law.force(self._forces)
-        for marker in self._pushed.pop(part, ()):
-            self._law.push(marker, np.zeros(3))
+        at_marker: dict[str, Array] = {}
+        for pushes in self._pushes.values():
+            for marker, push in pushes.items():
+                at_marker[marker] = at_marker.get(marker, 0.0) + push
+        for marker, push in at_marker.items():
+            self._law.push(marker, push)
 
     def _check_epoch(self, part: str, epoch: int) -> None:
         owner = self._actions[part].owner
@@ -114,5 +127,5 @@ class GoalDesk:
 
     def _drop(self, part: str) -> None:
         self._actions[part].drop(self._service.bus.k)
-        self._clear(part)
+        self.clear(part)
         self._rest(part)

@@ -7,10 +7,11 @@ import time
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Command, Motion, State
+from bus_schema.messages import Clock, Command, Motion
 from bus_schema.messages import Forces as ForcesMessage
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.delivery import LATEST
@@ -21,6 +22,7 @@ from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 
 OLDEST = 3  # ticks: with forces older than that the robot holds
+STALE = 100_000_000  # ns: a part whose state is older than that is not under control
 
 
 class ControllerNode:
@@ -41,12 +43,28 @@ class ControllerNode:
         self._motions = {part: bus.publisher(keys.motion(part), Motion, LATEST) for part in robot.parts}
         self._mark()
         service.mark, service.describe = self._mark, self._describe
-        GoalDesk(service, robot, self._law, self._actions, self._rest)
+        self._check_posture()
+        self._goals = GoalDesk(service, robot, self._law, self._actions, self._stay)
         service.on_run(self._new_run)
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
         service.on_clock(self._tick)
 
+    def _check_posture(self) -> None:
+        """Raise what the library says of a posture that the robot cannot take."""
+        for part, posture in self._config.posture.items():
+            limits = self._robot.limits[self._robot.part(part).slice]
+            if len(posture) != len(limits):
+                raise InvalidValue(f"posture of {part}: {len(posture)} numbers, it has {len(limits)} motors")
+            for motor, q, (lower, upper) in zip(self._robot.part(part).motors, posture, limits, strict=True):
+                if not lower <= q <= upper:
+                    raise InvalidValue(f"posture of {part}: {motor} at {q:g} rad, its range is {lower:.4f} to {upper:.4f}")
+
     def _tick(self, clock: Clock) -> None:
+        if clock.mode == "paused":
+            return
+        if clock.dt * 1e-9 >= self._law.max_dt:
+            self._service.bus.reject("rate", f"ticks of {clock.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
+            return
         self._clock = clock
         if self._forces is not None and self._forces.re_k >= clock.k:
             self._step()
@@ -68,9 +86,9 @@ class ControllerNode:
         clock, self._clock = self._clock, None
         if clock is None or not self._body.update():
             return
-        fresh = self._forces is not None and clock.k - self._forces.re_k <= OLDEST
-        self._supervise(clock.k, fresh)
-        gap, self._last_k = max(clock.k - self._last_k, 1), clock.k
+        fresh = self._forces is not None and abs(clock.k - self._forces.re_k) <= OLDEST
+        self._supervise(clock, fresh)
+        gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
         if fresh and self._forces is not None:
             self._advance(clock, min(gap, OLDEST), self._forces)
         else:
@@ -78,19 +96,20 @@ class ControllerNode:
         self._publish_motion(clock)
         self._ticks += 1
 
-    def _supervise(self, k: int, fresh: bool) -> None:
+    def _supervise(self, clock: Clock, fresh: bool) -> None:
         """Arm what can be armed; what is not under control has no action and rests where it is."""
         for part, action in self._actions.items():
             state = self._body.states[part]
-            armed = fresh and (self._drives.armed(part, state) or self._drives.arming(part, k) or self._drives.try_arm(part, state, k))
-            if not armed:
+            lacking = "no fresh forces" if not fresh else "no fresh state" if clock.t - state.t > STALE else ""
+            if lacking or not (self._drives.armed(part, state) or self._drives.try_arm(part, state)):
                 if action.status != "held":
-                    self._held(part, k, state)
-                self._law.hold(part, np.array(state.q))
+                    self._held(part, clock.k, lacking or f"gate {state.gate}")
+                self._law.rest(part, np.array(state.q))
                 self._held_ticks += 1
             elif action.status == "held":
-                self._rest(part)
-                action.resume(k)
+                self._law.rest(part, np.array(state.q))
+                self._seek_posture(part)
+                action.resume(clock.k)
 
     def _advance(self, clock: Clock, ticks: int, forces: ForcesMessage) -> None:
         """Step the law over the ticks that have passed, and command what is armed."""
@@ -133,15 +152,18 @@ class ControllerNode:
                 touched=touched.get(part, []),
             )
 
-    def _held(self, part: str, k: int, state: State) -> None:
+    def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)
-        self._service.bus.event("warning", "held", f"{part} is in hold (gate {state.gate})", epoch=float(self._drives.epochs[part]))
+        self._goals.clear(part)
+        self._service.bus.event("warning", "held", f"{part} is in hold ({why})", epoch=float(self._drives.epochs[part]))
 
-    def _rest(self, part: str) -> None:
-        """At rest where it is, or on its way to its posture if nobody owns it and one is given."""
-        if part not in self._body.states:
-            return
-        self._law.hold(part, np.array(self._body.states[part].q))
+    def _stay(self, part: str) -> None:
+        """Its owner is gone: brake and stay where it is, or go to its posture if one is given."""
+        if part in self._body.states:
+            self._law.hold(part, np.array(self._body.states[part].q))
+            self._seek_posture(part)
+
+    def _seek_posture(self, part: str) -> None:
         if self._actions[part].owner is None and part in self._config.posture:
             self._law.set_attractor(part, np.array(self._config.posture[part]))
 
@@ -150,8 +172,9 @@ class ControllerNode:
         self._drives.forget()
         self._forces, self._clock, self._last_k = None, None, -1
         self._law.reset(self._robot.home)
-        for action in self._actions.values():
+        for part, action in self._actions.items():
             action.hold(self._service.bus.k)
+            self._goals.clear(part)
 
     def _mark(self) -> None:
         self._ticks = self._late_forces = self._held_ticks = 0
