@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import sys
+from pathlib import Path
 
 
-def set_up(who: str) -> logging.Logger:
-    """The service's logger."""
+def set_up(who: str, file: Path | None = None) -> logging.Logger:
+    """The service's logger; `file` instead of standard error."""
     logging.basicConfig(
-        stream=sys.stderr,
+        handlers=[logging.StreamHandler(sys.stderr) if file is None else logging.FileHandler(file)],
         level=logging.INFO,
         format=f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s",
         datefmt="%H:%M:%S",

@@ -1,0 +1,69 @@
+"""Who the services are: which program, after whom it starts, what it cannot do without."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+AGENT = "agent_"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the launcher knows of a service before it reads its settings."""
+
+    module: str  # run with `python -m`
+    config: str  # module with its `Config`
+    stage: int  # services are listed in this order, and stopped in the opposite one
+    after: tuple[str, ...] = ()  # who must be ready before it is started
+    nice: int = 0
+    vital: bool = True  # when it is given up, the robot is stopped
+    needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
+    given: Mapping[str, str] = field(default_factory=dict)  # settings that make it this service
+
+
+_PICTURES = 10  # nice value of whatever may come late
+
+_ENTRIES = {
+    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config", 0, needs={"pybullet": "sim", "icub_models": "sim"}),
+    "model": Entry("services.model", "services.model.config", 1),
+    "controller": Entry("services.controller", "services.controller.config", 2, after=("robot_sim", "model")),
+    "renderer": Entry(
+        "services.robot_sim.renderer",
+        "services.robot_sim.renderer_config",
+        4,
+        after=("robot_sim", "controller"),
+        nice=_PICTURES,
+        vital=False,
+        needs={"pybullet": "sim", "icub_models": "sim"},
+    ),
+    "vision": Entry(
+        "services.vision",
+        "services.vision.config",
+        4,
+        after=("model", "controller"),
+        nice=_PICTURES,
+        vital=False,
+        needs={"cv2": "vision"},
+    ),
+    "monitor": Entry(
+        "services.monitor",
+        "services.monitor.config",
+        5,
+        after=("robot_sim", "controller"),
+        nice=_PICTURES,
+        vital=False,
+        needs={"rerun": "viz", "icub_models": "viz"},
+    ),
+}
+
+NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
+
+
+def entry_of(who: str, module: str | None) -> Entry | None:
+    """The entry of a service; `module` names the program of one that is not shipped.  None: nobody knows it."""
+    if module is not None:
+        return Entry(module, f"{module}.config", 3, after=("controller",))
+    if who.startswith(AGENT):
+        return Entry("services.agents", "services.agents.config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
+    return _ENTRIES.get(who)

@@ -1,0 +1,61 @@
+"""What must be right before anything is started: installed packages, robot and world files."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from mobee.errors import MobeeError, UnknownName
+from services.common.config import ConfigError, nearest
+from services.launcher.scenario import Part, Scenario
+
+
+class MissingExtra(Exception):
+    """A package that a service needs is not installed; the message holds the remedy."""
+
+
+def check_extras(scenario: Scenario) -> None:
+    """Raise MissingExtra for the first service that could not even be imported."""
+    for part in scenario.parts:
+        if part.entry.module == "services.robot_sim" and getattr(part.config, "backend", "pybullet") == "kinematic":
+            continue
+        for package, extra in part.entry.needs.items():
+            if importlib.util.find_spec(package) is None:
+                raise MissingExtra(f"{part.who} needs {package}, which is not installed{_remedy(package, extra)}")
+
+
+def _remedy(package: str, extra: str) -> str:
+    if package == "pybullet" and sys.version_info >= (3, 12):
+        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+        return (
+            f" and has no wheel for Python {version}: use Python 3.11, or the motor model alone, which runs on every version: "
+            "mobee launch kinematic"
+        )
+    return f": pip install 'mobee[{extra}]'"
+
+
+def check_robots(scenario: Scenario) -> None:
+    """Raise ConfigError in one line when a robot or world that a service names cannot be read."""
+    from mobee.robot.load import load_robot, load_world
+
+    read_robot, read_world = cache(load_robot), cache(load_world)
+    for part in scenario.parts:
+        robot = _read(scenario, part, "robot", read_robot)
+        if getattr(part.config, "world", ""):
+            _read(scenario, part, "world", read_world)
+        name = getattr(part.config, "part", None)
+        if name is not None and name not in robot.parts:
+            place = scenario.where(f"services.{part.who}")
+            raise ConfigError(f"{place}: {part.who}: the robot has no part {name!r}.{nearest(name, robot.parts)}")
+
+
+def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:
+    try:
+        return read(getattr(part.config, field))
+    except UnknownName as error:
+        raise ConfigError(f"{scenario.where(f'services.{part.who}.{field}')}: {field}: {error}") from None
+    except MobeeError as error:
+        raise ConfigError(str(error)) from None

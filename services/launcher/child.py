@@ -1,0 +1,117 @@
+"""One service as a process of its own: started, watched, ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from bus_schema.rpc import Stat
+
+Phase = Literal["waiting", "starting", "ready", "failed", "fault", "ended"]
+
+_ONE_THREAD = {
+    f"{pool}_NUM_THREADS": "1" for pool in ("OMP", "OPENBLAS", "MKL", "NUMBA", "RAYON", "NUMEXPR", "VECLIB_MAXIMUM")
+}  # the processes are the parallelism
+
+
+@dataclass(frozen=True)
+class Program:
+    """What is run as one service."""
+
+    who: str
+    argv: tuple[str, ...]
+    log: Path  # standard output and error
+    stage: int = 0
+    after: tuple[str, ...] = ()
+    nice: int = 0
+    vital: bool = True
+
+
+@dataclass
+class Child:
+    """A program and the process that runs it at present."""
+
+    program: Program
+    phase: Phase = "waiting"
+    process: subprocess.Popen[bytes] | None = None
+    since: float = 0.0  # monotonic time of the last change of phase
+    failures: deque[float] = field(default_factory=deque)  # monotonic times
+    restarts: int = 0
+    again_at: float = 0.0  # monotonic time of the next start
+    has_token: bool = False
+    asked_at: float = 0.0
+    answered_at: float = 0.0  # monotonic, as asked_at
+    asking: bool = False
+    unanswered: int = 0  # stat calls in a row
+    stat: Stat | None = None  # last answer of the present process
+    reason: str = ""  # of the last failure
+
+    @property
+    def who(self) -> str:
+        """The service's name."""
+        return self.program.who
+
+    @property
+    def pid(self) -> int:
+        """Of the present process, 0 when there is none."""
+        return 0 if self.process is None else self.process.pid
+
+    def enter(self, phase: Phase) -> None:
+        """Note the change of phase."""
+        self.phase, self.since = phase, time.monotonic()
+
+    def spawn(self) -> None:
+        """Start the process: in its own group, so that a terminal's Ctrl-C reaches the launcher alone.
+
+        In the same session, though: with autogroup scheduling, niceness counts only within one.
+        """
+        with self.program.log.open("ab") as log:
+            self.process = subprocess.Popen(
+                self.program.argv,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env={**os.environ, **_ONE_THREAD, "PYTHONUNBUFFERED": "1"},
+                process_group=0,
+            )
+        if self.program.nice:
+            os.setpriority(os.PRIO_PROCESS, self.process.pid, self.program.nice)
+        self.has_token, self.asking, self.unanswered, self.asked_at, self.answered_at, self.stat = False, False, 0, 0.0, 0.0, None
+        self.enter("starting")
+
+    def exit_code(self) -> int | None:
+        """The code with which the process ended; None while it runs."""
+        return None if self.process is None else self.process.poll()
+
+    def running(self) -> bool:
+        """Whether there is a process."""
+        return self.process is not None and self.process.poll() is None
+
+    def terminate(self) -> None:
+        """Ask the process to end."""
+        if self.running():
+            self.process.terminate()  # type: ignore[union-attr]
+
+    def kill(self) -> None:
+        """End the process and whatever it started, and wait until it is gone."""
+        if self.process is None:
+            return
+        try:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass  # all of them are gone
+        self.process.wait()
+        self.process = None  # its number may now name another process
+
+    def last_words(self) -> str:
+        """The last line of its log."""
+        with self.program.log.open("rb") as log:
+            log.seek(max(0, self.program.log.stat().st_size - 4000))
+            lines = log.read().decode(errors="replace").split("\n")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")

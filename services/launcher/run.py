@@ -1,0 +1,210 @@
+"""One run of a scenario: router, services, supervision, stop, summary."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from bus_schema import keys
+from bus_schema.rpc import Done
+from services.common import log
+from services.common.config import ConfigError, ServiceConfig
+from services.common.rpc import CallFailed
+from services.common.service import Service
+from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
+from services.launcher.checks import MissingExtra, check_extras, check_robots
+from services.launcher.child import Program
+from services.launcher.run_directory import make_run_directory
+from services.launcher.scenario import Scenario, read_scenario
+from services.launcher.screen import Screen
+from services.launcher.summary import as_text, summarise
+from services.launcher.supervisor import Limits, Supervisor
+
+OK, FAILED, BAD_INPUT, ENVIRONMENT = 0, 1, 2, 3
+
+_REDRAW = 0.5  # s
+_FOREVER = 1e6  # s
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to launch."""
+
+    scenario: str = "default"
+    settings: tuple[str, ...] = ()  # table.field=value
+    headless: bool = False  # without the monitor
+    duration: float | None = None  # s from readiness; None: until told to stop
+    json: bool = False
+    endpoint: str | None = None
+    runs: Path = Path("runs")
+    limits: Limits = Limits()
+
+
+def launch(options: Options) -> int:
+    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment."""
+    started = time.monotonic()
+    try:
+        scenario = read_scenario(options.scenario, options.settings, leave_out=["monitor"] if options.headless else [])
+        check_robots(scenario)
+        check_extras(scenario)
+        endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+        session = open_router(endpoint)
+    except ConfigError as error:
+        return _refuse(str(error), BAD_INPUT)
+    except (MissingExtra, BusUnreachable) as error:
+        return _refuse(str(error), ENVIRONMENT)
+    try:
+        directory = make_run_directory(options.runs, scenario, endpoint)
+        service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
+        service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
+    except OSError as error:
+        session.close()  # type: ignore[no-untyped-call]
+        return _refuse(
+            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
+        )
+    with service:
+        return _Run(service, scenario, directory, options).execute(started)
+
+
+def _refuse(text: str, code: int) -> int:
+    print(f"mobee launch: {' '.join(text.split())}", file=sys.stderr)
+    return code
+
+
+class _Run:
+    """The state of one run, in the launcher's main thread."""
+
+    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options) -> None:
+        self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
+        self._screen = Screen(scenario.title or scenario.name)
+        self._supervisor = Supervisor(service, _programs(scenario, directory), self._tell, options.limits)
+        self._children = self._supervisor.children.values()
+        self._stop_asked, self._starting = False, True
+
+    def execute(self, started: float) -> int:
+        """Start, watch, stop, summarise; `started`: monotonic time from which readiness is counted."""
+        self._listen_for_stop()
+        token = self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance))
+        self._service.describe = self._describe
+        self._service.ready()
+        ready = begun = None
+        try:
+            self._draw()
+            self._supervisor.begin()
+            self._spin(_FOREVER, self._supervisor.settled)
+            if not self._over():
+                self._starting = False
+                ready = time.monotonic() - started
+                self._tell(f"all ready after {ready:.1f} s" if not self._supervisor.faults else "running without what was given up")
+                self._mark()
+                begun = time.monotonic()
+                self._spin(self._options.duration or _FOREVER)
+                self._ask_last()
+            duration = 0.0 if begun is None else time.monotonic() - begun
+            self._tell("stopping")
+            self._supervisor.stop()
+        finally:
+            self._supervisor.kill_all()
+            self._screen.draw(self._children, self._directory, last=True)
+        token.undeclare()  # type: ignore[no-untyped-call]
+        return self._report(ready, duration)
+
+    def _over(self) -> bool:
+        """Whether somebody asked for the end, or nobody waits at a robot that is stopped for good."""
+        lost = self._supervisor.stopped_robot and (self._options.duration is not None or self._starting)
+        return self._stop_asked or lost
+
+    def _spin(self, seconds: float, enough: Callable[[], bool] = lambda: False) -> None:
+        self._service.spin(time.monotonic() + seconds, lambda: self._over() or enough())
+
+    def _mark(self) -> None:
+        """Have every service count from now on."""
+        waiting: set[str] = set()
+        for child in self._children:
+            if child.phase == "ready":
+                waiting.add(child.who)
+                done = partial(_note_marked, waiting, child.who)
+                self._service.ask(keys.service_rpc(child.who, "mark"), Done, done, timeout=1.0)
+        self._spin(2.0, lambda: not waiting)
+
+    def _ask_last(self) -> None:
+        """The numbers as they are now: the last poll is up to half a second old."""
+        asked = time.monotonic()
+        for child in self._children:
+            if child.phase == "ready":
+                self._supervisor.ask(child)
+        self._service.spin(asked + 2.0, lambda: not any(child.asking for child in self._children))
+
+    def _listen_for_stop(self) -> None:
+        """One signal stops everything in order, a second one kills."""
+        self._service.end = self._ask_stop
+
+        def on_signal(signum: int, frame: FrameType | None) -> None:
+            if self._stop_asked:
+                self._supervisor.kill_all()
+                raise SystemExit(FAILED)
+            self._ask_stop()
+
+        for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(signum) is not signal.SIG_IGN:  # nohup stays in force
+                signal.signal(signum, on_signal)
+
+    def _ask_stop(self) -> None:
+        self._stop_asked = True
+        self._service.inbox.put(lambda: None)  # wake the main thread
+
+    def _tell(self, text: str) -> None:
+        self._service.log.info("%s", text)
+        self._screen.tell(text)
+
+    def _draw(self) -> None:
+        self._screen.draw(self._children, self._directory)
+        self._service.inbox.at(time.monotonic() + _REDRAW, self._draw)
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        ready = sum(child.phase == "ready" for child in self._children)
+        fault = f", FAULT: {'; '.join(self._supervisor.faults)}" if self._supervisor.faults else ""
+        numbers = {f"restarts_{child.who}": float(child.restarts) for child in self._children}
+        return f"{self._scenario.name}: {ready} of {len(self._children)} ready{fault}, {self._directory}"[:2000], numbers
+
+    def _report(self, ready: float | None, duration: float) -> int:
+        summary = {
+            "scenario": self._scenario.name,
+            "run": str(self._directory),
+            "duration_s": duration,
+            "seconds_to_ready": ready,
+            "faults": self._supervisor.faults,
+            **summarise(self._children),
+        }
+        text = json.dumps(summary, indent=2)
+        with contextlib.suppress(OSError):  # a disk that is full now does not make the run a failure
+            (self._directory / "summary.json").write_text(text + "\n")
+        print(text if self._options.json else as_text(summary), flush=True)
+        return FAILED if self._supervisor.faults or (ready is None and not self._stop_asked) else OK
+
+
+def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None:
+    waiting.discard(who)
+
+
+def _programs(scenario: Scenario, directory: Path) -> list[Program]:
+    return [
+        Program(
+            who=part.who,
+            argv=(sys.executable, "-m", part.entry.module, "--config", str(directory / f"{part.who}.toml")),
+            log=directory / "logs" / f"{part.who}.log",
+            stage=part.entry.stage,
+            after=part.entry.after,
+            nice=part.entry.nice,
+            vital=part.entry.vital,
+        )
+        for part in scenario.parts
+    ]

@@ -1,0 +1,59 @@
+"""The folder of a run: what was run, with what, and what came of it."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+from msgspec import structs, to_builtins
+
+from services.common.config import ServiceConfig
+from services.launcher.scenario import Scenario
+from services.launcher.toml import to_toml
+
+_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "python-fcl", "pybullet", "icub-models", "rerun-sdk", "opencv-python-headless")
+
+
+def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:
+    """Make `runs/<time>-<name>/` with scenario.toml, versions.toml, <who>.toml and logs/; raises OSError."""
+    directory = _new_folder(runs, f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario.name}")
+    (directory / "logs").mkdir()
+    configs = {part.who: _complete(part.config, part.given, endpoint, directory) for part in scenario.parts}
+    for who, config in configs.items():
+        (directory / f"{who}.toml").write_text(to_toml(to_builtins(config)))
+    (directory / "scenario.toml").write_text(to_toml(scenario.as_tables(configs)))
+    (directory / "versions.toml").write_text(to_toml(_versions()))
+    return directory
+
+
+def _new_folder(runs: Path, name: str) -> Path:
+    """Two runs in one second get two folders."""
+    runs.mkdir(parents=True, exist_ok=True)
+    for number in range(1, 100):
+        folder = runs / (name if number == 1 else f"{name}-{number}")
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            continue
+        return folder.resolve()
+    raise FileExistsError(f"too many runs named {name}")
+
+
+def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
+    config = structs.replace(config, endpoint=endpoint)
+    if "run_dir" in config.__struct_fields__ and "run_dir" not in given:
+        config = structs.replace(config, run_dir=str(directory))
+    return config
+
+
+def _versions() -> Mapping[str, object]:
+    found = {}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return {"python": platform.python_version(), "platform": platform.platform(), "packages": found}

@@ -1,0 +1,175 @@
+"""A scenario: which services run, with which settings.  A file of TOML, read whole and checked before anything starts."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct, structs, to_builtins
+
+from services.common.config import ConfigError, ServiceConfig, convert, line_of, nearest
+from services.launcher.catalogue import NAMES, Entry, entry_of
+
+SHIPPED = Path(__file__).parent / "scenarios"
+
+
+class _File(Struct, forbid_unknown_fields=True):
+    """What a scenario file may hold at its top."""
+
+    title: str = ""
+    shared: dict[str, Any] = {}
+    services: dict[str, dict[str, Any]] = {}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A service of the scenario and its whole configuration."""
+
+    who: str
+    entry: Entry
+    config: ServiceConfig
+    given: frozenset[str]  # settings that the scenario names
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What is to be launched; parts in the order of their start."""
+
+    name: str
+    title: str
+    shared: Mapping[str, Any]
+    parts: tuple[Part, ...]
+    where: Callable[[str], str]  # place of a field, for messages
+
+    def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
+        """The scenario as its file would give it, with every setting of every service."""
+        services = {}
+        for part in self.parts:
+            module = {} if entry_of(part.who, None) else {"module": part.entry.module}
+            services[part.who] = {**module, **to_builtins(configs[part.who])}
+        return {"title": self.title, "services": services}
+
+
+def shipped() -> dict[str, Path]:
+    """The scenarios that come with the package."""
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
+
+
+def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Sequence[str] = ()) -> Scenario:
+    """The scenario of that shipped name or path, with `table.field=value` settings on top.
+
+    Raises ConfigError in one line: place, field, and the nearest valid name.
+    """
+    path = _find(name_or_path)
+    try:
+        text = path.read_text()
+        data = tomllib.loads(text)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+    origins = _override(data, settings)
+
+    def place(field: str) -> str:
+        for name, setting in origins.items():
+            if f"{field}.".startswith(f"{name}."):
+                return f"--set {setting}"
+        line = line_of(text, field)
+        return f"{path}:{line}" if line else str(path)
+
+    file = convert(data, _File, place)
+    where = _through_shared(file, place)
+    parts = [_part(who, table, file.shared, where) for who, table in file.services.items()]
+    if not parts:
+        raise ConfigError(f"{path}: no services: name at least one as [services.<name>]. Valid: {', '.join(NAMES)}.")
+    _check_shared(file.shared, parts, where)
+    kept = [part for part in parts if part.who not in leave_out]
+    return Scenario(path.stem, file.title, file.shared, tuple(sorted(kept, key=lambda part: part.entry.stage)), where)
+
+
+def _find(name_or_path: str) -> Path:
+    names = shipped()
+    if name_or_path in names:
+        return names[name_or_path]
+    if name_or_path.endswith(".toml") or "/" in name_or_path:
+        return Path(name_or_path)
+    raise ConfigError(f"unknown scenario {name_or_path!r}.{nearest(name_or_path, names)} Or give the path of a .toml file.")
+
+
+def _override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, str]:
+    """Put the settings into the data; returns which field came from which setting."""
+    origins = {}
+    for setting in settings:
+        field, equals, value = setting.partition("=")
+        *tables, name = field.strip().split(".")
+        if not equals or not tables or not name:
+            raise ConfigError(f"--set {setting}: write it as table.field=value, for example --set services.model.contact_forces=false")
+        table = data
+        for depth, key in enumerate(tables):
+            if key not in table and depth < 2 and not (depth == 0 and key == "shared"):
+                raise ConfigError(f"--set {setting}: the scenario has no {'.'.join(tables[: depth + 1])}.{nearest(key, _tables(table))}")
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise ConfigError(f"--set {setting}: {'.'.join(tables[: depth + 1])} is a value, not a table")
+        table[name] = _value(value)
+        origins[field.strip()] = setting
+    return origins
+
+
+def _tables(table: Mapping[str, Any]) -> list[str]:
+    return [key for key, value in table.items() if isinstance(value, dict)]
+
+
+def _value(text: str) -> Any:
+    """A value as TOML writes it; a word without quotes is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+
+
+def _through_shared(file: _File, where: Callable[[str], str]) -> Callable[[str], str]:
+    """`where`, but a service's field that is set for all of them is found there."""
+
+    def find(field: str) -> str:
+        match field.split(".", 3):
+            case ["services", who, name, *_] if name in file.shared and name not in file.services.get(who, {}):
+                return where(f"shared.{name}")
+        return where(field)
+
+    return find
+
+
+def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Callable[[str], str]) -> Part:
+    place = f"services.{who}"
+    if not re.fullmatch(r"[a-z0-9_]+", who) or who in ("launcher", "router"):
+        raise ConfigError(f"{where(place)}: {who!r} cannot name a service: use a-z, 0-9 and _, and neither launcher nor router")
+    own = {key: value for key, value in table.items() if key != "module"}
+    entry = entry_of(who, table.get("module"))
+    if entry is None:
+        raise ConfigError(f"{where(place)}: unknown service {who!r}.{nearest(who, NAMES)} Another program needs `module = ...`.")
+    cls = _config_class(entry, where(place))
+    given = {key: value for key, value in shared.items() if key in cls.__struct_fields__} | dict(entry.given) | own
+    return Part(who, entry, convert(given, cls, where, f"{place}."), frozenset(given))
+
+
+def _config_class(entry: Entry, where: str) -> type[ServiceConfig]:
+    try:
+        found = importlib.import_module(entry.config).Config
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"{where}: {entry.config} does not offer Config ({error})") from None
+    if not (isinstance(found, type) and issubclass(found, ServiceConfig)):
+        raise ConfigError(f"{where}: {entry.config}.Config is no ServiceConfig")
+    return found
+
+
+def _check_shared(shared: Mapping[str, Any], parts: Sequence[Part], where: Callable[[str], str]) -> None:
+    known = {field.name for part in parts for field in structs.fields(part.config)}
+    for name in shared:
+        if name not in known:
+            raise ConfigError(f"{where('shared.' + name)}: no service has a field {name!r}.{nearest(name, sorted(known))}")

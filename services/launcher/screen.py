@@ -1,0 +1,68 @@
+"""What a person sees while the system runs: one screen in a terminal, lines of news in a pipe."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import time
+from collections.abc import Collection
+from pathlib import Path
+
+from services.launcher.child import Child
+
+_NEWS = 5  # lines kept on the screen
+_COLOURS = {"ready": "32", "fault": "1;31", "failed": "33", "starting": "36"}
+
+
+class Screen:
+    """Writes to standard error: standard output belongs to the summary."""
+
+    def __init__(self, title: str) -> None:
+        self._title, self._started, self._height = title, time.monotonic(), 0
+        self._news: list[str] = []
+        self._terminal = sys.stderr.isatty()
+
+    def tell(self, text: str) -> None:
+        """One line of news."""
+        line = f"{time.strftime('%H:%M:%S')} {text}"
+        self._news = [*self._news, line][-_NEWS:]
+        if not self._terminal:
+            print(line, file=sys.stderr, flush=True)
+
+    def draw(self, children: Collection[Child], directory: Path, *, last: bool = False) -> None:
+        """The whole screen again, over the one before; nothing in a pipe."""
+        if not self._terminal:
+            return
+        columns = min(shutil.get_terminal_size().columns, 100)
+        lines = [f"mobee: {self._title}   up {_clock(time.monotonic() - self._started)}", f"run    {directory}"]
+        lines += [f"page   {page}" for page in _pages(children)]
+        lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  says"]
+        lines += [_row(child) for child in children]
+        lines += ["", *self._news, "" if last else "Ctrl-C stops everything."]
+        text = "".join(f"\x1b[2K{_paint(line[: columns - 1])}\n" for line in lines)
+        up = f"\x1b[{self._height}A" if self._height else ""
+        sys.stderr.write(f"{up}{text}\x1b[J")
+        sys.stderr.flush()
+        self._height = len(lines)
+
+
+def _row(child: Child) -> str:
+    says = child.reason if child.phase in ("failed", "fault") else child.stat.text if child.stat else ""
+    return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {' '.join(says.split())}"
+
+
+def _pages(children: Collection[Child]) -> list[str]:
+    """Addresses that services serve, as they say themselves."""
+    return [page for child in children if child.stat for page in re.findall(r"https?://\S+", child.stat.text)]
+
+
+def _paint(line: str) -> str:
+    """The state in its colour, after the line was cut to the width of the terminal."""
+    state = line[16:26].strip()
+    return f"{line[:16]}\x1b[{_COLOURS[state]}m{line[16:26]}\x1b[0m{line[26:]}" if state in _COLOURS else line
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(int(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}"

@@ -1,0 +1,105 @@
+"""What a run amounts to: the numbers of its services since all were ready, for scripts and for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from bus_schema.rpc import Stat
+from services.launcher.catalogue import AGENT
+from services.launcher.child import Child
+
+_NOT_MEASURED = -1.0  # how a service says that a number does not exist
+
+
+def summarise(children: Iterable[Child]) -> dict[str, Any]:
+    """The figures of a run; None where nobody measured.
+
+    Lengths in m, times in s; ages in ticks; counters since every service was ready, or since the service's last restart.
+    """
+    stats = {child.who: child.stat for child in children if child.stat is not None}
+    sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))
+    return {
+        "agents": {who.removeprefix(AGENT): _agent(_Numbers(stat)) for who, stat in stats.items() if who.startswith(AGENT)},
+        "table_contact_ticks": model.count("table_ticks"),
+        "field_contact_ticks": model.count("field_ticks"),
+        "closest_gap_m": sim.number("gap_min"),
+        "deepest_solid_contact_m": sim.number("solid_depth_max"),
+        "solid_contact_ticks": sim.count("solid_ticks"),
+        "pairs_watched": sim.count("pairs_watched"),
+        "rejected_commands": {} if "robot_sim" not in stats else dict(sorted(stats["robot_sim"].rejected.items())),
+        "command_age_ticks": {name: sim.number(f"age_{name}") for name in ("p50", "p99", "max")},
+        "ticks": sim.count("ticks"),
+        "hold_ticks": sim.count("hold_ticks"),
+        "missed_ticks": sim.count("missed_ticks"),
+        "restarts": {child.who: child.restarts for child in children},
+        "services": {who: {"rejected": stat.rejected, **stat.numbers} for who, stat in stats.items()},
+    }
+
+
+class _Numbers:
+    """A service's numbers, of which any may be missing."""
+
+    def __init__(self, stat: Stat | None) -> None:
+        self._numbers = {} if stat is None else stat.numbers
+
+    def number(self, name: str) -> float | None:
+        value = self._numbers.get(name, _NOT_MEASURED)
+        return None if value == _NOT_MEASURED else value
+
+    def count(self, name: str) -> int | None:
+        value = self.number(name)
+        return None if value is None else round(value)
+
+
+def _agent(numbers: _Numbers) -> dict[str, Any]:
+    return {
+        "transitions": numbers.count("transitions"),
+        "timeouts": numbers.count("timeouts"),
+        "mean_action_time_s": numbers.number("action_time_mean"),
+        "interrupted": numbers.count("interrupted"),
+    }
+
+
+def as_text(summary: dict[str, Any]) -> str:
+    """The summary as a small table."""
+    ready = summary["seconds_to_ready"]
+    course = "never ready" if ready is None else f"ready after {ready:.1f} s, then ran for {summary['duration_s']:.1f} s"
+    lines = [
+        f"{summary['scenario']}: {course}",
+        f"  run             {summary['run']}",
+    ]
+    for name, agent in summary["agents"].items():
+        lines.append(
+            f"  {name:<15} {_say(agent['transitions'])} transitions, {_say(agent['timeouts'])} timeouts, "
+            f"mean action {_say(agent['mean_action_time_s'], 's', 2)}"
+        )
+    if summary["ticks"] is not None:
+        lines += _robot_lines(summary)
+    restarts = {who: count for who, count in summary["restarts"].items() if count}
+    lines.append(f"  restarts        {_counts(restarts)}")
+    lines += [f"  FAULT           {fault}" for fault in summary["faults"]]
+    return "\n".join(lines)
+
+
+def _robot_lines(summary: dict[str, Any]) -> list[str]:
+    age = summary["command_age_ticks"]
+    return [
+        f"  table           {_say(summary['table_contact_ticks'])} ticks of field contact, closest gap {_mm(summary['closest_gap_m'])}",
+        f"  solid contact   deepest {_mm(summary['deepest_solid_contact_m'])} of {_say(summary['pairs_watched'])} watched pairs",
+        f"  command age     p50 {_say(age['p50'], '', 0)}, p99 {_say(age['p99'], '', 0)}, worst {_say(age['max'], '', 0)} ticks",
+        f"  ticks           {summary['ticks']}, {_say(summary['hold_ticks'])} in hold, {_say(summary['missed_ticks'])} missed",
+        f"  rejected        {_counts(summary['rejected_commands'])}",
+    ]
+
+
+def _say(value: float | None, unit: str = "", digits: int = 0) -> str:
+    return "-" if value is None else f"{value:.{digits}f}{unit and ' ' + unit}"
+
+
+def _mm(value: float | None) -> str:
+    return "-" if value is None else f"{value * 1000:.1f} mm"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items()) or "none"

@@ -1,0 +1,1 @@
+"""A service that fails on request, for the tests of its supervision."""

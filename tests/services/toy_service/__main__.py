@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+from services.common.config import load_config
+from services.common.service import Service
+from tests.services.toy_service.config import Config
+
+
+def main() -> None:
+    config = load_config(Config, None, "toy")
+    if config.behaviour == "bad_settings":
+        print("toy: file.toml:3: unknown field 'colour'", file=sys.stderr)
+        raise SystemExit(2)
+    if config.behaviour == "crash_at_start":
+        raise RuntimeError("no hardware at all")
+    marks = []
+    with Service(config.name, config) as service:
+        service.describe = lambda: (f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7})
+        service.mark = lambda: marks.append(1)
+        if config.behaviour == "deaf":
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        if config.behaviour == "freeze":
+            service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))
+        if config.behaviour == "crash_once_ready":
+            service.inbox.at(time.monotonic() + config.delay, crash)
+        if config.behaviour == "finish":
+            service.inbox.at(time.monotonic() + config.delay, service.end)
+        service.ready()
+        service.run()
+
+
+def crash() -> None:
+    raise RuntimeError("the motor burnt")
+
+
+main()
