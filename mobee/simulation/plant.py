@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mobee.collision.touch import touched
 from mobee.control import Command, Controller, Gains, SettleTest
 from mobee.control.collision import Propagate
 from mobee.control.modality import Modality
@@ -58,7 +59,6 @@ class OfflinePlant:
         self._ticks = 0
         self._actions: dict[str, _Action] = {}
         self._command: Command | None = None
-        self._moved_by = {name: _links_moved(self.robot, part.slice) for name, part in self.robot.parts.items()}
         self._q = self.motors.encoders(dt)
         self.pose: Pose | None = None  # the model at the last tick
 
@@ -132,18 +132,4 @@ class OfflinePlant:
         return done
 
     def _touched(self, part: str) -> tuple[str, ...]:
-        """World objects in contact with a link that the part moves, fields included."""
-        if self.pose is None:
-            return ()
-        moved = self._moved_by[part]
-        return tuple(sorted({c.second for c in self.pose.contacts if c.second_link < 0 and c.first_link in moved}))
-
-
-def _links_moved(robot: Robot, motors: slice) -> frozenset[int]:
-    """The links that these motors move in the root frame: those they drive and all that are mounted on them."""
-    matrix, _ = robot.coupling
-    moved: set[int] = set()
-    for index, joint in enumerate(robot.joints):
-        if joint.parent in moved or matrix[index, motors].any():
-            moved.add(index + 1)
-    return frozenset(moved)
+        return () if self._pose is None else touched(self._pose)[part]

@@ -14,9 +14,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     part: str = "left_arm"
     """The part it moves."""
-    joints: list[str] = []
+    joints: tuple[str, ...] = ()
     """Motors that span its state space; empty: the torso's three, or an arm's shoulder and elbow."""
-    levels: list[float] = [0.25, 0.5, 0.75]
+    levels: tuple[float, ...] = (0.25, 0.5, 0.75)
     """Fractions of each joint's range at which the samples lie."""
     neighbours: Annotated[int, Meta(ge=0)] = 0
     """How many nearest states it can go to; 0: the published 8 of the torso, 16 of an arm."""

@@ -25,7 +25,7 @@ def published_space(robot: Robot, config: Config) -> Lattice:
     is_arm = any(name.endswith("elbow") for name in part.motors)
     joints = config.joints or [name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS)]
     neighbours: int | Literal["equidistant"] = config.neighbours or (16 if is_arm else 8)
-    return Lattice(robot, joints, tuple(config.levels), neighbours, tie_seed=config.tie_seed)
+    return Lattice(robot, joints, config.levels, neighbours, tie_seed=config.tie_seed)
 
 
 class AgentNode:
