@@ -14,6 +14,7 @@ MODEL_JACOBIAN = "model/rpc/jacobian"
 SIM_TRUTH = "sim/truth"
 
 ALL_ALIVE = "alive/*/*"
+ALL_STATES = "*/state"
 ALL_EVENTS = "event/*"
 ALL_TRANSITIONS = "agents/*/transition"
 ALL_WORLD = "world/*"

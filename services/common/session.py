@@ -66,4 +66,5 @@ def open_router(endpoint: str) -> zenoh.Session:
 
 def _reason(error: zenoh.ZError) -> str:
     """Zenoh's message without the lines of its own source files."""
-    return re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
+    text = re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
+    return re.sub(r"Unable to connect to any of \[.*\]!", "nobody answers", text)

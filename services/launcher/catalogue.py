@@ -13,7 +13,7 @@ class Entry:
     """What the launcher knows of a service before it reads its settings."""
 
     module: str  # run with `python -m`
-    config: str  # module with its `Config`
+    config: str  # its configuration: module:class
     stage: int  # services are listed in this order, and stopped in the opposite one
     after: tuple[str, ...] = ()  # who must be ready before it is started
     nice: int = 0
@@ -25,12 +25,12 @@ class Entry:
 _PICTURES = 10  # nice value of whatever may come late
 
 _ENTRIES = {
-    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config", 0, needs={"pybullet": "sim", "icub_models": "sim"}),
-    "model": Entry("services.model", "services.model.config", 1),
-    "controller": Entry("services.controller", "services.controller.config", 2, after=("robot_sim", "model")),
+    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, needs={"pybullet": "sim", "icub_models": "sim"}),
+    "model": Entry("services.model", "services.model.config:Config", 1),
+    "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "renderer": Entry(
         "services.robot_sim.renderer",
-        "services.robot_sim.renderer_config",
+        "services.robot_sim.renderer_config:RendererConfig",
         4,
         after=("robot_sim", "controller"),
         nice=_PICTURES,
@@ -39,7 +39,7 @@ _ENTRIES = {
     ),
     "vision": Entry(
         "services.vision",
-        "services.vision.config",
+        "services.vision.config:Config",
         4,
         after=("model", "controller"),
         nice=_PICTURES,
@@ -48,7 +48,7 @@ _ENTRIES = {
     ),
     "monitor": Entry(
         "services.monitor",
-        "services.monitor.config",
+        "services.monitor.config:Config",
         5,
         after=("robot_sim", "controller"),
         nice=_PICTURES,
@@ -63,7 +63,7 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 def entry_of(who: str, module: str | None) -> Entry | None:
     """The entry of a service; `module` names the program of one that is not shipped.  None: nobody knows it."""
     if module is not None:
-        return Entry(module, f"{module}.config", 3, after=("controller",))
+        return Entry(module, f"{module}.config:Config", 3, after=("controller",))
     if who.startswith(AGENT):
-        return Entry("services.agents", "services.agents.config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
+        return Entry("services.agents", "services.agents.config:Config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
     return _ENTRIES.get(who)

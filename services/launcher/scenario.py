@@ -159,12 +159,13 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
 
 
 def _config_class(entry: Entry, where: str) -> type[ServiceConfig]:
+    module, _, name = entry.config.partition(":")
     try:
-        found = importlib.import_module(entry.config).Config
+        found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{where}: {entry.config} does not offer Config ({error})") from None
+        raise ConfigError(f"{where}: {module} does not offer {name} ({error})") from None
     if not (isinstance(found, type) and issubclass(found, ServiceConfig)):
-        raise ConfigError(f"{where}: {entry.config}.Config is no ServiceConfig")
+        raise ConfigError(f"{where}: {entry.config} is no ServiceConfig")
     return found
 
 

@@ -1,0 +1,75 @@
+"""The command `mobee`: finds the verb, and imports that verb alone."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+from typing import NoReturn
+
+from mobee_cli.errors import BAD_INPUT, UserError
+
+VERBS = {
+    "launch": "start a scenario and keep it running",
+    "status": "how the running system is",
+    "stop": "end the running system",
+    "estop": "stop the robot at once; --reset releases it",
+    "topic": "what is said on the bus: list, echo, hz",
+    "router": "only the router, when each service runs by itself",
+    "robots": "robots and worlds that come with mobee",
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_usage())
+        return 0
+    verb, *rest = arguments
+    if verb == "--version":
+        print(f"mobee {metadata.version('mobee')}")
+        return 0
+    if verb not in VERBS:
+        near = difflib.get_close_matches(verb, VERBS, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        print(f"mobee: unknown verb {verb!r}.{hint} Valid: {', '.join(VERBS)}.", file=sys.stderr)
+        return BAD_INPUT
+    return _run(verb, rest)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; `{self.prog} --help` tells more\n")
+
+
+def _run(verb: str, arguments: list[str]) -> int:
+    module = importlib.import_module(f"mobee_cli.{verb}")
+    parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
+    module.add_arguments(parser)
+    try:
+        return int(module.run(parser.parse_args(arguments)))
+    except UserError as error:
+        print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
+        return error.code
+    except KeyboardInterrupt:
+        return 0
+    except BrokenPipeError:  # the reader has seen enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _usage() -> str:
+    verbs = "\n".join(f"  {verb:<9}{text}" for verb, text in VERBS.items())
+    notes = "`mobee <verb> --help` tells more.  Exit codes: 0 ok, 1 failed, 2 bad input, 3 environment."
+    return f"usage: mobee <verb> [options]\n\n{verbs}\n\n{notes}"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,31 @@
+"""How a verb reaches the running system."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from mobee_cli.errors import ENVIRONMENT, UserError
+from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
+
+_PATIENCE = 0.3  # s: a system that runs answers at once
+
+
+def add_endpoint(parser: argparse.ArgumentParser) -> None:
+    """The option that names the router."""
+    parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="router of the system (default: %(default)s)")
+
+
+@contextmanager
+def connected(endpoint: str) -> Iterator[Any]:
+    """A session with the running system; UserError when there is none."""
+    try:
+        session = open_client(endpoint, patience=_PATIENCE)
+    except BusUnreachable as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    try:
+        yield session
+    finally:
+        session.close()  # type: ignore[no-untyped-call]

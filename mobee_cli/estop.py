@@ -1,0 +1,63 @@
+"""`mobee estop`: stop the robot at once, or release it again."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import time
+from typing import Any
+
+from bus_schema import keys
+from bus_schema.messages import EStop
+from bus_schema.rpc import Done, Empty
+from mobee_cli.connect import add_endpoint, connected
+from mobee_cli.errors import UserError
+from services.common import rpc
+from services.common.bus import Bus
+from services.common.delivery import STOP
+from services.common.observe import Heard, listen
+
+_REPEAT, _PATIENCE = 0.1, 2.0  # s
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    add_endpoint(parser)
+    parser.add_argument("--reset", action="store_true", help="release the robot; it moves when the controller arms it again")
+    parser.add_argument("--reason", default="asked for at the terminal", help="what the event log says (default: %(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Send it, and wait until the robot confirms."""
+    with connected(arguments.endpoint) as session:
+        if arguments.reset:
+            try:
+                rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)
+            except rpc.CallFailed as failed:
+                raise UserError(f"the robot was not released: {failed}") from None
+            print("released: the controller may arm the parts again")
+        else:
+            parts = _stop(session, arguments.reason)
+            print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
+    return 0
+
+
+def _stop(session: Any, reason: str) -> list[str]:
+    """Repeat the stop until every part that is heard says so; UserError when none does."""
+    gates: dict[str, str] = {}
+
+    def note(heard: Heard) -> None:
+        gates[heard.key.partition("/")[0]] = heard.content()["gate"]
+
+    listen(session, keys.ALL_STATES, note)
+    publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(keys.ESTOP, EStop, STOP)
+    give_up = time.monotonic() + _PATIENCE
+    while time.monotonic() < give_up:
+        publisher.put(set=True, source="mobee", reason=reason[:2000])
+        time.sleep(_REPEAT)
+        seen = dict(gates)
+        if seen and all(gate == "estop" for gate in seen.values()):
+            return sorted(seen)
+    moving = [part for part, gate in gates.items() if gate != "estop"]
+    said = f"{', '.join(moving)} did not stop" if moving else "no part of a robot is heard"
+    raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {said}: use the robot's own emergency button")

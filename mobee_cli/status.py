@@ -1,0 +1,105 @@
+"""`mobee status`: services, gates of the parts, agents."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from typing import Any
+
+from bus_schema import keys
+from bus_schema.rpc import Stat
+from mobee_cli.connect import add_endpoint, connected
+from mobee_cli.errors import FAILED
+from services.common.observe import Heard, alive, listen, stats
+
+_LISTEN = 0.3  # s: longer than the pause between two states of a part
+_RESTARTS = "restarts_"
+_AGENT = "agent_"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.epilog = "Exit code 1 when a service is down or does not answer."
+    add_endpoint(parser)
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Ask everybody and print."""
+    states: dict[str, Heard] = {}
+    with connected(arguments.endpoint) as session:
+        listen(session, keys.ALL_STATES, lambda heard: states.update({heard.key: heard}))
+        begun = time.monotonic()
+        present = alive(session)
+        answers = stats(session, [who for who in present if who != "router"])
+        time.sleep(max(0.0, begun + _LISTEN - time.monotonic()))
+    status = {
+        "endpoint": arguments.endpoint,
+        "services": _services(present, answers),
+        "parts": {heard.key.partition("/")[0]: _part(heard) for heard in list(states.values())},
+        "agents": {who.removeprefix(_AGENT): stat.numbers for who, stat in answers.items() if who.startswith(_AGENT)},
+    }
+    print(json.dumps(status, indent=2) if arguments.json else _as_text(status))
+    return 0 if all(service["state"] == "ready" for service in status["services"].values()) else FAILED
+
+
+def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[str, Any]:
+    """Every service that is there, or that the launcher says should be."""
+    launcher = answers.get("launcher")
+    restarts = {
+        name.removeprefix(_RESTARTS): int(count)
+        for name, count in (launcher.numbers if launcher else {}).items()
+        if name.startswith(_RESTARTS)
+    }
+    services = {}
+    for who in dict.fromkeys(["launcher", *restarts, *sorted(present)]):
+        stat = answers.get(who)
+        if who == "router" or (who == "launcher" and who not in present):
+            continue
+        services[who] = {
+            "state": "down" if who not in present else "silent" if stat is None else "ready" if stat.ready else "starting",
+            "pid": stat.pid if stat else None,
+            "uptime_s": stat.uptime if stat else None,
+            "restarts": restarts.get(who),
+            "rejected": stat.rejected if stat else {},
+            "text": stat.text if stat else "",
+        }
+    return services
+
+
+def _part(heard: Heard) -> dict[str, Any]:
+    try:
+        state = heard.content()
+        return {name: state[name] for name in ("gate", "mode", "epoch", "cmd_age", "faults")}
+    except (ValueError, KeyError, TypeError):
+        return {"gate": "unreadable"}
+
+
+def _as_text(status: dict[str, Any]) -> str:
+    lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>8}{'restarts':>9}{'rejected':>9}  says"]
+    for who, service in status["services"].items():
+        lines.append(
+            f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>8}"
+            f"{_say(service['restarts']):>9}{sum(service['rejected'].values()):>9}  {' '.join(service['text'].split())}"[:80].rstrip()
+        )
+    if status["parts"]:
+        lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>6}{'command age':>13}{'faults':>8}"]
+        for part, state in sorted(status["parts"].items()):
+            lines.append(
+                f"{part:<16}{state['gate']:<9}{_say(state.get('mode')):<10}{_say(state.get('epoch')):>6}"
+                f"{_say(state.get('cmd_age')):>13}{_say(state.get('faults')):>8}"
+            )
+    if status["agents"]:
+        lines += ["", f"{'agent':<16}{'transitions':>12}{'timeouts':>10}{'interrupted':>13}{'mean action s':>15}"]
+        for agent, numbers in status["agents"].items():
+            mean = numbers.get("action_time_mean", -1.0)
+            lines.append(
+                f"{agent:<16}{_say(numbers.get('transitions')):>12}{_say(numbers.get('timeouts')):>10}"
+                f"{_say(numbers.get('interrupted')):>13}{'-' if mean < 0 else f'{mean:.2f}':>15}"
+            )
+    return "\n".join(lines)
+
+
+def _say(value: Any) -> str:
+    return "-" if value is None else f"{value:.0f}" if isinstance(value, float) else str(value)

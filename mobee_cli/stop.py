@@ -1,0 +1,45 @@
+"""`mobee stop`: end the running system in order."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from bus_schema import keys
+from bus_schema.rpc import Done, Empty
+from mobee_cli.connect import add_endpoint, connected
+from mobee_cli.errors import UserError
+from services.common import rpc
+from services.common.observe import alive
+
+_PATIENCE = 30.0  # s
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    add_endpoint(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Ask the launcher to stop everything; without one, every service and then the router."""
+    with connected(arguments.endpoint) as session:
+        present = alive(session)
+        names = ["launcher"] if "launcher" in present else sorted(set(present) - {"router"}) + ["router"]
+        for who in names:
+            try:
+                rpc.call(session, "mobee", keys.service_rpc(who, "shutdown"), Empty, Done, timeout=2.0)
+            except rpc.CallFailed as failed:
+                raise UserError(f"{who} did not take the request: {failed}") from None
+        _wait_until_gone(session, names[-1])
+    print("stopped")
+    return 0
+
+
+def _wait_until_gone(session: Any, who: str) -> None:
+    """It is the router too: with it goes the connection, and then nobody is seen any more."""
+    give_up = time.monotonic() + _PATIENCE
+    while who in alive(session):
+        if time.monotonic() > give_up:
+            raise UserError(f"{who} is still there after {_PATIENCE:g} s; its process can be killed: see `mobee status`")
+        time.sleep(0.1)

@@ -1,0 +1,80 @@
+"""Looking on from outside: who is there, what is said.  For tools, which take part in nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import zenoh
+
+from bus_schema import keys
+from bus_schema.rpc import Stat
+from services.common import rpc
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message as it came, of whatever type."""
+
+    key: str
+    encoding: str
+    payload: bytes
+    at: float  # s, monotonic
+
+    @property
+    def type(self) -> str:
+        """Name of the message's type; the whole encoding when it is none of ours."""
+        return self.encoding.removeprefix("application/msgpack;icub/").partition("/")[0]
+
+    def content(self) -> Any:
+        """The message as dicts, lists and values, unchecked; raises ValueError when it is not msgpack."""
+        try:
+            return msgspec.msgpack.decode(self.payload)
+        except (msgspec.MsgspecError, RecursionError) as error:
+            raise ValueError(f"not msgpack: {error}") from None
+
+
+def listen(session: zenoh.Session, key: str, handle: Callable[[Heard], None]) -> None:
+    """Have every message on a key expression handled, on a thread of Zenoh, until the session is closed.
+
+    Raises ValueError when the key expression is not valid.
+    """
+
+    def enqueue(sample: zenoh.Sample) -> None:
+        handle(Heard(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), time.monotonic()))
+
+    try:
+        session.declare_subscriber(zenoh.KeyExpr(key), enqueue)
+    except zenoh.ZError as error:
+        raise ValueError(str(error).partition(" at /")[0]) from None
+
+
+def alive(session: zenoh.Session) -> dict[str, list[str]]:
+    """Instances by service, of all that have declared themselves ready."""
+    found: dict[str, list[str]] = {}
+    for answer in session.liveliness().get(keys.ALL_ALIVE, timeout=1.0):
+        if answer.ok is not None:
+            _, who, instance = str(answer.ok.key_expr).split("/")
+            found.setdefault(who, []).append(instance)
+    return found
+
+
+def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
+    """How the services are, all asked at once; who does not answer in time is left out."""
+    answers: dict[str, Stat | rpc.CallFailed] = {}
+
+    def ask(who: str) -> None:
+        def note(answer: Stat | rpc.CallFailed) -> None:
+            answers[who] = answer
+
+        rpc.ask(session, "mobee", keys.service_rpc(who, "stat"), Stat, note, timeout=timeout)
+
+    for who in names:
+        ask(who)
+    give_up = time.monotonic() + timeout + 0.5
+    while len(answers) < len(names) and time.monotonic() < give_up:
+        time.sleep(0.005)
+    return {who: answer for who, answer in sorted(answers.items()) if isinstance(answer, Stat)}
