@@ -13,7 +13,7 @@ from mobee.control.collision import Propagate
 from mobee.control.modality import Modality
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array
 from mobee.simulation.motors import MotorParameters, Motors
 
 if TYPE_CHECKING:
@@ -132,4 +132,4 @@ class OfflinePlant:
         return done
 
     def _touched(self, part: str) -> tuple[str, ...]:
-        return () if self._pose is None else touched(self._pose)[part]
+        return () if self.pose is None else touched(self.pose)[part]
