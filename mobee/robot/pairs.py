@@ -7,8 +7,9 @@ Solids and fields follow one rule; a pair is left out when
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
 Joined: a cluster is a group of joints, each within 5 cm of the one that carries it or of one beside it (shoulder, elbow and
-pro-supination, wrist, neck, torso), for a shape there fills the whole cluster. The link that carries a cluster and all links that its joints move are
-joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with wrist and hand.
+pro-supination, wrist, neck, torso), for a shape there fills the whole cluster. The link that carries a cluster and all links that
+its joints move are joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with
+wrist and hand.
 So hands and forearms are tested against torso, head and the other arm, and only what overlaps in every pose is left out.
 """
 

@@ -148,7 +148,7 @@ def read_xml(path: Path) -> Node:
         ) from error
     except xml.sax.SAXParseException as error:
         raise RobotFileError(
-            f"{path}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()} in column {error.getColumnNumber()}. "
+            f"{path}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()} in column {(error.getColumnNumber() or 0) + 1}. "
             "Close every tag and quote every value."
         ) from error
     if handler.root is None:

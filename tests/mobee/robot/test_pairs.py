@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from mobee.robot.load import load_robot
+from mobee.robot.pairs import joined_links
+from mobee.robot.robot import Robot
+from mobee.robot.zero_position import read_robot
+from tests.mobee.robot.robot_files import robot_file
+
+
+def chain(folder: Path, *extra: str, steps: tuple[float, ...] = (0.3, 0.3, 0.3), hand: int = -1) -> Robot:
+    """Base b, then joints j0, j1, ... `steps` apart, a solid and a field on each link."""
+    shapes = '<sphere name="s{0}" radius="0.01"/><sphere name="f{0}" radius="0.1" field="true"/>'
+    lines = ['<bodypart name="arm"><link name="b"/>', shapes.format("b")]
+    for k, step in enumerate(steps):
+        flag = 'noSelfCollision="true"' if k == hand else ""
+        lines.append(f'<link x="{step}"><motor name="j{k}" minPos="-1" maxPos="1"><joint z="1" {flag}>{shapes.format(k)}')
+    lines.append("</joint></motor></link>" * len(steps) + "</bodypart>")
+    return read_robot(robot_file(folder, *lines, *extra))
+
+
+def pairs_of(robot: Robot, role: str = "solid") -> set[str]:
+    pairs = robot.solid_pairs if role == "solid" else robot.field_pairs
+    return {robot.shapes[i].name[1:] + robot.shapes[j].name[1:] for i, j in pairs}
+
+
+def test_only_links_that_share_a_joint_are_joined_in_a_stretched_chain(tmp_path: Path) -> None:
+    assert pairs_of(chain(tmp_path)) == {"b1", "b2", "02"}
+
+
+def test_joints_that_are_one_place_join_all_links_that_meet_there(tmp_path: Path) -> None:
+    robot = chain(tmp_path, steps=(0.3, 0.04, 0.04))
+    assert pairs_of(robot) == set()
+    assert joined_links(robot.joints) == {frozenset(pair) for pair in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))}
+
+
+def test_a_hand_is_not_tested_against_itself(tmp_path: Path) -> None:
+    assert pairs_of(chain(tmp_path, steps=(0.3, 0.3, 0.3, 0.3))) == {"b1", "b2", "b3", "02", "03", "13"}
+    assert pairs_of(chain(tmp_path, steps=(0.3, 0.3, 0.3, 0.3), hand=1)) == {"b1", "b2", "b3", "02", "03"}
+
+
+def test_fields_of_one_part_are_not_tested_against_each_other(tmp_path: Path) -> None:
+    assert pairs_of(chain(tmp_path), "field") == set()
+
+
+def test_ignored_links_are_left_out_for_the_role_that_is_named(tmp_path: Path) -> None:
+    assert pairs_of(chain(tmp_path, '<ignore first="b" second="j1"/>')) == {"b2", "02"}
+    assert pairs_of(chain(tmp_path, '<ignore first="j1" second="b" role="solid"/>')) == {"b2", "02"}
+    assert pairs_of(chain(tmp_path, '<ignore first="b" second="j1" role="field"/>')) == {"b1", "b2", "02"}
+
+
+def test_the_icubs_clusters_are_its_anatomy() -> None:
+    robot = load_robot("icub")
+    joined = {frozenset(robot.links[k] for k in pair) for pair in joined_links(robot.joints)}
+    for first, second in (("chest", "l_shoulder_3"), ("root_link", "chest"), ("chest", "head"), ("l_shoulder_3", "l_forearm")):
+        assert frozenset((first, second)) in joined
+    for first, second in (("chest", "l_forearm"), ("l_shoulder_3", "l_hand"), ("l_shoulder_1", "r_shoulder_1"), ("head", "l_shoulder_1")):
+        assert frozenset((first, second)) not in joined
