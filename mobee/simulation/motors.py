@@ -175,8 +175,9 @@ class Motors:
         share = 1.0 - np.exp(-dt / lag) if lag else 1.0
         velocity = self._motor_v + share * (delayed - self._motor_v)
         if self._any_torque:
-            driven = self._motor_v + dt / INERTIA * (delayed - FRICTION * self._motor_v)
-            driven = np.clip(driven, -self._max_velocity, self._max_velocity)
+            push = (delayed - FRICTION * self._motor_v) / INERTIA
+            push = np.clip(push, -self._max_acceleration, self._max_acceleration)
+            driven = np.clip(self._motor_v + push * dt, -self._max_velocity, self._max_velocity)
             velocity = np.where(self._is_torque, driven, velocity)
         return velocity
 

@@ -1,0 +1,49 @@
+"""What node.py expects of a simulated body; kinematic.py and bullet.py answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from mobee.collision.world import World
+from mobee.simulation.motors import Motors
+
+
+class BackendUnavailable(Exception):
+    """A back-end that cannot run here, and what to do instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class SolidContact:
+    """The deepest solid contact of a listed pair; depth 0 when there is none."""
+
+    depth: float = 0.0  # m
+    pair: str = ""
+
+
+class Backend(Protocol):
+    """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
+
+    motors: Motors  # q and velocities as they are now
+    world: World
+    pairs_watched: int
+
+    def step(self, dt: float) -> None:
+        """Advance by a tick of dt [s]."""
+        ...
+
+    def reset(self, seed: int) -> None:
+        """Back home, at rest, in hold, the world as it was."""
+        ...
+
+    def place(self, name: str, position: tuple[float, float, float]) -> None:
+        """Put a world object somewhere, m; raises MobeeError."""
+        ...
+
+    def contact(self) -> SolidContact:
+        """The deepest solid contact of the last tick."""
+        ...
+
+    def gap(self) -> float:
+        """Closest distance of hands and forearms to the table, m; -1 when it is not measured."""
+        ...

@@ -1,0 +1,37 @@
+"""What robot_sim is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from services.common.config import ServiceConfig
+
+NotNegative = Annotated[float, Meta(ge=0)]
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """The simulated robot's settings."""
+
+    backend: Literal["pybullet", "kinematic"] = "pybullet"
+    """Physics with contacts, or the motor model alone."""
+    rate: Annotated[float, Meta(ge=1, le=1000)] = 100.0
+    """Ticks a second."""
+    world: str = "table"
+    """Shipped world, or path to a world file."""
+    lag: NotNegative = 0.05
+    """Time constant of the motors, s."""
+    delay: NotNegative = 0.02
+    """Time before a command begins to act, s."""
+    backlash: NotNegative = math.radians(0.2)
+    """Play between motor and joint, rad."""
+    encoder_noise: NotNegative = math.radians(0.1)
+    """Standard deviation of the encoders at a tick of 20 ms, rad; scaled with the tick."""
+    substep: Annotated[float, Meta(gt=0)] = 0.005
+    """Longest step of motors and physics, s."""
+    jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.02
+    """Standard deviation of a part's sampling time, share of a tick."""
+    truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
+    """Messages a second of what only the simulator knows."""

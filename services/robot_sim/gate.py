@@ -1,0 +1,233 @@
+"""The safety gate of one part, the last thing before its motors; pure logic, time is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bus_schema import Refused
+from bus_schema.messages import Command, GateState, Mode
+from mobee.robot.robot import Array
+from services.robot_sim.limits import Limits
+from services.robot_sim.shaper import Shaper
+
+MAX_AGE = 0.1  # s between the tick a command answers and the tick it arrives in
+MAX_TTL = 1000  # ms
+MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
+START = math.radians(2.0)  # rad between the measured position and the first position commanded
+STEP = 2.0  # times the distance that full speed covers, by which a position reference may move
+
+Tell = Callable[[str, str, dict[str, float]], None]  # code, text, values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """What the motors shall do in this tick; `reference` (n,) rad, rad/s or N m by mode, None on hold."""
+
+    mode: Mode
+    reference: Array | None = None
+
+
+HOLD = Drive("hold")
+
+
+@dataclass(frozen=True, slots=True)
+class InForce:
+    """An accepted command."""
+
+    command: Command
+    reference: Array
+    expires: int  # ns, monotonic clock
+
+
+class Gate:
+    """States: idle (nobody owns the part), hold, armed, fault, estop.  Only `armed` moves.
+
+    Commands are admitted between ticks; `tick` says what the motors shall do.  A command stays in force until the
+    next one, or until its ttl; then the part brakes at full deceleration, holds where it came to rest, and must be
+    armed again: nothing is ever replayed.
+    """
+
+    def __init__(self, part: str, limits: Limits, dt: float, epoch: int = 0, tell: Tell | None = None) -> None:
+        """Idle; `epoch`: every later one is larger.  `tell` hears why a part holds."""
+        self.part, self.epoch = part, epoch
+        self.state: GateState = "idle"
+        self.owner: tuple[str, str] | None = None  # service, instance of its token
+        self.faults = 0
+        self.mode: Mode = "hold"  # these three: as applied in the tick that runs
+        self.seq = -1
+        self.age = -1  # ticks
+        self._limits, self._dt = limits, dt
+        self._tell = tell or (lambda code, text, values: None)
+        self._shaper = Shaper(limits, dt)
+        self._in_force: InForce | None = None
+        self._newest_seq = -1
+        self._last_position: tuple[Array, int] | None = None  # newest accepted position reference and its tick
+
+    def take(self, who: str, instance: str) -> int:
+        """A new owner, a new epoch: whatever the old one still sends is refused."""
+        self.epoch += 1
+        self.owner = (who, instance)
+        self._newest_seq = -1
+        if self.state in ("idle", "armed"):
+            self._enter("hold", f"taken by {who}")
+        return self.epoch
+
+    def arm(self, epoch: int) -> None:
+        """Obey commands from now on; raises Refused (epoch, estop, fault)."""
+        self._check_epoch(epoch)
+        if self.state in ("estop", "fault"):
+            raise Refused(self.state, f"{self.part} is in {self.state}: {_REMEDY[self.state]}")
+        if self.state != "armed":
+            self._forget()
+            self.state = "armed"
+
+    def release(self, epoch: int) -> None:
+        """Give the part up; raises Refused (epoch)."""
+        self._check_epoch(epoch)
+        self.owner = None
+        if self.state in ("hold", "armed"):
+            self._enter("idle", "released")
+
+    def hold(self, epoch: int) -> None:
+        """The owner's own wish to hold; raises Refused (epoch)."""
+        self._check_epoch(epoch)
+        self.force_hold("asked by its owner")
+
+    def force_hold(self, why: str) -> None:
+        """Hold at once, whoever owns the part."""
+        if self.state == "armed":
+            self._enter("hold", why)
+
+    def lose_owner(self) -> None:
+        """The owner's token is gone."""
+        who = self.owner[0] if self.owner else "nobody"
+        self.owner = None
+        self.force_hold(f"its owner {who} is gone")
+
+    def stop(self, why: str) -> None:
+        """Emergency stop: latched."""
+        if self.state != "estop":
+            self._enter("estop", why)
+
+    def reset_stop(self) -> None:
+        """Unlatch; moving again needs `arm`."""
+        if self.state == "estop":
+            self._enter("fault" if self.faults else "hold", "emergency stop reset")
+
+    def fail(self, bit: int, why: str) -> None:
+        """A fault of the part's hardware; only a new run clears it."""
+        self.faults |= bit
+        if self.state not in ("fault", "estop"):
+            self._enter("fault", why)
+
+    def admit(self, command: Command, k: int, now: int, q: Array) -> None:
+        """Put a command in force from the next tick on, or raise Refused with the reason.
+
+        `k`: the tick that runs; `now`: ns, monotonic clock; `q`: (n,) rad measured.
+        """
+        if self.state != "armed":
+            raise Refused("not_armed", f"{self.part} is in {self.state}")
+        if command.epoch != self.epoch:
+            raise Refused("epoch", f"{self.part}: epoch {command.epoch}, in force is {self.epoch}")
+        if command.seq <= self._newest_seq:
+            raise Refused("seq", f"{self.part}: seq {command.seq} after {self._newest_seq}")
+        self._newest_seq = command.seq
+        reference = np.array(command.ref, dtype=np.float64)
+        if reference.shape != self._limits.lower.shape:
+            raise Refused("length", f"{self.part}: {reference.size} numbers for {self._limits.lower.size} motors")
+        if not np.isfinite(reference).all():
+            raise Refused("value", f"{self.part}: NaN or infinity")
+        self._check_limits(command.mode, reference)
+        self._check_time(command, k)
+        if command.mode == "position":
+            self._check_step(reference, k, q)
+            self._last_position = (reference, k)
+        else:
+            self._last_position = None
+        self._in_force = InForce(command, reference, now + command.ttl * 1_000_000)
+
+    def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
+        """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): where they are."""
+        current = self._in_force
+        if current is not None and now > current.expires:
+            late = (now - current.expires) / 1e6
+            ttl = float(current.command.ttl)
+            self._enter("hold", f"no valid command for {ttl + late:.0f} ms, ttl {ttl:g} ms", late_ms=late, ttl_ms=ttl)
+            current = None
+        if current is None:
+            self.mode, self.seq, self.age = "hold", -1, -1
+            return HOLD
+        command = current.command
+        if command.mode != self.mode:
+            self._shaper.start(q, velocity)
+        self.mode, self.seq, self.age = command.mode, command.seq, k - command.re_k
+        return self._shaped(command.mode, current.reference, q)
+
+    @property
+    def applied_velocity(self) -> Array:
+        """What is asked of the motors in velocity and position mode now, (n,) rad/s."""
+        return self._shaper.velocity
+
+    def _shaped(self, mode: Mode, reference: Array, q: Array) -> Drive:
+        if mode == "velocity":
+            return Drive(mode, self._shaper.to_velocity(reference, q))
+        if mode == "position":
+            return Drive(mode, self._shaper.to_position(reference))
+        return Drive(mode, reference) if mode == "torque" else HOLD
+
+    def _enter(self, state: GateState, why: str, **values: float) -> None:
+        moved, self.state = self.state == "armed", state
+        self._forget()
+        if moved or state in ("estop", "fault"):
+            self._tell(state, f"{self.part}: {why}", values)
+
+    def _forget(self) -> None:
+        self._in_force = None
+        self._last_position = None
+
+    def _check_epoch(self, epoch: int) -> None:
+        if self.owner is None or epoch != self.epoch:
+            raise Refused(
+                "epoch", f"{self.part}: epoch {epoch} does not own it, in force is {self.epoch if self.owner else 'none'}: take it"
+            )
+
+    def _check_limits(self, mode: Mode, reference: Array) -> None:
+        limits = self._limits
+        if mode == "position" and ((reference < limits.lower - MARGIN) | (reference > limits.upper + MARGIN)).any():
+            raise Refused("position", f"{self.part}: {_worst(reference - limits.upper, limits.lower - reference):.3f} rad beyond a limit")
+        if mode == "velocity" and (np.abs(reference) > limits.velocity * _EXACT).any():
+            raise Refused("velocity", f"{self.part}: {_worst(np.abs(reference) - limits.velocity):.3f} rad/s beyond the limit")
+        if mode == "torque" and (np.abs(reference) > limits.torque * _EXACT).any():
+            raise Refused("torque", f"{self.part}: {_worst(np.abs(reference) - limits.torque):.3f} N m beyond the limit")
+
+    def _check_time(self, command: Command, k: int) -> None:
+        if command.re_k > k:
+            raise Refused("future", f"{self.part}: answers tick {command.re_k}, it is {k}")
+        age = (k - command.re_k) * self._dt
+        if age > MAX_AGE:
+            raise Refused("age", f"{self.part}: answers a tick {age * 1e3:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
+        if not 0 < command.ttl <= MAX_TTL:  # 0 must not mean "for ever"
+            raise Refused("ttl", f"{self.part}: ttl {command.ttl} ms, valid: 1 to {MAX_TTL}")
+
+    def _check_step(self, reference: Array, k: int, q: Array) -> None:
+        if self._last_position is None:
+            before, allowed = q, np.full(len(q), START)
+        else:
+            before, at = self._last_position
+            ticks = min(max(k - at, 1), max(round(MAX_AGE / self._dt), 1))
+            allowed = STEP * self._limits.velocity * self._dt * ticks
+        step = np.abs(reference - before)
+        if (step > allowed).any():
+            raise Refused("step", f"{self.part}: a jump of {step.max():.3f} rad, allowed {allowed[int(np.argmax(step - allowed))]:.3f}")
+
+
+_EXACT = 1.0 + 1e-9  # a limit that went through the wire is still the limit
+_REMEDY = {"estop": "reset the emergency stop first", "fault": "reset the simulator"}
+
+
+def _worst(*excess: Array) -> float:
+    return float(max(e.max() for e in excess))

@@ -1,0 +1,129 @@
+"""The gates of all parts on the bus: commands, ownership, liveliness, emergency stop."""
+
+from __future__ import annotations
+
+import time
+
+from bus_schema import VERSION, keys
+from bus_schema.messages import Command, EStop
+from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
+from mobee.robot.robot import Robot
+from services.common.delivery import LATEST
+from services.common.service import CallRefused, Service
+from services.robot_sim.backend import Backend
+from services.robot_sim.gate import Gate
+from services.robot_sim.limits import Limits
+from services.robot_sim.refuse import refused_as_call, rejected
+
+INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
+ESTOP_PERIOD = 0.1  # s
+
+
+class Guard:
+    """One gate a part."""
+
+    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float) -> None:
+        self._service, self._robot, self._backend, self._dt = service, robot, backend, dt
+        self._estop_reason = ""
+        self._estop = service.bus.publisher(keys.ESTOP, EStop, LATEST)
+        # Epochs grow over restarts too: what a controller holds from before never fits again.
+        self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
+        self._declare()
+
+    def renew(self) -> None:
+        """A new run: idle, nobody owns anything; a latched emergency stop stays."""
+        self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
+        if self._estop_reason:
+            self._stop_all()
+
+    def tick(self, k: int) -> None:
+        """Hand to the motors what is in force in tick k."""
+        now = time.monotonic_ns()
+        motors = self._backend.motors
+        for part, gate in self.gates.items():
+            where = self._robot.parts[part].slice
+            drive = gate.tick(k, now, motors.q[where], motors.motor_velocities[where])
+            motors.command(where, drive.mode, drive.reference)
+
+    def hold_all(self, why: str) -> None:
+        """Every part holds at once."""
+        for gate in self.gates.values():
+            gate.force_hold(why)
+
+    def _gate(self, part: str, epoch: int) -> Gate:
+        bus = self._service.bus
+        return Gate(
+            part, Limits.of(self._robot, part), self._dt, epoch, lambda code, text, values: bus.event("warning", code, text, **values)
+        )
+
+    def _declare(self) -> None:
+        service = self._service
+        for part in self.gates:
+            service.on_newest(keys.command(part), Command, lambda command, part=part: self._admit(part, command), part=part)
+        service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
+        for verb in ("arm", "release", "hold"):
+            service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
+        service.on_each(keys.ESTOP, EStop, self._on_estop, any_run=True)
+        service.on_request(keys.ESTOP_RESET, Empty, self._reset_estop)
+        service.on_alive(self._on_alive)
+
+    def _admit(self, part: str, command: Command) -> None:
+        where = self._robot.parts[part].slice
+        with rejected(self._service.bus):
+            self.gates[part].admit(command, self._service.bus.k, time.monotonic_ns(), self._backend.motors.q[where])
+
+    def _take(self, request: Take, key: str) -> Taken:
+        gate = self.gates[key.split("/")[0]]
+        return Taken(v=VERSION, epoch=gate.take(request.who, request.instance))
+
+    def _drive(self, request: WithEpoch, key: str) -> Driven:
+        part, verb = key.split("/")[0], key.split("/")[-1]
+        gate = self.gates[part]
+        with refused_as_call():
+            if verb == "arm":
+                self._check_alive(gate)
+                gate.arm(request.epoch)
+            elif verb == "release":
+                gate.release(request.epoch)
+            else:
+                gate.hold(request.epoch)
+        return Driven(v=VERSION, gate=gate.state)
+
+    def _check_alive(self, gate: Gate) -> None:
+        """A part whose owner cannot be seen to die must not move."""
+        if gate.owner is not None and gate.owner[1] not in self._service.alive.get(gate.owner[0], ()):
+            raise CallRefused("no_token", f"{gate.part}: alive/{gate.owner[0]}/{gate.owner[1]} is not there; declare it, then arm")
+
+    def _on_alive(self, who: str, instance: str, up: bool) -> None:
+        if up:
+            return
+        for gate in self.gates.values():
+            if gate.owner == (who, instance):
+                gate.lose_owner()
+        if who in INDISPENSABLE:
+            self.hold_all(f"{who} is gone")
+
+    def _on_estop(self, message: EStop) -> None:
+        own = message.src == self._service.who and message.run == self._service.bus.run
+        if message.set and not own and not self._estop_reason:
+            self._estop_reason = f"emergency stop by {message.source}: {message.reason}"
+            self._stop_all()
+            self._repeat_estop()
+
+    def _stop_all(self) -> None:
+        for gate in self.gates.values():
+            gate.stop(self._estop_reason)
+
+    def _repeat_estop(self) -> None:
+        """Tell whoever comes late, until it is reset."""
+        if self._estop_reason:
+            self._estop.put(set=True, source=self._service.who, reason=self._estop_reason[:2000])
+            self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_estop)
+
+    def _reset_estop(self, request: Empty, key: str) -> Done:
+        if self._estop_reason:
+            self._estop_reason = ""
+            for gate in self.gates.values():
+                gate.reset_stop()
+            self._service.bus.event("warning", "estop_reset", f"emergency stop reset by {request.who}")
+        return Done(v=VERSION)

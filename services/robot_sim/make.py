@@ -1,0 +1,22 @@
+"""Makes the back-end that the configuration names."""
+
+from __future__ import annotations
+
+from mobee.robot.load import load_world
+from mobee.robot.robot import Robot
+from mobee.simulation.motors import MotorParameters
+from services.robot_sim.backend import Backend
+from services.robot_sim.config import Config
+from services.robot_sim.kinematic import KinematicBackend
+
+
+def make_backend(config: Config, robot: Robot) -> Backend:
+    """The body; raises BackendUnavailable or MobeeError."""
+    parameters = MotorParameters(
+        lag=config.lag, delay=config.delay, backlash=config.backlash, encoder_noise=config.encoder_noise, substep=config.substep
+    )
+    if config.backend == "kinematic":
+        return KinematicBackend(robot, lambda: load_world(config.world), parameters, config.seed)
+    from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
+
+    return BulletBackend(robot, lambda: load_world(config.world), parameters, config.seed)

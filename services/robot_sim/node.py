@@ -1,0 +1,183 @@
+"""robot_sim's tick: gate, clock, physics, then each part's state at its own time."""
+
+from __future__ import annotations
+
+import gc
+import secrets
+import time
+from collections.abc import Mapping
+
+import numpy as np
+
+from bus_schema import VERSION, keys
+from bus_schema.messages import Clock, ObjectTruth, Truth
+from bus_schema.rpc import Done, Empty, PartMeta, Place
+from mobee.errors import MobeeError
+from mobee.kinematics.quaternion import from_matrix
+from mobee.robot.robot import Robot
+from services.common.delivery import DATA, LATEST
+from services.common.rate import Rate
+from services.common.service import CallRefused, Service
+from services.robot_sim.backend import Backend, SolidContact
+from services.robot_sim.config import Config
+from services.robot_sim.counters import Counters
+from services.robot_sim.guard import Guard
+from services.robot_sim.meta import part_meta
+from services.robot_sim.sensors import Sensors
+from services.robot_sim.streams import Phases
+
+SPREAD = 0.002  # s, a tick shorter than this has its parts one after the other without waiting between them
+NOT_FINITE = 1  # fault bit
+
+
+class Node:
+    """The simulated robot as a service."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot, backend: Backend) -> None:
+        self._service, self._config, self._robot, self._backend = service, config, robot, backend
+        self._bus = service.bus
+        self._dt_ns = round(1e9 / config.rate)
+        self._dt = self._dt_ns / 1e9
+        self._bus.run = _new_run()
+        self._paused = False
+        self._guard = Guard(service, robot, backend, self._dt)
+        self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
+        self._sensors = Sensors(self._bus, robot, self._dt)
+        self._clock = self._bus.publisher(keys.CLOCK, Clock, LATEST)
+        self._truth = self._bus.publisher(keys.SIM_TRUTH, Truth, DATA)
+        self._truth_period = max(1, round(config.rate / config.truth_rate))  # ticks
+        self._deepest = SolidContact()  # since the last truth message
+        self._rate = Rate(self._dt)
+        self._counters = Counters()
+        service.describe = self._describe
+        service.mark = self._mark
+        for verb, handler in (("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
+            service.on_request(keys.sim(verb), Empty, handler)
+        service.on_request(keys.sim("place"), Place, self._place)
+        for part in robot.parts:
+            service.on_request(keys.meta(part), Empty, self._meta)
+
+    def run(self) -> None:
+        """Tick until the process is told to end."""
+        gc.collect()
+        gc.freeze()  # what lives as long as the process is not looked at again
+        gc.set_threshold(20_000, 20, 100)
+        self._rate = Rate(self._dt)
+        router_check = time.monotonic()
+        while True:
+            deadline = self._rate.next()
+            self._service.spin(deadline)
+            now = time.monotonic()
+            self._counters.overtime.add((now - deadline) * 1e3)
+            if now >= router_check:
+                self._service.check_router()
+                router_check = now + 1.0
+            if not self._paused:
+                self._tick(now)
+
+    def _tick(self, start: float) -> None:
+        bus, backend = self._bus, self._backend
+        bus.k += 1
+        bus.t += self._dt_ns
+        self._guard.tick(bus.k)
+        self._publish_clock("free")
+        self._sensors.begin(backend.motors)
+        backend.step(self._dt)
+        self._counters.tick_time.add((time.monotonic() - start) * 1e3)
+        self._count()
+        run = bus.run
+        for share, part in self._phases.next():
+            if self._dt >= SPREAD:
+                self._service.spin(start + share * self._dt)
+                if bus.run != run:  # reset meanwhile
+                    return
+            self._sensors.publish(part, share, backend.motors, self._guard.gates[part])
+        if bus.k % self._truth_period == 0:
+            self._publish_truth()
+
+    def _publish_clock(self, mode: str) -> None:
+        self._clock.put(dt=self._dt_ns, mode=mode, rate=1.0)
+
+    def _count(self) -> None:
+        motors, gates = self._backend.motors, self._guard.gates
+        self._counters.count_gates(gates.values())
+        contact = self._backend.contact()
+        self._counters.count_contact(contact)
+        if contact.depth > self._deepest.depth:
+            self._deepest = contact
+        if not np.isfinite(motors.q).all():
+            for gate in gates.values():
+                gate.fail(NOT_FINITE, "the physics has no finite answer any more")
+        self._watch_stops()
+
+    def _watch_stops(self) -> None:
+        now, motors, stops = time.monotonic_ns(), self._backend.motors, self._counters.stops
+        for part, gate in self._guard.gates.items():
+            where = self._robot.parts[part].slice
+            q, velocity = motors.q[where], motors.motor_velocities[where]
+            if gate.mode != "hold":
+                stops.obeys(part, now, q, velocity)
+                continue
+            stopped = stops.look(part, now, q, velocity)
+            if stopped:
+                self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
+
+    def _publish_truth(self) -> None:
+        gap = self._backend.gap()
+        self._counters.count_gap(gap)
+        self._truth.put(
+            q=self._backend.motors.q.tolist(),
+            depth=self._deepest.depth,
+            pair=self._deepest.pair,
+            gap=gap,
+            objects=[
+                ObjectTruth(name=thing.name, position=thing.position.tolist(), quaternion=from_matrix(thing.rotation).tolist())
+                for thing in self._backend.world.objects.values()
+            ],
+        )
+        self._deepest = SolidContact()
+
+    def _describe(self) -> tuple[str, Mapping[str, float]]:
+        states = [gate.state for gate in self._guard.gates.values()]
+        text = f"{self._config.backend} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
+        return text, self._counters.numbers(self._rate.missed, self._backend.pairs_watched)
+
+    def _mark(self) -> None:
+        self._counters = Counters()
+        self._counters.missed_before = self._rate.missed
+
+    def _reset(self, request: Empty, key: str) -> Done:
+        self._backend.reset(self._config.seed)
+        self._bus.run, self._bus.k, self._bus.t = _new_run(), 0, 0
+        self._guard.renew()
+        self._phases = Phases(tuple(self._robot.parts), self._config.jitter, self._config.seed)
+        self._counters.stops.forget()
+        self._paused = False
+        self._bus.event("info", "new_run", f"reset by {request.who}: run {self._bus.run}")
+        return Done(v=VERSION)
+
+    def _pause(self, request: Empty, key: str) -> Done:
+        if not self._paused:
+            self._paused = True
+            self._guard.hold_all(f"paused by {request.who}")
+            self._publish_clock("paused")
+        return Done(v=VERSION)
+
+    def _resume(self, request: Empty, key: str) -> Done:
+        self._paused = False
+        return Done(v=VERSION)
+
+    def _place(self, request: Place, key: str) -> Done:
+        x, y, z = request.position
+        try:
+            self._backend.place(request.name, (x, y, z))
+        except MobeeError as error:
+            raise CallRefused("object", str(error)) from None
+        return Done(v=VERSION)
+
+    def _meta(self, request: Empty, key: str) -> PartMeta:
+        return part_meta(self._robot, key.split("/")[0])
+
+
+def _new_run() -> str:
+    return f"run_{secrets.token_hex(4)}"

@@ -1,0 +1,46 @@
+"""References that never ask the motors for more than their velocity and acceleration limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.robot.robot import Array
+from services.robot_sim.limits import Limits
+
+
+class Shaper:
+    """Turns commanded references into allowed ones, tick by tick; arrays (n,)."""
+
+    def __init__(self, limits: Limits, dt: float) -> None:
+        self._limits, self._dt = limits, dt
+        self._change = limits.acceleration * dt  # rad/s a tick
+        self.position = np.zeros(len(limits.lower))  # rad
+        self.velocity = np.zeros(len(limits.lower))  # rad/s, what is asked of the motors now
+
+    def start(self, q: Array, velocity: Array) -> None:
+        """Begin where the motors are: rad and rad/s."""
+        self.position = q.copy()
+        self.velocity = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
+
+    def to_velocity(self, wanted: Array, q: Array) -> Array:
+        """The velocity to ask for now; before a position limit no more than can still be braked."""
+        up = self._braked_within(np.maximum(self._limits.upper - q, 0.0))
+        down = self._braked_within(np.maximum(q - self._limits.lower, 0.0))
+        self._approach(np.clip(wanted, -down, up))
+        return self.velocity
+
+    def to_position(self, wanted: Array) -> Array:
+        """The position to ask for now, on the way to `wanted` and arriving there at rest."""
+        rest = np.clip(wanted, self._limits.lower, self._limits.upper) - self.position
+        fastest = np.minimum(self._braked_within(np.abs(rest)), np.abs(rest) / self._dt)
+        self._approach(np.sign(rest) * fastest)
+        self.position = self.position + self.velocity * self._dt
+        return self.position
+
+    def _approach(self, velocity: Array) -> None:
+        self.velocity = self.velocity + np.clip(velocity - self.velocity, -self._change, self._change)
+
+    def _braked_within(self, distance: Array) -> Array:
+        """The largest velocity that whole ticks of full braking end within the distance."""
+        steps = np.sqrt(0.25 + 2.0 * distance / (self._change * self._dt)) - 0.5
+        return np.minimum(self._limits.velocity, self._change * steps)
