@@ -17,6 +17,7 @@ _COMMON = {
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
     "transport/link/tx/lease": 1000,
+    "transport/unicast/open_timeout": 2000,  # ms; a listener that says nothing blocks `open` so long, and signals with it
     "timestamping/enabled": {"router": True, "peer": True, "client": True},  # events keep a history
 }
 
