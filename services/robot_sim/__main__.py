@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
-from mobee.errors import MobeeError
 from mobee.robot.load import load_robot
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
-from services.robot_sim.backend import BackendUnavailable
 from services.robot_sim.config import Config
 from services.robot_sim.make import make_backend
 from services.robot_sim.node import Node
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the simulated robot until it is told to end; exits with 2 when it cannot be made."""
+    """Run the simulated robot until it is told to end."""
     config = load_config(Config, argv, "services.robot_sim")
-    try:
+    with explained("services.robot_sim"):
         robot = load_robot(config.robot)
         backend = make_backend(config, robot)
-    except (MobeeError, BackendUnavailable) as error:
-        print(f"services.robot_sim: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    with Service("robot_sim", config, robot) as service:
-        node = Node(service, config, robot, backend)
-        service.ready()
-        node.run()
+        with Service("robot_sim", config, robot) as service:
+            node = Node(service, config, robot, backend)
+            service.ready()
+            node.run()
 
 
 if __name__ == "__main__":

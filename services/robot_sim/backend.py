@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from mobee.collision.world import World
+from mobee.errors import InvalidValue
 from mobee.simulation.motors import Motors
 
 
-class BackendUnavailable(Exception):
+class BackendUnavailable(InvalidValue):
     """A back-end that cannot run here, and what to do instead."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mobee.robot.load import load_world
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.backend import Backend
+from services.robot_sim.backend import Backend, BackendUnavailable
 from services.robot_sim.config import Config
 from services.robot_sim.kinematic import KinematicBackend
 
@@ -17,6 +17,11 @@ def make_backend(config: Config, robot: Robot) -> Backend:
     )
     if config.backend == "kinematic":
         return KinematicBackend(robot, lambda: load_world(config.world), parameters, config.seed)
-    from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
-
-    return BulletBackend(robot, lambda: load_world(config.world), parameters, config.seed)
+    try:
+        from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
+    except ModuleNotFoundError as error:
+        raise BackendUnavailable(
+            f"the pybullet back-end needs the module {error.name!r}: pip install 'mobee[sim]' on Python 3.11. "
+            'Without it: backend = "kinematic".'
+        ) from error
+    return BulletBackend(robot, lambda: load_world(config.world), parameters, config.seed, round(1e9 / config.rate) / 1e9)

@@ -1,0 +1,103 @@
+"""The iCub, table and ball in PyBullet; bullet.py moves them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Collection, Iterable
+from pathlib import Path
+
+import numpy as np
+import pybullet
+from pybullet_utils.bullet_client import BulletClient
+
+from mobee.collision.world import World, WorldObject
+from mobee.kinematics.quaternion import from_matrix
+from mobee.robot.icub_urdf import write_upper_body_urdf
+from mobee.robot.robot import Array, Robot
+from services.robot_sim.backend import BackendUnavailable
+
+GRAVITY = -9.81  # m/s^2
+BASE = -1  # PyBullet's index of the base link
+
+
+class BulletScene:
+    """Bodies, and what they are called.
+
+    `motors` and `joints`: which motors of the robot PyBullet moves, and the joints they are there; the others (fingers,
+    eyes) have no counterpart in the URDF.
+    """
+
+    def __init__(self, robot: Robot, world: World, substep: float) -> None:
+        """`substep`: s.  Raises BackendUnavailable for a robot that the URDF does not describe."""
+        self.client = BulletClient(pybullet.DIRECT)
+        self.client.setPhysicsEngineParameter(fixedTimeStep=substep, numSubSteps=1, deterministicOverlappingPairs=1)
+        self.client.setGravity(0.0, 0.0, GRAVITY)
+        self.body = self._load_robot()
+        self.links = {"root_link": BASE}
+        joints = {}
+        for index in range(self.client.getNumJoints(self.body)):
+            info = self.client.getJointInfo(self.body, index)
+            self.links[info[12].decode()] = index
+            if info[2] == pybullet.JOINT_REVOLUTE:
+                joints[info[1].decode()] = index
+        missing = sorted(set(joints) - set(robot.motors))
+        if missing:
+            self.close()
+            raise BackendUnavailable(
+                f"the pybullet back-end simulates the robot 'icub' only: {robot.name!r} has no motor {missing[0]!r}. "
+                'Use the kinematic back-end: backend = "kinematic".'
+            )
+        driven = [(i, joints[name]) for i, name in enumerate(robot.motors) if name in joints]
+        self.motors = np.array([motor for motor, _ in driven])
+        self.joints = [joint for _, joint in driven]
+        self.objects = {thing.name: self._add(thing) for thing in world.objects.values()}
+
+    def close(self) -> None:
+        """Free the simulator's memory."""
+        self.client.disconnect()
+
+    def set_posture(self, q: Array) -> None:
+        """Put the joints at q (n,) rad of all motors, at rest."""
+        for joint, position in zip(self.joints, q[self.motors].tolist(), strict=True):
+            self.client.resetJointState(self.body, joint, position)
+
+    def move(self, name: str, position: Iterable[float]) -> None:
+        """Put a world object somewhere, m."""
+        _, turn = self.client.getBasePositionAndOrientation(self.objects[name])
+        self.client.resetBasePositionAndOrientation(self.objects[name], tuple(position), turn)
+
+    def watch(self, links: Collection[frozenset[str]], against: Iterable[tuple[str, str]]) -> None:
+        """Let only these pairs collide: of two links, and of (link, object)."""
+        names = list(self.links)
+        for i, first in enumerate(names):
+            for second in names[:i]:
+                on = frozenset((first, second)) in links
+                self.client.setCollisionFilterPair(self.body, self.body, self.links[first], self.links[second], int(on))
+        wanted = set(against)
+        for name, index in self.links.items():
+            for thing, body in self.objects.items():
+                self.client.setCollisionFilterPair(self.body, body, index, BASE, int((name, thing) in wanted))
+
+    def distance(self, link: str, other: str, within: float) -> float:
+        """Distance [m] of a link from another link or a world object, negative when they overlap; inf beyond `within`."""
+        body, index = (self.objects[other], BASE) if other in self.objects else (self.body, self.links[other])
+        points = self.client.getClosestPoints(self.body, body, within, self.links[link], index)
+        return min((point[8] for point in points), default=np.inf)
+
+    def _load_robot(self) -> int:
+        flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_INERTIA_FROM_FILE
+        with tempfile.TemporaryDirectory() as folder:
+            path = write_upper_body_urdf(Path(folder) / "icub.urdf")
+            return int(self.client.loadURDF(str(path), useFixedBase=True, flags=flags))
+
+    def _add(self, thing: WorldObject) -> int:
+        client, size = self.client, thing.size
+        if thing.kind == "box":
+            shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[edge / 2.0 for edge in size])
+        elif thing.kind == "sphere":
+            shape = client.createCollisionShape(pybullet.GEOM_SPHERE, radius=size[0])
+        else:
+            kind = pybullet.GEOM_CYLINDER if thing.kind == "cylinder" else pybullet.GEOM_CAPSULE
+            shape = client.createCollisionShape(kind, radius=size[0], height=size[1])
+        w, x, y, z = from_matrix(thing.rotation).tolist()
+        return int(client.createMultiBody(0.0, shape, basePosition=thing.position.tolist(), baseOrientation=[x, y, z, w]))
