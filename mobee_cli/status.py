@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import time
 from typing import Any
 
@@ -77,17 +78,20 @@ def _part(heard: Heard) -> dict[str, Any]:
 
 
 def _as_text(status: dict[str, Any]) -> str:
-    lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>8}{'restarts':>9}{'rejected':>9}  says"]
+    columns = shutil.get_terminal_size().columns  # 80 in a pipe
+    lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>7}{'restarts':>10}  says"]
     for who, service in status["services"].items():
+        refused = sum(service["rejected"].values())
+        says = f"refused {refused}; {service['text']}" if refused else service["text"]
         lines.append(
-            f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>8}"
-            f"{_say(service['restarts']):>9}{sum(service['rejected'].values()):>9}  {' '.join(service['text'].split())}"[:80].rstrip()
+            f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>7}{_say(service['restarts']):>10}  "
+            f"{' '.join(says.split())}"[:columns].rstrip()
         )
     if status["parts"]:
-        lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>6}{'command age':>13}{'faults':>8}"]
+        lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>14}{'command age':>13}{'faults':>8}"]
         for part, state in sorted(status["parts"].items()):
             lines.append(
-                f"{part:<16}{state['gate']:<9}{_say(state.get('mode')):<10}{_say(state.get('epoch')):>6}"
+                f"{part:<16}{state['gate']:<9}{_say(state.get('mode')):<10}{_say(state.get('epoch')):>14}"
                 f"{_say(state.get('cmd_age')):>13}{_say(state.get('faults')):>8}"
             )
     if status["agents"]:

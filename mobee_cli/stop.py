@@ -14,6 +14,7 @@ from services.common import rpc
 from services.common.observe import alive
 
 _PATIENCE = 30.0  # s
+_START = 2.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,13 +28,23 @@ def run(arguments: argparse.Namespace) -> int:
         present = alive(session)
         names = ["launcher"] if "launcher" in present else sorted(set(present) - {"router"}) + ["router"]
         for who in names:
-            try:
-                rpc.call(session, "mobee", keys.service_rpc(who, "shutdown"), Empty, Done, timeout=2.0)
-            except rpc.CallFailed as failed:
-                raise UserError(f"{who} did not take the request: {failed}") from None
+            _ask_to_end(session, who)
         _wait_until_gone(session, names[-1])
     print("stopped")
     return 0
+
+
+def _ask_to_end(session: Any, who: str) -> None:
+    """Again for a while when nobody answers: it may have just begun."""
+    give_up = time.monotonic() + _START
+    while True:
+        try:
+            rpc.call(session, "mobee", keys.service_rpc(who, "shutdown"), Empty, Done, timeout=_START)
+            return
+        except rpc.CallFailed as failed:
+            if failed.code != "no_answer" or time.monotonic() > give_up:
+                raise UserError(f"{who} did not take the request: {failed}") from None
+        time.sleep(0.1)
 
 
 def _wait_until_gone(session: Any, who: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from services.common.observe import Heard, listen
 
-_HINT_AFTER = 2.0  # s
+_HINT_AFTER = 1.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

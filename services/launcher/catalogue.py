@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 AGENT = "agent_"
 
@@ -61,9 +61,11 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 
 
 def entry_of(who: str, module: str | None) -> Entry | None:
-    """The entry of a service; `module` names the program of one that is not shipped.  None: nobody knows it."""
-    if module is not None:
-        return Entry(module, f"{module}.config:Config", 3, after=("controller",))
+    """The entry of a service; `module`: another program in its place, or one that is not shipped.  None: nobody knows it."""
+    entry = _ENTRIES.get(who)
     if who.startswith(AGENT):
-        return Entry("services.agents", "services.agents.config:Config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
-    return _ENTRIES.get(who)
+        entry = Entry("services.agents", "services.agents.config:Config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
+    if module is None:
+        return entry
+    place = entry or Entry("", "", 3, after=("controller",))
+    return replace(place, module=module, config=f"{module}.config:Config", needs={})

@@ -28,8 +28,8 @@ def check_extras(scenario: Scenario) -> None:
 
 
 def _remedy(package: str, extra: str) -> str:
-    if package == "pybullet" and sys.version_info >= (3, 12):
-        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    if package == "pybullet" and sys.version_info[:2] >= (3, 12):
+        version = "{}.{}".format(*sys.version_info)
         return (
             f" and has no wheel for Python {version}: use Python 3.11, or the motor model alone, which runs on every version: "
             "mobee launch kinematic"

@@ -26,7 +26,7 @@ from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
 from services.launcher.summary import as_text, summarise
-from services.launcher.supervisor import Limits, Supervisor
+from services.launcher.supervisor import Supervisor
 
 OK, FAILED, BAD_INPUT, ENVIRONMENT = 0, 1, 2, 3
 
@@ -45,7 +45,6 @@ class Options:
     json: bool = False
     endpoint: str | None = None
     runs: Path = Path("runs")
-    limits: Limits = Limits()
 
 
 def launch(options: Options) -> int:
@@ -85,7 +84,7 @@ class _Run:
     def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options) -> None:
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
-        self._supervisor = Supervisor(service, _programs(scenario, directory), self._tell, options.limits)
+        self._supervisor = Supervisor(service, _programs(scenario, directory), self._tell)
         self._children = self._supervisor.children.values()
         self._stop_asked, self._starting = False, True
 

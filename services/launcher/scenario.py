@@ -50,7 +50,7 @@ class Scenario:
         """The scenario as its file would give it, with every setting of every service."""
         services = {}
         for part in self.parts:
-            module = {} if entry_of(part.who, None) else {"module": part.entry.module}
+            module = {} if part.entry == entry_of(part.who, None) else {"module": part.entry.module}
             services[part.who] = {**module, **to_builtins(configs[part.who])}
         return {"title": self.title, "services": services}
 
@@ -154,7 +154,7 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
     if entry is None:
         raise ConfigError(f"{where(place)}: unknown service {who!r}.{nearest(who, NAMES)} Another program needs `module = ...`.")
     cls = _config_class(entry, where(place))
-    given = {key: value for key, value in shared.items() if key in cls.__struct_fields__} | dict(entry.given) | own
+    given = {key: value for key, value in [*shared.items(), *entry.given.items()] if key in cls.__struct_fields__} | own
     return Part(who, entry, convert(given, cls, where, f"{place}."), frozenset(given))
 
 

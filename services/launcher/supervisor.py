@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from bus_schema import keys
 from bus_schema.messages import EStop
@@ -18,28 +17,21 @@ from services.launcher.child import Child, Program
 BAD_INPUT = 2  # exit code of a service that cannot use its settings: the same again would not help
 
 
-@dataclass(frozen=True)
-class Limits:
-    """When the supervisor acts."""
-
-    look: float = 0.05  # s between looks at the processes
-    poll: float = 0.5  # s between an answer and the next question
-    answer: float = 1.0  # s within which a service answers
-    unanswered: int = 2  # questions in a row, then it counts as frozen
-    ready: float = 60.0  # s from its start until a service is ready
-    first_wait: float = 0.2  # s before the first restart, then doubled
-    longest_wait: float = 5.0  # s
-    restarts: int = 5  # within the window
-    window: float = 60.0  # s
-    end: float = 2.0  # s from SIGTERM to SIGKILL
+LOOK = 0.05  # s between looks at the processes
+POLL = 0.5  # s between questions
+ANSWER = 1.0  # s within which a service answers
+UNANSWERED = 2  # questions in a row, then it counts as frozen
+READY = 60.0  # s from its start until a service is ready
+FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before a restart: doubled with every failure
+RESTARTS, WINDOW = 5, 60.0  # so many in so many s, then it is given up
+END = 2.0  # s from SIGTERM to SIGKILL
 
 
 class Supervisor:
     """The children of the launcher; everything happens in the inbox of its service."""
 
-    def __init__(self, service: Service, programs: Sequence[Program], tell: Callable[[str], None], limits: Limits | None = None) -> None:
+    def __init__(self, service: Service, programs: Sequence[Program], tell: Callable[[str], None]) -> None:
         self.children = {program.who: Child(program) for program in programs}
-        self.limits = limits or Limits()
         self.faults: list[str] = []  # one line each
         self.stopped_robot = False  # a vital service was given up
         self._service, self._tell, self._stopping = service, tell, False
@@ -64,12 +56,12 @@ class Supervisor:
             self._wait_for(group)
             for child in group:
                 if child.running():
-                    self._tell(f"{child.who} did not end within {self.limits.end:g} s: killed")
+                    self._tell(f"{child.who} did not end within {END:g} s: killed")
                 child.kill()
                 child.enter("ended")
 
     def _wait_for(self, group: Sequence[Child]) -> None:
-        self._service.spin(time.monotonic() + self.limits.end, lambda: not any(child.running() for child in group))
+        self._service.spin(time.monotonic() + END, lambda: not any(child.running() for child in group))
 
     def kill_all(self) -> None:
         """Leave no process behind."""
@@ -82,7 +74,7 @@ class Supervisor:
         if not self._stopping:
             for child in self.children.values():
                 self._look_at(child, now)
-        self._service.inbox.at(now + self.limits.look, self._look)
+        self._service.inbox.at(now + LOOK, self._look)
 
     def _look_at(self, child: Child, now: float) -> None:
         if child.phase == "waiting":
@@ -99,17 +91,17 @@ class Supervisor:
         code = child.exit_code()
         if code is not None:
             self._note_end(child, code)
-        elif child.phase == "starting" and now - child.since > self.limits.ready:
-            self._fail(child, f"was not ready within {self.limits.ready:g} s")
+        elif child.phase == "starting" and now - child.since > READY:
+            self._fail(child, f"was not ready within {READY:g} s")
         elif child.phase == "ready" and self._is_frozen(child, now):
             self._fail(child, f"is frozen: no answer for {now - child.answered_at:.1f} s")
-        elif not child.asking and now >= child.asked_at + self.limits.poll and (child.has_token or child.phase == "ready"):
+        elif not child.asking and now >= child.asked_at + POLL and (child.has_token or child.phase == "ready"):
             self.ask(child)
 
     def _is_frozen(self, child: Child, now: float) -> bool:
         """Both, since a call to a process whose connection was dropped fails at once, and the launcher itself may have been stopped."""
         silent = now - child.answered_at
-        return child.unanswered >= self.limits.unanswered and silent >= self.limits.unanswered * self.limits.answer
+        return child.unanswered >= UNANSWERED and silent >= UNANSWERED * ANSWER
 
     def ask(self, child: Child) -> None:
         """Have its numbers brought up to date."""
@@ -120,7 +112,7 @@ class Supervisor:
                 child.asking = False
                 self._note_answer(child, answer)
 
-        self._service.ask(keys.service_rpc(child.who, "stat"), Stat, note, timeout=self.limits.answer)
+        self._service.ask(keys.service_rpc(child.who, "stat"), Stat, note, timeout=ANSWER)
 
     def _note_answer(self, child: Child, answer: Stat | CallFailed) -> None:
         if isinstance(answer, CallFailed) or answer.pid != child.pid:
@@ -157,13 +149,13 @@ class Supervisor:
         child.kill()
         now = time.monotonic()
         child.failures.append(now)
-        while now - child.failures[0] > self.limits.window:
+        while now - child.failures[0] > WINDOW:
             child.failures.popleft()
         child.reason = reason
-        if len(child.failures) > self.limits.restarts:
-            self._give_up(child, f"{reason}; given up after {self.limits.restarts} restarts in {self.limits.window:g} s")
+        if len(child.failures) > RESTARTS:
+            self._give_up(child, f"{reason}; given up after {RESTARTS} restarts in {WINDOW:g} s")
             return
-        wait = min(self.limits.first_wait * 2 ** (len(child.failures) - 1), self.limits.longest_wait)
+        wait = min(FIRST_WAIT * 2 ** (len(child.failures) - 1), LONGEST_WAIT)
         child.again_at = now + wait
         child.enter("failed")
         self._service.bus.event("warning", "restart", f"{child.who} {reason}")

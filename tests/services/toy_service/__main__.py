@@ -21,6 +21,8 @@ def main() -> None:
     with Service(config.name, config) as service:
         service.describe = lambda: (f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7})
         service.mark = lambda: marks.append(1)
+        if config.behaviour == "talk":
+            say(service)
         if config.behaviour == "deaf":
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if config.behaviour == "freeze":
@@ -30,7 +32,15 @@ def main() -> None:
         if config.behaviour == "finish":
             service.inbox.at(time.monotonic() + config.delay, service.end)
         service.ready()
-        service.run()
+        try:
+            service.run()
+        finally:
+            print(f"over at {time.monotonic()}")
+
+
+def say(service: Service) -> None:
+    service.bus.event("info", "hello", "ten times a second", here=1.0)
+    service.inbox.at(time.monotonic() + 0.1, lambda: say(service))
 
 
 def crash() -> None:

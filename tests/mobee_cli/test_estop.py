@@ -1,0 +1,95 @@
+"""`mobee estop` against a robot that the test plays."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.messages import State
+from bus_schema.rpc import Done
+from mobee_cli.__main__ import main
+from services.common.bus import Bus
+from services.common.delivery import LATEST
+from services.common.observe import listen
+from services.common.session import open_router
+
+
+class Robot:
+    """Two parts; one of them may be deaf."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.session = open_router(endpoint)
+        bus = Bus(self.session, "robot_sim", logging.getLogger("robot_sim"))
+        self.gates = {"torso": "armed", "head": "armed"}
+        self.deaf: set[str] = set()
+        self.over = threading.Event()
+        publishers = {part: bus.publisher(keys.state(part), State, LATEST) for part in self.gates}
+        listen(self.session, keys.ESTOP, lambda heard: self.stop())
+        self.session.declare_queryable(keys.ESTOP_RESET, self.reset)
+
+        def speak() -> None:
+            while not self.over.wait(0.02):
+                for part, publisher in publishers.items():
+                    publisher.put(
+                        q=[0.0],
+                        dq=[0.0],
+                        tau=[0.0],
+                        mode="velocity",
+                        gate=self.gates[part],
+                        faults=0,
+                        epoch=1,
+                        cmd_seq=0,
+                        cmd_age=1,
+                    )
+
+        self.thread = threading.Thread(target=speak)
+        self.thread.start()
+
+    def stop(self) -> None:
+        self.gates.update({part: "estop" for part in self.gates if part not in self.deaf})
+
+    def reset(self, query: object) -> None:
+        self.gates.update(dict.fromkeys(self.gates, "hold"))
+        with query:
+            query.reply(keys.ESTOP_RESET, encode(Done(v=VERSION)), encoding=encoding_of(Done))
+
+
+@pytest.fixture
+def endpoint(free_port: int) -> str:
+    return f"tcp/127.0.0.1:{free_port}"
+
+
+@pytest.fixture
+def robot(endpoint: str) -> Iterator[Robot]:
+    robot = Robot(endpoint)
+    yield robot
+    robot.over.set()
+    robot.thread.join()
+    robot.session.close()
+
+
+def test_every_part_stops_and_is_named(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estop", "--endpoint", endpoint]) == 0
+    assert robot.gates == {"torso": "estop", "head": "estop"}
+    assert capsys.readouterr().out.startswith("stopped: head, torso;")
+
+
+def test_a_part_that_does_not_stop_is_named(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.deaf.add("torso")
+    assert main(["estop", "--endpoint", endpoint]) == 1
+    assert "torso did not stop" in capsys.readouterr().err
+
+
+def test_reset_releases(robot: Robot, endpoint: str) -> None:
+    main(["estop", "--endpoint", endpoint])
+    assert main(["estop", "--reset", "--endpoint", endpoint]) == 0
+    assert set(robot.gates.values()) == {"hold"}
+
+
+def test_status_shows_the_gates(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["status", "--endpoint", endpoint])
+    assert "torso           armed    velocity" in capsys.readouterr().out

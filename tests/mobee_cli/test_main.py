@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from mobee_cli.__main__ import VERBS, main
+from tests.services.launched import mobee
+
+
+def test_without_a_verb_all_verbs_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    usage = capsys.readouterr().out
+    assert all(f"  {verb} " in usage for verb in VERBS)
+
+
+def test_an_unknown_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lanch"]) == 2
+    assert capsys.readouterr().err.startswith("mobee: unknown verb 'lanch'. Did you mean 'launch'?")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([verb, "--help"])
+    assert ended.value.code == 0
+    assert f"usage: mobee {verb}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments", [["status", "--jsn"], ["topic", "lst"], ["topic", "hz"], ["launch", "--duration", "-1"], ["launch", "--duration", "soon"]]
+)
+def test_a_wrong_option_is_said_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert said.startswith(f"mobee {arguments[0]}")
+
+
+@pytest.mark.parametrize("verb", [["status"], ["stop"], ["estop"], ["estop", "--reset"], ["topic", "list"], ["topic", "echo", "clock"]])
+def test_with_nothing_running_it_says_how_to_start(verb: list[str], free_port: int, capsys: pytest.CaptureFixture[str]) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port}"
+    assert main([*verb, "--endpoint", endpoint]) == 3
+    said = capsys.readouterr().err
+    assert f"no router at {endpoint}" in said
+    assert "Start it with `mobee launch`" in said
+    assert len(said.splitlines()) == 1
+
+
+def test_the_command_itself_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, mobee_cli.__main__ as m; m.main([]); "
+        "print(sorted({'numpy', 'zenoh', 'msgspec', 'tyro', 'mobee'} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_the_verbs_of_an_operator_import_no_library() -> None:
+    code = "import sys, mobee_cli.status, mobee_cli.stop, mobee_cli.estop, mobee_cli.topic; print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_robots_lists_what_is_shipped() -> None:
+    done = mobee("robots")
+    assert done.returncode == 0
+    assert "icub         41 motors: torso 3, head 6, left_arm 16, right_arm 16" in done.stdout
+    assert "table" in done.stdout

@@ -1,0 +1,218 @@
+from __future__ import annotations
+
+import re
+import signal
+import time
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from bus_schema import keys
+from services.common.observe import Heard, listen
+from services.common.session import open_client
+from tests.services.launched import Launched, is_free, mobee, toys, wait_until
+
+Launch = Callable[..., Launched]
+
+
+@pytest.fixture
+def endpoint(free_port: int) -> str:
+    return f"tcp/127.0.0.1:{free_port}"
+
+
+@pytest.fixture
+def launch(tmp_path: Path, endpoint: str) -> Iterator[Launch]:
+    started: list[Launched] = []
+
+    def start(scenario: str, *options: str, at: str = endpoint) -> Launched:
+        folder = tmp_path / f"launch{len(started)}"
+        folder.mkdir()
+        started.append(Launched(folder, at, scenario, *options))
+        return started[-1]
+
+    yield start
+    for launched in started:
+        launched.leave_nothing()
+
+
+def test_a_timed_run_counts_from_readiness_and_leaves_nothing_behind(launch: Launch, free_port: int) -> None:
+    launched = launch(toys(one="healthy", two="healthy"), "--duration", "0.5")
+    code, summary = launched.end()
+    assert code == 0
+    assert summary["seconds_to_ready"] > 0
+    assert 0.5 <= summary["duration_s"] < 2.0
+    assert summary["restarts"] == {"one": 0, "two": 0}
+    assert summary["services"]["one"]["marks"] == 1
+    assert launched.children() == []
+    assert is_free(free_port)
+
+
+def test_the_run_folder_says_what_was_run(launch: Launch, endpoint: str) -> None:
+    _, summary = launch(toys(one="healthy"), "--duration", "0.1", "--set", "services.one.seed=7").end()
+    folder = Path(summary["run"])
+    config = tomllib.loads((folder / "one.toml").read_text())
+    assert config["seed"] == 7
+    assert config["endpoint"] == endpoint
+    assert config["run_dir"] == str(folder)
+    assert tomllib.loads((folder / "scenario.toml").read_text())["services"]["one"] == {"module": "tests.services.toy_service", **config}
+    assert "python" in tomllib.loads((folder / "versions.toml").read_text())
+    assert "ready as" in (folder / "logs" / "one.log").read_text()
+
+
+def test_services_start_after_those_they_need_and_end_before_them(launch: Launch) -> None:
+    launched = launch(toys(agent="healthy", controller="healthy", robot_sim="healthy", model="healthy"))
+    launched.wait_for("all ready")
+    ready = re.findall(r"(\w+) is ready", launched.news)
+    assert set(ready[:2]) == {"robot_sim", "model"}
+    assert ready[2:] == ["controller", "agent"]
+    launched.process.send_signal(signal.SIGTERM)
+    code, summary = launched.end()
+    assert code == 0
+    logs = {path.stem: path.read_text() for path in (Path(summary["run"]) / "logs").iterdir()}
+    over = {who: float(found[1]) for who, text in logs.items() if (found := re.search(r"over at ([\d.]+)", text))}
+    assert sorted(over, key=lambda who: over[who]) == ["agent", "controller", "model", "robot_sim"]
+
+
+def test_a_service_that_crashes_is_restarted_after_a_doubling_pause(launch: Launch) -> None:
+    launched = launch(toys(one="crash_once_ready", two="healthy"), "--duration", "2.5")
+    code, summary = launched.end()
+    assert code == 0
+    assert summary["restarts"]["one"] >= 2
+    assert summary["restarts"]["two"] == 0
+    assert re.findall(r"the motor burnt; starts again in ([\d.]+) s", launched.news)[:2] == ["0.2", "0.4"]
+
+
+def test_a_service_that_keeps_failing_is_given_up_and_the_robot_stopped(launch: Launch, endpoint: str) -> None:
+    launched = launch(toys(one="crash_at_start", two="healthy"))
+    launched.wait_for("starts again in 0.2")
+    stops: list[Heard] = []
+    with open_client(endpoint) as session:
+        listen(session, keys.ESTOP, stops.append)
+        code, summary = launched.end()
+    assert code == 1
+    assert re.findall(r"starts again in ([\d.]+) s", launched.news) == ["0.2", "0.4", "0.8", "1.6", "3.2"]
+    assert summary["restarts"]["one"] == 5
+    assert ["no hardware at all" in fault for fault in summary["faults"]] == [True]
+    assert [stop.content()["set"] for stop in stops] == [True]
+    assert launched.children() == []
+
+
+def test_a_service_that_cannot_use_its_settings_is_not_started_again(launch: Launch) -> None:
+    launched = launch(toys(one="bad_settings"))
+    code, summary = launched.end()
+    assert code == 1
+    assert summary["restarts"]["one"] == 0
+    assert "unknown field 'colour'" in summary["faults"][0]
+
+
+def test_a_frozen_service_is_killed_and_restarted(launch: Launch) -> None:
+    launched = launch(toys(one="freeze", two="healthy"))
+    launched.wait_for("all ready")
+    frozen = re.search(r"one is ready .*pid (\d+)", launched.news)
+    launched.wait_for("one is frozen")
+    assert frozen and not psutil.pid_exists(int(frozen[1]))
+    wait_until(lambda: launched.news.count("one is ready") == 2, 10)
+    launched.process.send_signal(signal.SIGTERM)
+    code, summary = launched.end()
+    assert code == 0
+    assert summary["restarts"] == {"one": 1, "two": 0}
+
+
+def test_a_service_that_is_killed_is_back_within_seconds(launch: Launch) -> None:
+    launched = launch(toys(one="healthy"))
+    launched.wait_for("all ready")
+    launched.children()[0].kill()
+    launched.wait_for("one was killed by SIGKILL")
+    wait_until(lambda: launched.news.count("one is ready") == 2, 5)
+    assert launched.news.count("one is ready") == 2
+
+
+def test_a_service_that_has_done_its_work_is_left_in_peace(launch: Launch) -> None:
+    launched = launch(toys(one="finish", two="healthy"), "--duration", "1")
+    code, summary = launched.end()
+    assert code == 0
+    assert "one has ended" in launched.news
+    assert summary["restarts"]["one"] == 0
+
+
+def test_ctrl_c_once_stops_everything(launch: Launch, free_port: int) -> None:
+    launched = launch(toys(one="healthy", two="healthy"))
+    launched.wait_for("all ready")
+    assert len(launched.children()) == 2
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end(timeout=2)[0] == 0
+    assert launched.children() == []
+    assert is_free(free_port)
+
+
+def test_ctrl_c_during_the_start_stops_everything(launch: Launch) -> None:
+    launched = launch(toys(one="crash_at_start", two="healthy"))
+    launched.wait_for("starts again")
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end(timeout=5)[0] == 0
+    assert launched.children() == []
+
+
+def test_a_service_deaf_to_sigterm_is_killed_after_two_seconds(launch: Launch) -> None:
+    launched = launch(toys(one="deaf"), "--duration", "0.1")
+    assert launched.end()[0] == 0
+    assert "one did not end within 2 s: killed" in launched.news
+    assert launched.children() == []
+
+
+def test_ctrl_c_twice_kills(launch: Launch, free_port: int) -> None:
+    launched = launch(toys(one="deaf"))
+    launched.wait_for("all ready")
+    launched.process.send_signal(signal.SIGINT)
+    launched.wait_for("stopping")
+    launched.process.send_signal(signal.SIGINT)
+    begun = time.monotonic()
+    assert launched.end()[0] == 1
+    assert time.monotonic() - begun < 1.5  # not the two seconds a service is given
+    assert launched.children() == []
+    assert is_free(free_port)
+
+
+def test_services_of_a_killed_launcher_end_when_the_next_one_comes(launch: Launch) -> None:
+    orphaned = launch(toys(one="healthy", two="healthy"))
+    orphaned.wait_for("all ready")
+    orphans = orphaned.children()
+    orphaned.process.kill()
+    orphaned.process.wait()
+    launched = launch(toys(one="healthy"))
+    launched.wait_for("all ready")
+    psutil.wait_procs(orphans, timeout=5)
+    assert [process for process in orphans if process.is_running()] == []
+    assert len(launched.children()) == 1
+
+
+def test_a_second_launcher_at_the_same_endpoint_is_refused_in_one_line(launch: Launch, endpoint: str) -> None:
+    launch(toys(one="healthy")).wait_for("all ready")
+    second = launch(toys(one="healthy"))
+    assert second.end() == (3, {})
+    assert len(second.news.splitlines()) == 1
+    assert f"cannot listen at {endpoint}" in second.news
+    assert "`mobee stop`" in second.news
+    assert not (second.folder / "runs").exists()
+
+
+def test_a_unix_socket_is_gone_after_the_run(launch: Launch, tmp_path: Path) -> None:
+    socket = tmp_path / "bus.sock"
+    launched = launch(toys(one="healthy"), at=f"unixsock-stream/{socket}")
+    launched.wait_for("all ready")
+    assert socket.exists()
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end()[0] == 0
+    assert list(tmp_path.glob("*.sock*")) == []
+
+
+def test_a_runs_folder_that_cannot_be_written_is_said_in_one_line(tmp_path: Path, endpoint: str) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "toys.toml").write_text(toys(one="healthy"))
+    done = mobee("launch", str(tmp_path / "toys.toml"), "--endpoint", endpoint, "--runs", str(tmp_path / "file" / "runs"))
+    assert done.returncode == 3
+    assert len(done.stderr.splitlines()) == 1
+    assert str(tmp_path / "file") in done.stderr

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import importlib.util
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.common.config import ConfigError
+from services.launcher.checks import MissingExtra, check_extras, check_robots
+from services.launcher.scenario import read_scenario, shipped
+from services.launcher.toml import to_toml
+from tests.services.launched import mobee, toys
+
+SCENARIO = """\
+title = "a test"
+
+[shared]
+gains = "default"
+
+[services.robot_sim]
+backend = "kinematic"
+
+[services.model]
+world = "table"
+gains = "published_2014"
+
+[services.agent_torso]
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO)
+    return path
+
+
+def mistake(path: Path | str, *settings: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        check_robots(read_scenario(str(path), settings))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_scenarios_are_right(name: str) -> None:
+    scenario = read_scenario(name)
+    check_robots(scenario)
+    assert scenario.title
+
+
+def test_parts_come_in_the_order_of_their_start() -> None:
+    names = [part.who for part in read_scenario("default").parts]
+    assert names == [
+        "robot_sim",
+        "model",
+        "controller",
+        "agent_torso",
+        "agent_left_arm",
+        "agent_right_arm",
+        "renderer",
+        "vision",
+        "monitor",
+    ]
+
+
+def test_an_agent_is_told_its_part_and_shared_settings_reach_whom_they_concern(scenario: Path) -> None:
+    parts = {part.who: part.config for part in read_scenario(str(scenario)).parts}
+    assert parts["agent_torso"].part == "torso"
+    assert parts["model"].gains == "published_2014"
+    assert not hasattr(parts["robot_sim"], "gains")
+
+
+def test_settings_of_the_command_line_win(scenario: Path) -> None:
+    parts = {part.who: part.config for part in read_scenario(str(scenario), ["services.model.contact_forces=false", "shared.seed=5"]).parts}
+    assert parts["model"].contact_forces is False
+    assert {config.seed for config in parts.values()} == {5}
+
+
+@pytest.mark.parametrize(
+    ("line", "typo", "where", "said"),
+    [
+        ("title =", "titel =", ":1:", "Did you mean 'title'?"),
+        ("[services.model]", "[services.modle]", ":9:", "Did you mean 'model'?"),
+        ("[shared]", "[shard]", ":3:", "Did you mean 'shared'?"),
+        ("world =", "wrld =", ":10:", "Did you mean 'world'?"),
+        ('"published_2014"', '"published_2041"', ":11:", "Did you mean 'published_2014'?"),
+        ('"default"', '"defualt"', ":4:", "Did you mean 'default'?"),
+        ('gains = "default"', 'gain = "default"', ":4:", "Did you mean 'gains'?"),
+        ('"kinematic"', '"kinematics"', ":7:", "Did you mean 'kinematic'?"),
+        ('"table"', '"tabel"', ":10:", "Did you mean 'table'?"),
+        ("agent_torso", "agent_torsoe", ":13:", "Did you mean 'torso'?"),
+        ('world = "table"', "world = 3", ":10:", "Expected `str`, got `int`"),
+    ],
+)
+def test_a_typo_names_file_line_and_the_nearest_valid_name(scenario: Path, line: str, typo: str, where: str, said: str) -> None:
+    text = SCENARIO.replace(line, typo, 1)
+    if typo == '"defualt"':
+        text = text.replace('gains = "published_2014"\n', "")
+    scenario.write_text(text)
+    text = mistake(scenario)
+    assert text.startswith(f"{scenario}{where}")
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("services.model.contact_force=false", "Did you mean 'contact_forces'?"),
+        ("services.modle.contact_forces=false", "Did you mean 'model'?"),
+        ("service.model.contact_forces=false", "Did you mean 'services'?"),
+        ("services.model.contact_forces=maybe", "Expected `bool`, got `str`"),
+        ("contact_forces=false", "table.field=value"),
+        ("services.model.contact_forces", "table.field=value"),
+    ],
+)
+def test_a_mistaken_setting_is_named(scenario: Path, setting: str, said: str) -> None:
+    text = mistake(scenario, setting)
+    assert text.startswith(f"--set {setting}")
+    assert said in text
+
+
+def test_an_unknown_scenario_names_the_nearest() -> None:
+    assert "Did you mean 'kinematic'?" in mistake("kinematick")
+
+
+@pytest.mark.parametrize("content", [b"title = ", b"\xff\xfe", b"", b"services = 3"])
+def test_what_is_no_scenario_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(content)
+    assert mistake(path).startswith(str(path))
+
+
+def test_a_mistake_ends_the_command_with_two(scenario: Path) -> None:
+    scenario.write_text(SCENARIO.replace("world =", "wrld ="))
+    done = mobee("launch", str(scenario))
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"mobee launch: {scenario}:10: unknown field 'services.model.wrld'.")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def missing(monkeypatch: pytest.MonkeyPatch, package: str, *settings: str) -> str:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
+    with pytest.raises(MissingExtra) as caught:
+        check_extras(read_scenario("default", settings))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("package", "service", "remedy"),
+    [
+        ("icub_models", "robot_sim", "mobee[sim]"),
+        ("cv2", "vision", "mobee[vision]"),
+        ("rerun", "monitor", "mobee[viz]"),
+    ],
+)
+def test_a_missing_extra_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch, package: str, service: str, remedy: str) -> None:
+    text = missing(monkeypatch, package)
+    assert text.startswith(f"{service} needs {package}")
+    assert f"pip install '{remedy}'" in text
+
+
+def test_on_a_newer_python_the_motor_model_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "version_info", (3, 13, 1))
+    assert "mobee launch kinematic" in missing(monkeypatch, "pybullet")
+
+
+def test_the_kinematic_robot_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    check_extras(read_scenario("kinematic"))
+
+
+def test_another_program_may_take_the_place_of_a_service(tmp_path: Path) -> None:
+    path = tmp_path / "toys.toml"
+    path.write_text(toys(controller="healthy", own="healthy"))
+    entries = {part.who: part.entry for part in read_scenario(str(path)).parts}
+    assert entries["controller"].module == "tests.services.toy_service"
+    assert entries["controller"].after == ("robot_sim", "model")
+    assert entries["own"].after == ("controller",)
+
+
+_KEYS = st.text(min_size=1, max_size=10)
+_VALUES = st.recursive(
+    st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@given(st.dictionaries(_KEYS, _VALUES | st.dictionaries(_KEYS, _VALUES, max_size=3), max_size=5))
+def test_settings_survive_as_toml(tables: dict[str, object]) -> None:
+    assert tomllib.loads(to_toml(tables)) == tables
