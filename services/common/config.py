@@ -102,6 +102,7 @@ def nearest(given: str, valid: Iterable[str]) -> str:
 
 def line_of(text: str, field: str) -> int | None:
     """The line of a TOML text that sets a field, given with its tables' names; else of the innermost table around it."""
+    field = field.partition("[")[0]  # msgspec does not say which entry of a table or list
     table, closest, found = "", -1, None
     for number, line in enumerate(text.splitlines(), start=1):
         if header := re.match(r'\[+([\w."-]+)\]+\s*(#.*)?$', line):

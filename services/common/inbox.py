@@ -11,7 +11,8 @@ from threading import Lock
 from typing import Any
 
 Handler = Callable[[], None]
-CROWDED = 1000  # waiting messages and calls at which further ones are dropped
+CROWDED = 1000  # waiting messages and calls at which further messages are dropped
+CROWDED_WITH_CALLS = 2 * CROWDED  # at which further calls are dropped: a flood of messages must not make the service deaf
 GRACE = 0.002  # s for which `spin` goes on with what is waiting when its time is up
 
 
@@ -48,9 +49,9 @@ class Inbox:
         """Have the main thread run it; any thread may call this."""
         self._queue.put(handler)
 
-    def offer(self, handler: Handler) -> bool:
-        """As put, but False, and counted, while too much is waiting: a flood must not fill the memory."""
-        if self._queue.qsize() >= CROWDED:
+    def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
+        """As put, but False, and counted, while `crowd` handlers are waiting: a flood must not fill the memory."""
+        if self._queue.qsize() >= crowd:
             self.dropped += 1
             return False
         self._queue.put(handler)

@@ -23,7 +23,7 @@ from mobee.robot.robot import Robot
 from services.common import log, rpc
 from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
-from services.common.inbox import Inbox, Newest
+from services.common.inbox import CROWDED_WITH_CALLS, Inbox, Newest
 from services.common.session import open_client
 
 _M = TypeVar("_M", bound=Message)
@@ -85,8 +85,7 @@ class Service:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         try:
-            signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            _ignore_signals()
             if error is not None and not isinstance(error, SystemExit):
                 is_mistake = isinstance(error, MobeeError) and not self._is_ready  # its text says all; see entry.py
                 self.log.error("ended by %s", error, exc_info=None if is_mistake else error)
@@ -141,7 +140,7 @@ class Service:
         """Answer calls: handler(request, key) -> reply, or CallRefused.  `part_of_key`: its first chunk names the part."""
 
         def enqueue(query: zenoh.Query) -> None:
-            self.inbox.offer(lambda: self._answer(query, key, cls, handler, part_of_key))
+            self.inbox.offer(lambda: self._answer(query, key, cls, handler, part_of_key), CROWDED_WITH_CALLS)
 
         self._kept.append(self.bus.session.declare_queryable(key, enqueue))
 
@@ -278,4 +277,10 @@ def _leave() -> None:
 
 
 def _end(signum: int, frame: FrameType | None) -> None:
+    _ignore_signals()  # a second one must not interrupt the end
     raise SystemExit(0)
+
+
+def _ignore_signals() -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,24 @@
+"""Beside the probe, because a struct of the main module cannot be named by another."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from services.common.config import ServiceConfig
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """A few kinds of fields."""
+
+    orphaned: float = 10.0
+    """Seconds without a router."""
+    dawdle: float = 0.0
+    """Seconds spent on every object."""
+    gains: Literal["default", "published_2014"] = "default"
+    """A word out of few."""
+    share: Annotated[float, Meta(gt=0, le=1)] = 0.5
+    """A bounded number."""
+    posture: dict[str, list[float]] = {}
+    """A table."""
