@@ -191,9 +191,8 @@ class Gate:
 
     def _check_epoch(self, epoch: int) -> None:
         if self.owner is None or epoch != self.epoch:
-            raise Refused(
-                "epoch", f"{self.part}: epoch {epoch} does not own it, in force is {self.epoch if self.owner else 'none'}: take it"
-            )
+            in_force = f"epoch {self.epoch} does" if self.owner else "nobody does"
+            raise Refused("epoch", f"{self.part}: epoch {epoch} does not own it, {in_force}; take it first")
 
     def _check_limits(self, mode: Mode, reference: Array) -> None:
         limits = self._limits

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.robot.robot import Array
+from mobee.simulation.motors import SERVO_GAIN
 from services.robot_sim.limits import Limits
 
 
@@ -18,9 +19,9 @@ class Shaper:
         self.velocity = np.zeros(len(limits.lower))  # rad/s, what is asked of the motors now
 
     def start(self, q: Array, velocity: Array) -> None:
-        """Begin where the motors are: rad and rad/s."""
-        self.position = q.copy()
+        """Begin where the motors are, rad, as fast as they are, rad/s."""
         self.velocity = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
+        self.position = q + self.velocity / SERVO_GAIN  # so far is the reference ahead of a servo at that speed
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
         """The velocity to ask for now; before a position limit no more than can still be braked."""

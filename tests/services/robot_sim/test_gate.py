@@ -1,0 +1,304 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bus_schema import Refused
+from mobee.simulation.motors import MotorParameters
+from tests.services.robot_sim.gated import LIMITS, Gated, N
+
+VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]
+ROUNDING = 1 + 1e-9
+
+
+def refusal(gated: Gated, *args: object, **changes: object) -> str:
+    with pytest.raises(Refused) as caught:
+        gated.command(*args, **changes)  # type: ignore[arg-type]
+    return caught.value.reason
+
+
+def test_the_limits_of_the_icub_are_those_of_the_design() -> None:
+    assert pytest.approx(math.radians(60)) == VELOCITY
+    assert pytest.approx(math.radians(600)) == ACCELERATION
+
+
+def test_a_command_moves_an_armed_part_from_the_next_tick_on() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05)
+    gated.tick()
+    assert gated.velocity == pytest.approx(0.05)
+    assert (gated.gate.mode, gated.gate.seq, gated.gate.age) == ("velocity", 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("reason", "changes"),
+    [
+        ("epoch", {"epoch": 0}),
+        ("epoch", {"epoch": 99}),
+        ("length", {"ref": [0.0] * (N + 1)}),
+        ("length", {"ref": []}),
+        ("value", {"ref": math.nan}),
+        ("value", {"ref": math.inf}),
+        ("velocity", {"ref": 1.1 * VELOCITY}),
+        ("position", {"mode": "position", "ref": 3.0}),
+        ("torque", {"mode": "torque", "ref": 41.0}),
+        ("step", {"mode": "position", "ref": 0.1}),
+        ("future", {"re_k": 21}),
+        ("age", {"re_k": 9}),
+        ("ttl", {"ttl": 0}),
+        ("ttl", {"ttl": -1}),
+        ("ttl", {"ttl": 10**9}),
+    ],
+)
+def test_a_wrong_command_is_refused_with_its_reason_and_moves_nothing(reason: str, changes: dict[str, object]) -> None:
+    gated = Gated().owned()
+    for _ in range(20):
+        gated.tick()
+    assert refusal(gated, **changes) == reason
+    gated.tick()
+    assert gated.drive.mode == "hold"
+    assert not gated.velocity.any()
+
+
+def test_a_refused_command_leaves_the_last_valid_one_in_force() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05)
+    gated.tick()
+    refusal(gated, ref=math.nan)
+    gated.tick()
+    assert gated.gate.seq == 0
+    assert gated.velocity == pytest.approx(0.05)
+
+
+def test_a_command_100_ms_old_is_just_in_time() -> None:
+    gated = Gated().owned()
+    for _ in range(20):
+        gated.tick()
+    gated.command(ref=0.05, re_k=10)
+    gated.tick()
+    assert gated.gate.age == 11
+
+
+@pytest.mark.parametrize("seq", [0, 3])
+def test_a_replayed_or_overtaken_command_is_refused(seq: int) -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05, seq=3)
+    assert refusal(gated, ref=0.05, seq=seq) == "seq"
+
+
+def test_a_new_owner_may_count_from_zero_again() -> None:
+    gated = Gated().owned()
+    gated.command(seq=500)
+    gated.owned().command(ref=0.05, seq=0)
+    gated.tick()
+    assert gated.gate.seq == 0
+
+
+def test_the_old_of_two_owners_can_neither_command_nor_arm_nor_release() -> None:
+    gated = Gated().owned()
+    old = gated.gate.epoch
+    gated.gate.take("intruder", "x1")
+    for verb in (gated.gate.arm, gated.gate.hold, gated.gate.release):
+        with pytest.raises(Refused, match="epoch"):
+            verb(old)
+    gated.gate.arm(gated.gate.epoch)
+    assert refusal(gated, ref=0.05, epoch=old) == "epoch"
+
+
+def test_taking_a_moving_part_makes_it_hold() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05)
+    gated.tick()
+    gated.gate.take("other", "o1")
+    gated.tick()
+    assert gated.gate.state == "hold"
+    assert not gated.velocity.any()
+
+
+def test_an_unarmed_part_does_not_move() -> None:
+    gated = Gated()
+    gated.gate.take("controller", "c1")
+    assert refusal(gated, ref=0.05) == "not_armed"
+
+
+@given(speed=st.floats(-VELOCITY, VELOCITY), ttl=st.integers(10, 1000), ideal=st.booleans())
+def test_after_the_ttl_a_part_is_at_rest_as_soon_as_its_deceleration_allows(speed: float, ttl: int, ideal: bool) -> None:
+    gated = Gated(MotorParameters.ideal() if ideal else None).owned()
+    for _ in range(30):
+        gated.command(ref=speed, ttl=ttl)
+        gated.tick()
+    while gated.gate.state == "armed":
+        assert gated.now <= (30 + 1) * 10_000_000 + ttl * 1_000_000
+        gated.tick()
+    for _ in range(math.ceil(abs(speed) / ACCELERATION / gated.dt)):
+        gated.tick()
+    assert np.abs(gated.velocity).max() < 0.02  # what is left is the servo, which corrects the pose
+
+
+def test_nothing_is_replayed_after_a_hold() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05)
+    gated.tick()
+    gated.tick(wall=0.5)
+    assert gated.gate.state == "hold"
+    gated.gate.arm(gated.gate.epoch)
+    gated.tick()
+    assert gated.drive.mode == "hold"
+    assert gated.told[0][0] == "hold"
+    assert "ttl 100 ms" in gated.told[0][1]
+
+
+def test_the_loss_of_the_owner_holds_and_its_epoch_is_worth_nothing() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05)
+    gated.tick()
+    gated.gate.lose_owner()
+    gated.tick()
+    assert gated.drive.mode == "hold"
+    with pytest.raises(Refused, match="nobody"):
+        gated.gate.arm(gated.gate.epoch)
+
+
+def test_a_released_part_is_idle() -> None:
+    gated = Gated().owned()
+    gated.gate.release(gated.gate.epoch)
+    assert gated.gate.state == "idle"
+    assert refusal(gated, ref=0.05) == "not_armed"
+
+
+def test_an_emergency_stop_is_left_only_by_reset_and_arm() -> None:
+    gated = Gated().owned()
+    gated.gate.stop("test")
+    epoch = gated.gate.take("other", "o1")
+    assert gated.gate.state == "estop"
+    with pytest.raises(Refused, match="reset the emergency stop"):
+        gated.gate.arm(epoch)
+    gated.gate.release(epoch)
+    assert gated.gate.state == "estop"
+    epoch = gated.gate.take("other", "o1")
+    gated.gate.reset_stop()
+    assert gated.gate.state == "hold"
+    assert refusal(gated, ref=0.05) == "not_armed"
+    gated.gate.arm(epoch)
+    gated.command(ref=0.05)
+
+
+def test_a_fault_survives_take_and_the_reset_of_an_emergency_stop() -> None:
+    gated = Gated().owned()
+    gated.gate.fail(1, "broken")
+    with pytest.raises(Refused, match="reset the simulator"):
+        gated.gate.arm(gated.gate.take("other", "o1"))
+    gated.gate.stop("test")
+    gated.gate.reset_stop()
+    assert gated.gate.state == "fault"
+
+
+def test_a_position_reference_may_go_on_where_a_refused_one_left_off() -> None:
+    gated = Gated().owned()
+    gated.command("position", 0.02)
+    for _ in range(5):
+        gated.tick()
+    gated.command("position", 0.02 + 5 * VELOCITY * gated.dt)
+    assert refusal(gated, "position", 0.02 + 9 * VELOCITY * gated.dt) == "step"
+
+
+@pytest.mark.parametrize("parameters", [MotorParameters.ideal(), MotorParameters()], ids=["ideal", "default"])
+def test_position_mode_arrives_where_it_is_sent(parameters: MotorParameters) -> None:
+    gated = Gated(parameters).owned()
+    goal = 0.0
+    for _ in range(200):
+        goal = min(goal + 0.5 * VELOCITY * gated.dt, 0.3)
+        gated.command("position", goal)
+        gated.tick()
+    assert gated.q == pytest.approx(0.3, abs=parameters.backlash + 1e-5)
+
+
+def test_a_velocity_command_does_not_ram_a_limit() -> None:
+    gated = Gated().owned()
+    for _ in range(300):
+        gated.command(ref=VELOCITY)
+        before = gated.q.copy()
+        gated.tick()
+    assert (gated.q <= LIMITS.upper).all()
+    assert gated.q == pytest.approx(LIMITS.upper, abs=1e-3)
+    assert gated.velocity == pytest.approx(0.0, abs=0.05)
+    assert (np.abs(gated.q - before) < 1e-3).all()
+
+
+# What may happen at any time, sense or nonsense.
+REFERENCE = st.lists(st.floats(-1.3, 1.3) | st.sampled_from([VELOCITY, -VELOCITY, math.nan, 1e9]), min_size=N, max_size=N)
+COMMAND = st.tuples(st.sampled_from(["velocity", "position", "torque", "hold"]), REFERENCE, st.integers(-3, 1), st.integers(1, 300))
+DEED = st.one_of(COMMAND, COMMAND, COMMAND, st.sampled_from(["take", "arm", "own", "release", "hold", "lose", "stop", "reset", "late"]))
+
+
+def do(gated: Gated, deed: object) -> None:
+    gate = gated.gate
+    try:
+        if isinstance(deed, tuple):
+            mode, ref, behind, ttl = deed
+            if mode == "torque":
+                ref = [40.0 * x for x in ref]
+            if mode == "position":
+                ref = (gated.q + 0.03 * np.array(ref)).tolist()
+            gated.command(mode, ref, re_k=max(0, gated.k + behind), ttl=ttl)
+        elif deed == "take":
+            gate.take("controller", "c1")
+        elif deed == "own":
+            gated.owned()
+        elif deed in ("arm", "release", "hold"):
+            getattr(gate, str(deed))(gate.epoch)
+        elif deed == "lose":
+            gate.lose_owner()
+        elif deed == "stop":
+            gate.stop("test")
+        elif deed == "reset":
+            gate.reset_stop()
+    except Refused:
+        pass
+
+
+@given(
+    deeds=st.lists(DEED, min_size=5, max_size=60),
+    pause=st.integers(1, 6),
+    parameters=st.sampled_from([MotorParameters.ideal(), MotorParameters()]),
+)
+def test_whatever_happens_the_motors_keep_their_limits(deeds: list[object], pause: int, parameters: MotorParameters) -> None:
+    gated = Gated(parameters).owned()
+    for deed in deeds:
+        do(gated, deed)
+        for _ in range(pause):
+            change = gated.tick(wall=0.2 if deed == "late" else None)
+            assert np.abs(gated.velocity).max() <= VELOCITY * ROUNDING
+            assert np.abs(change).max() <= ACCELERATION * gated.dt * ROUNDING, deed
+            assert ((gated.q >= LIMITS.lower) & (gated.q <= LIMITS.upper)).all()
+
+
+@given(deeds=st.lists(DEED, max_size=40))
+def test_an_old_epoch_never_moves_anything(deeds: list[object]) -> None:
+    gated = Gated().owned()
+    old = gated.gate.epoch
+    gated.gate.take("other", "o1")
+    for deed in deeds:
+        if isinstance(deed, tuple):
+            with pytest.raises(Refused):
+                gated.command(deed[0], deed[1], epoch=old)
+        elif deed != "reset":
+            do(gated, deed)
+        gated.tick()
+        assert gated.drive.mode == "hold"
+
+
+@given(deeds=st.lists(DEED, max_size=40))
+def test_an_emergency_stop_stays_through_everything_but_its_reset(deeds: list[object]) -> None:
+    gated = Gated().owned()
+    gated.gate.stop("test")
+    for deed in deeds:
+        if deed != "reset":
+            do(gated, deed)
+        gated.tick()
+        assert gated.gate.state == "estop"
+        assert gated.drive.mode == "hold"
