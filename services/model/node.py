@@ -83,7 +83,7 @@ class ModelNode:
         ]
         self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)
         items = [
-            ContactItem(first=c.first, second=c.second, kind=c.kind, depth=c.depth, point=c.point.tolist(), normal=c.normal.tolist())
+            ContactItem(first=c.first, second=c.second, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
             for c in pose.contacts
         ]
         self._contacts.put(re_k=k, contacts=items)
