@@ -120,4 +120,4 @@ def posture(robot: Robot, degrees: Mapping[str, float]) -> Array:
     return q
 
 
-LOOKING_DOWN = {"torso_pitch": 10.0, "neck_pitch": -20.0, "eyes_tilt": -24.0, "eyes_vergence": 10.0}
+LOOKING_DOWN = {"torso_pitch": 10.0, "neck_pitch": -26.0, "eyes_tilt": -18.0, "eyes_vergence": 11.0}

@@ -1,0 +1,60 @@
+"""What is where on the page."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from services.monitor.palette import PARTS
+
+TIMELINE = "robot_time"
+ROOT = "root_link"  # frame of everything in the scene
+WINDOW = 30.0  # s of plot
+
+
+def blueprint() -> rrb.Blueprint:
+    """The robot large, its pictures and the log below it, plots on the right, no side panels."""
+    left = rrb.Vertical(_scene(), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
+    plots = [_plot(part, f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
+    learning = rrb.Tabs(
+        _plot("reward", "intrinsic reward, nats", "plots/reward"),
+        _plot("value", "value of the state", "plots/value"),
+        _plot("transitions", "transitions", "plots/transitions"),
+    )
+    right = rrb.Vertical(*plots, _plot("forces", "forces by kind, norm, rad/s²", "plots/forces"), learning)
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[1.9, 1]),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TopPanel(state="hidden"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _scene() -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["/scene/**", "/robot/**"],
+        name="iCub",
+        background=rrb.Background(color=(24, 27, 33)),
+        line_grid=rrb.LineGrid3D(visible=False),
+        spatial_information=rrb.SpatialInformation(target_frame=ROOT),
+        eye_controls=rrb.EyeControls3D(position=(-0.98, -0.60, 0.42), look_target=(-0.14, 0.0, 0.06), eye_up=(0.0, 0.0, 1.0)),
+    )
+
+
+def _eye(eye: str) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(origin=f"/eyes/{eye}", name=f"{eye} eye", background=rrb.Background(color=(24, 27, 33)))
+
+
+def _log() -> rrb.TextLogView:
+    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"])
+    return rrb.TextLogView(origin="/events", name="events", columns=columns)
+
+
+def _plot(name: str, title: str, origin: str) -> rrb.TimeSeriesView:
+    window = rrb.VisibleTimeRange(
+        TIMELINE, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-WINDOW), end=rrb.TimeRangeBoundary.cursor_relative()
+    )
+    return rrb.TimeSeriesView(origin=f"/{origin}", name=title, time_ranges=window, plot_legend=rrb.PlotLegend("LeftTop"))

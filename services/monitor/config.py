@@ -1,0 +1,30 @@
+"""What the monitor is told."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from services.common.config import ServiceConfig
+
+Port = Annotated[int, Meta(gt=0, lt=65536)]
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """The monitor's settings."""
+
+    serve: bool = True
+    """Whether a page is served; a recording is made in any case when there is a run_dir."""
+    web_port: Port = 9090
+    """Where the page is, on 127.0.0.1."""
+    grpc_port: Port = 9876
+    """Where the page gets its data, on 127.0.0.1."""
+    run_dir: str = ""
+    """Folder for recording.rrd; empty: no recording."""
+    rate: Annotated[float, Meta(ge=1, le=20)] = 20.0
+    """Looks at the newest state a second."""
+    image_rate: Annotated[float, Meta(gt=0, le=10)] = 2.0
+    """Eye pictures shown a second."""
+    memory_limit: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB)$")] = "300MB"
+    """What the page's server keeps for a viewer that comes late."""

@@ -1,0 +1,113 @@
+"""Where the pictures go: a page on loopback, a recording, or both."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+import rerun as rr
+
+from services.monitor.blueprint import blueprint
+from services.monitor.config import Config
+from services.monitor.page import HOST, program
+
+START = 10.0  # s for the page to come up
+
+
+@dataclass(frozen=True)
+class Output:
+    """An open recording stream and, if a page is served, its process and address."""
+
+    stream: rr.RecordingStream
+    page: subprocess.Popen[bytes] | None
+    url: str
+
+
+@contextmanager
+def open_output(config: Config) -> Iterator[Output]:
+    """Serve and record as configured; exits with 2 and one line when a port or the folder cannot be used."""
+    folder = Path(config.run_dir) if config.run_dir else None
+    if folder is not None and not folder.is_dir():
+        _refuse(f"run_dir {folder} is not a folder: make it, or leave run_dir empty for no recording")
+    with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
+        page = _start_page(config, private) if config.serve else None
+        stream = rr.RecordingStream("mobee")
+        try:
+            _connect(stream, config, folder)
+            yield Output(stream, page, page_url(config) if page else "")
+        finally:
+            if page is not None:
+                page.kill()  # first: to a page that hangs, the last data would be waited for
+                page.wait()
+            stream.disconnect()
+
+
+def _connect(stream: rr.RecordingStream, config: Config, folder: Path | None) -> None:
+    sinks: list[rr.GrpcSink | rr.FileSink] = []
+    if config.serve:
+        sinks.append(rr.GrpcSink(f"rerun+http://{HOST}:{config.grpc_port}/proxy"))
+    if folder is not None:
+        sinks.append(rr.FileSink(folder / "recording.rrd"))
+    if sinks:
+        stream.set_sinks(*sinks, default_blueprint=blueprint())
+
+
+def page_url(config: Config) -> str:
+    """The address a person opens."""
+    source = quote(f"rerun+http://{HOST}:{config.grpc_port}/proxy", safe="")
+    return f"http://{HOST}:{config.web_port}/?url={source}"
+
+
+def _start_page(config: Config, folder: str) -> subprocess.Popen[bytes]:
+    for name, port in (("web_port", config.web_port), ("grpc_port", config.grpc_port)):
+        _require_free(name, port)
+    numbers = [str(os.getpid()), str(config.web_port), str(config.grpc_port), config.memory_limit]
+    page = subprocess.Popen([sys.executable, "-m", "services.monitor.page", *numbers], stdin=subprocess.DEVNULL, env=_private(folder))
+    give_up = time.monotonic() + START
+    while not all(_answers(port) for port in (config.web_port, config.grpc_port)):
+        if page.poll() is not None or time.monotonic() > give_up:
+            page.kill()
+            _refuse(f"the page did not come up at port {config.web_port} within {START:g} s; serve = false runs without it")
+        time.sleep(0.05)
+    return page
+
+
+def _private(folder: str) -> dict[str, str]:
+    """Surroundings in which Rerun's program sends no usage data anywhere and reads no settings of the user."""
+    surroundings = {**os.environ, "RUST_LOG": "error", "XDG_CONFIG_HOME": folder, "XDG_DATA_HOME": folder}
+    subprocess.run([program(), "analytics", "disable"], env=surroundings, capture_output=True, check=True, timeout=START)
+    return surroundings
+
+
+def _require_free(name: str, port: int) -> None:
+    """A page that was just killed may hold its port for a moment more."""
+    give_up = time.monotonic() + 1.0
+    while True:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((HOST, port))
+                return
+            except OSError:
+                if time.monotonic() > give_up:
+                    _refuse(f"{name} {port} is in use: end the other system with `mobee stop`, or choose another {name}")
+        time.sleep(0.05)
+
+
+def _answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex((HOST, port)) == 0
+
+
+def _refuse(text: str) -> None:
+    print(f"services.monitor: {text}", file=sys.stderr)
+    raise SystemExit(2)

@@ -1,0 +1,23 @@
+"""One set of colours: 8-bit red, green, blue (, opacity)."""
+
+from __future__ import annotations
+
+Color = tuple[int, int, int]
+
+JOINTS: tuple[Color, ...] = ((76, 154, 255), (255, 171, 64), (102, 205, 130), (214, 122, 232))
+PARTS: dict[str, Color] = {"torso": (255, 202, 97), "left_arm": (86, 180, 233), "right_arm": (232, 120, 170)}
+FORCES: dict[str, Color] = {"limits": (120, 170, 255), "constraints": (190, 140, 255), "collision": (255, 92, 82)}
+FIELD = (90, 200, 220, 28)
+TOUCHED = (255, 50, 40, 130)
+TABLE = (150, 138, 120, 255)
+BALL = (225, 40, 40, 255)
+OTHER = (170, 170, 180, 255)
+
+
+def faded(color: Color, share: float) -> Color:
+    """The colour, dimmed towards the dark background."""
+    red, green, blue = (round(share * channel) for channel in color)
+    return red, green, blue
+
+
+COVERS = "0.30 0.34 0.40 1"  # of the URDF's red parts

@@ -1,0 +1,48 @@
+"""The plots: state and goal of the joints the agents use, forces by kind, and what the agents learn."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from bus_schema.messages import Forces, Motion, Transition
+from mobee.robot.robot import Robot
+from services.monitor import palette
+
+SHOWN = 4  # joints of a part: shoulder and elbow of an arm, all of the torso
+LEARNED = ("reward", "value", "transitions")
+
+
+class Plots:
+    """Logs numbers to a stream under plots/; few entities with many series each, because a recording pays by the entity."""
+
+    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+        self._stream = stream
+        for part in palette.PARTS:
+            motors = robot.part(part).motors[:SHOWN]
+            names = [motor.rsplit("_", 1)[-1] for motor in motors]  # pitch, roll, yaw, elbow
+            colors = palette.JOINTS[: len(motors)]
+            goals = [palette.faded(color, 0.6) for color in colors]
+            widths = [1.6] * len(motors) + [0.8] * len(motors)
+            self._style(f"joints/{part}", [*colors, *goals], widths, names + [""] * len(motors))
+        self._style("forces", list(palette.FORCES.values()), [1.4] * len(palette.FORCES), list(palette.FORCES))
+        for quantity in LEARNED:
+            for part, color in palette.PARTS.items():
+                self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
+
+    def log_motion(self, part: str, motion: Motion) -> None:
+        """State and goal of a part."""
+        self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
+
+    def log_forces(self, forces: Forces) -> None:
+        """Norms over the whole robot."""
+        self._stream.log("plots/forces", rr.Scalars([float(np.linalg.norm(getattr(forces, kind))) for kind in palette.FORCES]))
+
+    def log_transition(self, part: str, seen: Transition) -> None:
+        """What an agent has just learned."""
+        for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):
+            self._stream.log(f"plots/{quantity}/{part}", rr.Scalars(value))
+
+    def _style(self, path: str, colors: list[palette.Color], widths: list[float], names: list[str]) -> None:
+        style = rr.SeriesLines(colors=colors, widths=widths, names=names)
+        self._stream.log(f"plots/{path}", style, static=True)

@@ -1,0 +1,160 @@
+"""The scene: the robot's meshes, its fields, the objects around it, and where its hands have been."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import deque
+from pathlib import Path
+
+import defusedxml.ElementTree
+import numpy as np
+import rerun as rr
+from rerun.urdf import UrdfTree
+
+from bus_schema.messages import ContactItem, WorldObject
+from bus_schema.rpc import ObjectState
+from mobee.errors import MobeeError
+from mobee.kinematics import link_transforms
+from mobee.kinematics.quaternion import from_matrix
+from mobee.robot.icub_urdf import write_upper_body_urdf
+from mobee.robot.robot import Array, Robot, Shape
+from services.monitor import palette
+from services.monitor.blueprint import ROOT
+
+TRAIL = 60  # points a hand
+TRAIL_STEP = 4  # looks a point
+TRAIL_PIECES = 8  # of fading brightness
+HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["right_arm"]}
+
+
+class Scene:
+    """Logs poses to a stream; what does not move is logged once."""
+
+    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+        self._stream, self._robot = stream, robot
+        self._fields = [shape for shape in robot.shapes if shape.role == "field"]
+        self._trails: dict[str, deque[Array]] = {name: deque(maxlen=TRAIL) for name in HANDS if name in robot.markers}
+        self._objects: dict[str, ObjectState | WorldObject] = {}
+        self._looks = 0
+        for path in ("fields/capsules", "fields/spheres", "objects", "trails"):
+            stream.log(f"scene/{path}", rr.CoordinateFrame(ROOT), static=True)
+        self.tree = self._load_tree()
+        names = {joint.name: index for index, joint in enumerate(robot.joints)}
+        joints = self.tree.joints() if self.tree else []
+        self.meshes = [(joint, names[joint.name]) for joint in joints if joint.name in names]  # with the index in the robot
+
+    def forget(self) -> None:
+        """A new run: trails end."""
+        for trail in self._trails.values():
+            trail.clear()
+
+    def log_robot(self, q: Array, contacts: list[ContactItem]) -> None:
+        """The robot at q (n,) rad; fields named in a contact are red."""
+        transforms = link_transforms(self._robot, q)
+        angles = self._robot.coupling[0] @ q + self._robot.coupling[1]
+        for joint, index in self.meshes:
+            self._stream.log("robot/joints", joint.compute_transform(float(angles[index]), clamp=False))
+        self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
+        if self._looks % TRAIL_STEP == 0:
+            self._log_trails(transforms)
+        self._looks += 1
+
+    def set_objects(self, objects: list[ObjectState]) -> None:
+        """What the model has in its world."""
+        known = {thing.name: thing for thing in objects}
+        for name in self._objects.keys() - known.keys():
+            self._stream.log(f"scene/objects/{name}", rr.Clear(recursive=False))
+        self._objects = {**known}
+        for thing in objects:
+            self.log_object(thing)
+
+    def log_object(self, thing: ObjectState | WorldObject) -> None:
+        """An object where it is believed to be."""
+        self._objects[thing.name] = thing
+        path = f"scene/objects/{thing.name}"
+        size, kind = thing.geometry.size, thing.geometry.kind
+        w, x, y, z = thing.quaternion
+        color = palette.BALL if thing.role == "target" else palette.TABLE if kind == "box" else palette.OTHER
+        common = {"quaternions": [rr.Quaternion(xyzw=[x, y, z, w])], "colors": [color], "fill_mode": "solid"}
+        if kind == "box":
+            shape: rr.AsComponents = rr.Boxes3D(sizes=[size], centers=[thing.position], **common)
+        elif kind == "sphere":
+            shape = rr.Ellipsoids3D(radii=[size[0]], centers=[thing.position], **common)
+        else:
+            shape = rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[thing.position], **common)
+        self._stream.log(path, rr.CoordinateFrame(ROOT), shape)
+
+    def _log_fields(self, transforms: Array, touched: set[str]) -> None:
+        capsules = [shape for shape in self._fields if shape.kind == "capsule"]
+        spheres = [shape for shape in self._fields if shape.kind == "sphere"]
+        lengths = [shape.size[1] for shape in capsules]
+        turns = np.array([transforms[shape.link, :3, :3] @ shape.rotation for shape in capsules])
+        starts = np.array([_now(transforms, shape) for shape in capsules]) - turns[:, :, 2] * np.array(lengths)[:, None] / 2.0
+        self._stream.log(
+            "scene/fields/capsules",
+            rr.Capsules3D(
+                lengths=lengths,
+                radii=[shape.size[0] for shape in capsules],
+                translations=starts,
+                quaternions=[rr.Quaternion(xyzw=wxyz[[1, 2, 3, 0]]) for wxyz in from_matrix(turns)],
+                colors=[_field_color(shape, touched) for shape in capsules],
+                fill_mode="solid",
+            ),
+        )
+        self._stream.log(
+            "scene/fields/spheres",
+            rr.Ellipsoids3D(
+                radii=[shape.size[0] for shape in spheres],
+                centers=[_now(transforms, shape) for shape in spheres],
+                colors=[_field_color(shape, touched) for shape in spheres],
+                fill_mode="solid",
+            ),
+        )
+
+    def _log_trails(self, transforms: Array) -> None:
+        strips, colors = [], []
+        for name, trail in self._trails.items():
+            marker = self._robot.marker(name)
+            link = transforms[marker.link]
+            trail.append(link[:3, :3] @ marker.position + link[:3, 3])
+            points = np.array(trail)
+            edges = np.linspace(0, len(points) - 1, TRAIL_PIECES + 1).astype(int)
+            for piece, (first, last) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                if last > first:
+                    strips.append(points[first : last + 1])
+                    colors.append((*HANDS[name], round(40 + 215 * (piece + 1) / TRAIL_PIECES)))
+        if strips:
+            self._stream.log("scene/trails", rr.LineStrips3D(strips, colors=colors, radii=0.003))
+
+    def _load_tree(self) -> UrdfTree | None:
+        """Log the iCub's meshes once; None where they are not installed."""
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                path = _plain(write_upper_body_urdf(Path(folder) / "icub.urdf"))
+                tree = UrdfTree.from_file_path(path, entity_path_prefix="robot")
+                tree.log_urdf_to_recording(self._stream)
+                return tree
+        except MobeeError:
+            return None
+
+
+def _plain(path: Path) -> Path:
+    """The same URDF file in neutral colours, for red means contact, and without collision geometry, which would double the data."""
+    tree = defusedxml.ElementTree.parse(path)
+    for color in tree.getroot().iter("color"):
+        red, green, blue, _ = (float(channel) for channel in color.attrib["rgba"].split())
+        if red > 1.5 * max(green, blue):
+            color.set("rgba", palette.COVERS)
+    for link in tree.getroot().iter("link"):
+        for hull in link.findall("collision"):
+            link.remove(hull)
+    tree.write(path)
+    return path
+
+
+def _now(transforms: Array, shape: Shape) -> Array:
+    return transforms[shape.link, :3, :3] @ shape.position + transforms[shape.link, :3, 3]
+
+
+def _field_color(shape: Shape, touched: set[str]) -> tuple[int, int, int, int]:
+    return palette.TOUCHED if shape.name in touched else palette.FIELD

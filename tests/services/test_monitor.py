@@ -1,0 +1,242 @@
+"""The monitor: what it shows, and that nobody else notices it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+
+from bus_schema import keys
+from bus_schema.messages import ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, Transition, WorldObject
+from mobee.kinematics import link_transforms
+from mobee.kinematics.quaternion import to_matrix
+from mobee.robot.load import load_robot
+from tests.services.stage import LOOKING_DOWN, Stage, posture
+
+rr = pytest.importorskip("rerun")
+from services.monitor import palette  # noqa: E402
+from services.monitor.page import program  # noqa: E402
+from services.monitor.scene import Scene  # noqa: E402
+
+ROBOT = load_robot("icub")
+DOWN = posture(ROBOT, LOOKING_DOWN)
+
+
+@pytest.fixture
+def stage(free_port: int) -> Iterator[Stage]:
+    made = Stage(free_port)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ports() -> tuple[int, int]:
+    """Two free ports of loopback."""
+    with socket.socket() as first, socket.socket() as second:
+        for probe in (first, second):
+            probe.bind(("127.0.0.1", 0))
+        return first.getsockname()[1], second.getsockname()[1]
+
+
+def flags(ports: tuple[int, int]) -> list[str]:
+    return ["--web-port", str(ports[0]), "--grpc-port", str(ports[1])]
+
+
+def page_of(monitor: subprocess.Popen[str]) -> psutil.Process:
+    (page,) = psutil.Process(monitor.pid).children()
+    return page
+
+
+class Notebook:
+    """A recording stream that remembers what was logged."""
+
+    def __init__(self) -> None:
+        self.stream = rr.RecordingStream("test")
+        self.logged: dict[str, list[Any]] = {}
+        self.stream.log = self._log
+
+    def _log(self, path: str, *what: Any, static: bool = False) -> None:
+        self.logged.setdefault(path, []).extend(what)
+
+
+def channels(shape: Any) -> list[tuple[int, int, int, int]]:
+    packed = [int(value) for value in shape.colors.as_arrow_array().to_pylist()]
+    return [(value >> 24, value >> 16 & 255, value >> 8 & 255, value & 255) for value in packed]
+
+
+def test_a_field_is_red_while_it_is_in_contact() -> None:
+    notebook = Notebook()
+    scene = Scene(notebook.stream, ROBOT)
+    capsules = [shape.name for shape in ROBOT.shapes if shape.role == "field" and shape.kind == "capsule"]
+    touching = ContactItem(first=capsules[3], second="table", kind="field", depth=0.01, point=[0.0] * 3, normal=[0.0, 0.0, 1.0])
+    scene.log_robot(DOWN, [touching])
+    scene.log_robot(DOWN, [])
+    shown = [item for item in notebook.logged["scene/fields/capsules"] if isinstance(item, rr.Capsules3D)]
+    assert channels(shown[0]) == [palette.TOUCHED if name == capsules[3] else palette.FIELD for name in capsules]
+    assert set(channels(shown[1])) == {palette.FIELD}
+
+
+def test_the_meshes_move_as_the_model_s_links_do(rng: np.random.Generator) -> None:
+    scene = Scene(rr.RecordingStream("test"), ROBOT)
+    assert len(scene.meshes) == 20
+    for _ in range(5):
+        q = rng.uniform(*ROBOT.limits.T)
+        angles = ROBOT.coupling[0] @ q + ROBOT.coupling[1]
+        transforms = link_transforms(ROBOT, q)
+        for link in ("head", "l_hand", "r_hand", "l_forearm"):
+            index = ROBOT.links.index(link)
+            moved = mesh_pose(scene, link, angles) @ np.linalg.inv(mesh_pose(scene, link, np.zeros(len(angles))))
+            np.testing.assert_allclose(moved, transforms[index], atol=1e-4)
+
+
+def mesh_pose(scene: Scene, link: str, angles: np.ndarray) -> np.ndarray:
+    """Pose of a link of the URDF that the viewer has, by the transforms that it is sent."""
+    joints = {joint.child_link: joint for joint in scene.tree.joints()}
+    index = {joint.name: place for joint, place in scene.meshes}
+    pose = np.eye(4)
+    while link in joints:
+        joint = joints[link]
+        sent = joint.compute_transform(float(angles[index[joint.name]]) if joint.name in index else 0.0, clamp=False)
+        step = np.eye(4)
+        x, y, z, w = sent.quaternion.as_arrow_array().to_pylist()[0]
+        step[:3, :3] = to_matrix(np.array([w, x, y, z]))
+        step[:3, 3] = sent.translation.as_arrow_array().to_pylist()[0]
+        pose, link = step @ pose, joint.parent_link
+    return pose
+
+
+def test_trails_follow_the_hands_and_end_with_the_run() -> None:
+    notebook = Notebook()
+    scene = Scene(notebook.stream, ROBOT)
+    for lift in np.linspace(0.0, 40.0, 24):
+        scene.log_robot(posture(ROBOT, {**LOOKING_DOWN, "l_shoulder_roll": 20.0 + lift}), [])
+    last = [item for item in notebook.logged["scene/trails"] if isinstance(item, rr.LineStrips3D)][-1]
+    points = np.vstack([np.array(strip) for strip in last.strips.as_arrow_array().to_pylist()])
+    assert np.ptp(points[points[:, 1] < 0.0], axis=0).max() > 0.1  # the left hand has moved, the right one has not
+    assert np.ptp(points[points[:, 1] > 0.0], axis=0).max() < 0.01
+    scene.forget()
+    scene.log_robot(DOWN, [])
+    assert all(len(strips) < 12 for strips in [last.strips.as_arrow_array().to_pylist()])
+
+
+def whole_chain(stage: Stage) -> Callable[[], None]:
+    """A function that puts one message on every stream that the monitor shows."""
+    motions = {part: stage.publisher(keys.motion(part), Motion) for part in palette.PARTS}
+    forces, contacts = stage.publisher(keys.MODEL_FORCES, Forces), stage.publisher(keys.MODEL_CONTACTS, Contacts)
+    images = {eye: stage.publisher(keys.image(eye), Image) for eye in keys.EYES}
+    transitions = {part: stage.publisher(keys.transition(part), Transition) for part in palette.PARTS}
+    ball, events = stage.publisher(keys.world("ball"), WorldObject), stage.publisher(keys.event("stage"), Event)
+
+    def put() -> None:
+        for part, stream in motions.items():
+            at = [0.1] * len(ROBOT.part(part))
+            about = {"action_id": "a", "epoch": 1, "status": "moving", "since_k": 0, "start_k": 0, "touched": []}
+            stream.put(**about, q=at, dq=at, ddq=at, goal=at)
+        zeros = [0.0] * len(ROBOT.motors)
+        forces.put(re_k=stage.k, limits=zeros, constraints=zeros, collision=zeros, part_age={}, touched={})
+        contacts.put(re_k=stage.k, contacts=[])
+        for eye, stream in images.items():
+            stream.put(eye=eye, k_capture=stage.k, width=16, height=12, encoding="rgb8", data=bytes(16 * 12 * 3))
+        for part, stream in transitions.items():
+            counts = {"n": 1, "s": 0, "a": 0, "goal": 1, "s_next": 1}
+            stream.put(agent=part, **counts, reward=0.5, value=1.0, settled=True, duration=4.0, touched=[])
+        pose = {"position": [-0.35, 0.0, -0.07], "quaternion": [1.0, 0.0, 0.0, 0.0], "covariance": [0.0] * 9}
+        ball.put(name="ball", geometry=Geometry("sphere", [0.03]), **pose, role="target", t_capture=0, valid_until=10**12)
+        events.put(level="warning", code="note", text="hello", values={})
+
+    return put
+
+
+def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: Path) -> None:
+    put = whole_chain(stage)
+    with stage.running("services.monitor", "monitor", "--no-serve", "--run-dir", str(tmp_path)):
+
+        def busy() -> bool:
+            if stage.k % 10 == 0:
+                put()
+            return stage.k > 150
+
+        assert stage.play(DOWN, busy)
+        stat = stage.stat("monitor")
+        assert stat.numbers["transitions"] > 0
+        assert stat.numbers["looks"] <= 1.5 * 20 + 20  # 20 Hz at most
+    private = {**os.environ, "XDG_CONFIG_HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path)}
+    command = [program(), "rrd", "stats", str(tmp_path / "recording.rrd")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=private)
+    shown = {line.split(":")[0] for line in done.stdout.splitlines() if line.startswith("/")}
+    wanted = {"/robot/joints", "/scene/fields/capsules", "/scene/fields/spheres", "/scene/trails", "/scene/objects/ball", "/events"}
+    wanted |= {"/eyes/left", "/eyes/right", "/plots/forces", "/plots/reward/torso", "/plots/value/left_arm", "/plots/transitions/right_arm"}
+    wanted |= {f"/plots/joints/{part}" for part in palette.PARTS}
+    assert wanted - shown == set()
+    assert any("mesh/l_hand/visual" in path or "l_hand" in path and "visual" in path for path in shown)
+
+
+def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published(stage: Stage, ports: tuple[int, int]) -> None:
+    heard: set[str] = set()
+    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
+        watch = stage.session.declare_subscriber("**", lambda sample: heard.add(str(sample.key_expr)))
+        assert stage.play(DOWN, lambda: stage.k > 100)
+        with urllib.request.urlopen(f"http://127.0.0.1:{ports[0]}/", timeout=5.0) as answer:
+            assert b"<html" in answer.read(2000).lower()
+        listening = {c.laddr for c in page_of(monitor).net_connections("tcp") if c.status == psutil.CONN_LISTEN}
+        assert {address.port for address in listening} == set(ports)
+        assert {address.ip for address in listening} == {"127.0.0.1"}
+        own = [c for c in psutil.Process(monitor.pid).net_connections("tcp") if c.status == psutil.CONN_LISTEN]
+        assert own == []
+        watch.undeclare()
+    others = {keys.CLOCK, keys.SIM_TRUTH} | {keys.state(part) for part in ROBOT.parts}
+    assert heard - others <= {keys.event("monitor")}
+
+
+def test_a_frozen_page_does_not_stop_the_monitor(stage: Stage, ports: tuple[int, int]) -> None:
+    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
+        page = page_of(monitor)
+        assert stage.play(DOWN, lambda: stage.k > 50)
+        page.suspend()
+        try:
+            before, memory = stage.stat("monitor").numbers["looks"], psutil.Process(monitor.pid).memory_info().rss
+            assert stage.play(DOWN, lambda: stage.k > 450)
+            assert stage.stat("monitor").numbers["looks"] - before > 20
+            assert psutil.Process(monitor.pid).memory_info().rss - memory < 50_000_000
+        finally:
+            page.resume()
+
+
+def test_page_and_monitor_end_together(stage: Stage, ports: tuple[int, int]) -> None:
+    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
+        page = page_of(monitor)
+        os.kill(monitor.pid, signal.SIGKILL)
+        page.wait(5.0)
+    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:  # the ports are free again
+        page_of(monitor).kill()
+        assert monitor.wait(5.0) == 1
+
+
+@pytest.mark.parametrize("taken", [0, 1])
+def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, ports: tuple[int, int], taken: int) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", ports[taken]))
+        other.listen()
+        command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", *flags(ports)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert f"{('web_port', 'grpc_port')[taken]} {ports[taken]} is in use" in done.stderr
+    assert "mobee stop" in done.stderr
+
+
+def test_a_missing_run_dir_is_told(free_port: int, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", "--run-dir", str(tmp_path / "none")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert "is not a folder" in done.stderr
