@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Collection
 from pathlib import Path
@@ -34,12 +35,14 @@ class Screen:
         """The whole screen again, over the one before; nothing in a pipe."""
         if not self._terminal:
             return
-        columns = min(shutil.get_terminal_size().columns, 100)
+        columns, rows = shutil.get_terminal_size()
         lines = [f"mobee: {self._title}   up {_clock(time.monotonic() - self._started)}", f"run    {directory}"]
         lines += [f"page   {page}" for page in _pages(children)]
         lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  says"]
         lines += [_row(child) for child in children]
-        lines += ["", *self._news, "" if last else "Ctrl-C stops everything."]
+        news = [line for text in self._news for line in textwrap.wrap(text, columns - 1, subsequent_indent=" " * 9)]
+        lines += ["", *news, "" if last else "Ctrl-C stops everything."]
+        lines = lines[: rows - 1]  # what scrolled away could not be drawn over
         text = "".join(f"\x1b[2K{_paint(line[: columns - 1])}\n" for line in lines)
         up = f"\x1b[{self._height}A" if self._height else ""
         sys.stderr.write(f"{up}{text}\x1b[J")
