@@ -1,8 +1,9 @@
-"""What must be right before anything is started: installed packages, robot and world files."""
+"""What must be right before anything is started: installed packages, free ports, robot and world files."""
 
 from __future__ import annotations
 
 import importlib.util
+import socket
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -15,6 +16,10 @@ from services.launcher.scenario import Part, Scenario
 
 class MissingExtra(Exception):
     """A package that a service needs is not installed; the message holds the remedy."""
+
+
+class PortInUse(Exception):
+    """A port on which a service wants to listen is taken; the message holds the remedy."""
 
 
 def check_extras(scenario: Scenario) -> None:
@@ -35,6 +40,27 @@ def _remedy(package: str, extra: str) -> str:
             "mobee launch kinematic"
         )
     return f": pip install 'mobee[{extra}]'"
+
+
+def check_ports(scenario: Scenario) -> None:
+    """Raise PortInUse for the first `..._port` setting whose port on the loopback interface is taken."""
+    for part in scenario.parts:
+        for name in part.config.__struct_fields__:
+            if name.endswith("_port") and not _is_free(port := getattr(part.config, name)):
+                raise PortInUse(
+                    f"port {port} of {part.who} is in use: choose another with --set services.{part.who}.{name}=..., "
+                    f"or leave {part.who} out with --headless"
+                )
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as servers do: connections just closed do not count
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
 
 
 def check_robots(scenario: Scenario) -> None:

@@ -20,7 +20,7 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
-from services.launcher.checks import MissingExtra, check_extras, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_ports, check_robots
 from services.launcher.child import Program
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
@@ -54,11 +54,12 @@ def launch(options: Options) -> int:
         scenario = read_scenario(options.scenario, options.settings, leave_out=["monitor"] if options.headless else [])
         check_robots(scenario)
         check_extras(scenario)
+        check_ports(scenario)
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
         session = open_router(endpoint)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (MissingExtra, BusUnreachable) as error:
+    except (MissingExtra, PortInUse, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)

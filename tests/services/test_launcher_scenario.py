@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib.util
+import socket
 import sys
 import tomllib
 from pathlib import Path
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.common.config import ConfigError
-from services.launcher.checks import MissingExtra, check_extras, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_ports, check_robots
 from services.launcher.scenario import read_scenario, shipped
 from services.launcher.toml import to_toml
 from tests.services.launched import mobee, toys
@@ -173,6 +174,16 @@ def test_on_a_newer_python_the_motor_model_is_offered(monkeypatch: pytest.Monkey
 def test_the_kinematic_robot_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     check_extras(read_scenario("kinematic"))
+
+
+def test_a_port_in_use_is_named_with_its_remedy() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        setting = f"services.monitor.web_port={taken.getsockname()[1]}"
+        with pytest.raises(PortInUse, match="--set services.monitor.web_port="):
+            check_ports(read_scenario("default", [setting]))
+        check_ports(read_scenario("default", [setting], leave_out=["monitor"]))
 
 
 def test_another_program_may_take_the_place_of_a_service(tmp_path: Path) -> None:
