@@ -188,7 +188,9 @@ class _Run:
         with contextlib.suppress(OSError):  # a disk that is full now does not make the run a failure
             (self._directory / "summary.json").write_text(text + "\n")
         print(text if self._options.json else as_text(summary), flush=True)
-        return FAILED if self._supervisor.faults or (ready is None and not self._stop_asked) else OK
+        if self._supervisor.bad_settings:
+            return BAD_INPUT
+        return FAILED if self._supervisor.faults else OK
 
 
 def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None:

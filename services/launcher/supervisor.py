@@ -34,6 +34,7 @@ class Supervisor:
         self.children = {program.who: Child(program) for program in programs}
         self.faults: list[str] = []  # one line each
         self.stopped_robot = False  # a vital service was given up
+        self.bad_settings = False  # a service was given up since it cannot use them
         self._service, self._tell, self._stopping = service, tell, False
         self._estop = service.bus.publisher(keys.ESTOP, EStop, STOP)
         service.on_alive(self._note_token)
@@ -138,6 +139,7 @@ class Supervisor:
             child.enter("ended")
         elif code == BAD_INPUT:
             child.kill()
+            self.bad_settings = True
             self._give_up(child, f"cannot use its settings: {child.last_words()}")
         elif code < 0:
             self._fail(child, f"was killed by {signal.Signals(-code).name}")
