@@ -1,0 +1,162 @@
+"""A whole system, launched as a user launches it, and a client that watches it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from bus_schema import decode, keys
+from bus_schema.messages import Clock, Event, Message, Motion, State
+from bus_schema.rpc import Empty, Stat
+from services.common import rpc
+from services.common.session import open_client
+
+PARTS = ("torso", "head", "left_arm", "right_arm")
+AGENTS = ("torso", "left_arm", "right_arm")
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@dataclass
+class Launch:
+    """A launcher process."""
+
+    process: subprocess.Popen[str]
+    endpoint: str
+    runs: Path
+    errors: Path
+
+    @property
+    def run_dir(self) -> Path:
+        return next(self.runs.iterdir())
+
+    def log(self, who: str) -> str:
+        path = self.run_dir / "logs" / f"{who}.log"
+        return path.read_text() if path.exists() else ""
+
+    def summary(self, timeout: float) -> dict[str, Any]:
+        """Wait for the end of a run with a duration; its summary."""
+        out, _ = self.process.communicate(timeout=timeout)
+        assert self.process.returncode == 0, self.errors.read_text()[-3000:]
+        return dict(json.loads(out))
+
+
+def launch(folder: Path, scenario: str, *settings: str, headless: bool = True, duration: float | None = None) -> Launch:
+    endpoint, runs, errors = free_endpoint(), folder / "runs", folder / "launcher.err"
+    argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", endpoint, "--runs", str(runs), "--json"]
+    argv += ["--headless"] if headless else []
+    argv += ["--duration", str(duration)] if duration else []
+    for setting in settings:
+        argv += ["--set", setting]
+    with errors.open("w") as sink:
+        process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=sink, text=True, start_new_session=True)
+    return Launch(process, endpoint, runs, errors)
+
+
+@contextmanager
+def running(folder: Path, scenario: str, *settings: str, headless: bool = True) -> Iterator[tuple[Launch, Watcher]]:
+    """A system that is ready, and one who watches it; stopped as by Ctrl-C afterwards."""
+    system = launch(folder, scenario, *settings, headless=headless)
+    try:
+        until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 60.0, "the system is ready")
+        assert system.process.poll() is None, system.errors.read_text()[-3000:]
+        with Watcher(system.endpoint) as watcher:
+            yield system, watcher
+    finally:
+        if system.process.poll() is None:
+            system.process.send_signal(signal.SIGINT)
+        try:
+            system.process.communicate(timeout=20.0)
+        except subprocess.TimeoutExpired:
+            os.killpg(system.process.pid, signal.SIGKILL)
+            raise
+
+
+def until(condition: Callable[[], Any], timeout: float, what: str) -> Any:
+    """The condition's first true value; fails with `what` after the timeout."""
+    give_up = time.monotonic() + timeout
+    while time.monotonic() < give_up:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.005)
+    raise AssertionError(f"not within {timeout:g} s: {what}")
+
+
+@dataclass
+class Watcher:
+    """Listens to clock, states, motions and events, with the tick at which each came."""
+
+    endpoint: str
+    clock: Clock | None = None
+    states: dict[str, list[State]] = field(default_factory=lambda: {part: [] for part in PARTS})
+    motions: dict[str, list[Motion]] = field(default_factory=lambda: {part: [] for part in PARTS})
+    events: list[Event] = field(default_factory=list)
+
+    def __enter__(self) -> Watcher:
+        self.session = open_client(self.endpoint)
+        self._subscriptions = [self.session.declare_subscriber(keys.CLOCK, self._note_clock)]
+        for part in PARTS:
+            self._subscribe(keys.state(part), State, self.states[part])
+            self._subscribe(keys.motion(part), Motion, self.motions[part])
+        self._subscribe(keys.ALL_EVENTS, Event, self.events)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.session.close()
+
+    def _subscribe(self, key: str, cls: type[Message], into: list[Any]) -> None:
+        def note(sample: zenoh.Sample) -> None:
+            into.append(decode(cls, sample.payload.to_bytes(), str(sample.encoding)))
+
+        self._subscriptions.append(self.session.declare_subscriber(key, note))
+
+    def _note_clock(self, sample: zenoh.Sample) -> None:
+        self.clock = decode(Clock, sample.payload.to_bytes(), str(sample.encoding))
+
+    @property
+    def k(self) -> int:
+        return -1 if self.clock is None else self.clock.k
+
+    @property
+    def run(self) -> str:
+        return "" if self.clock is None else self.clock.run
+
+    def stat(self, who: str) -> Stat:
+        return rpc.call(self.session, "watcher", keys.service_rpc(who, "stat"), Empty, Stat, timeout=2.0)
+
+    def speed(self, part: str) -> float:
+        """Fastest motor of the part now, rad/s."""
+        seen = self.states[part]
+        return max((abs(v) for v in seen[-1].dq), default=0.0) if seen else 0.0
+
+    def wait_moving(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 40.0) -> None:
+        until(lambda: all(self.speed(part) > faster for part in parts), timeout, f"{', '.join(parts)} move")
+
+
+def transitions(run_dir: Path) -> dict[str, list[tuple[Any, ...]]]:
+    """All transitions on disk, by agent."""
+    import sqlite3
+
+    with sqlite3.connect(f"file:{run_dir}/transitions.sqlite?mode=ro", uri=True) as database:
+        rows = database.execute("SELECT agent, n, s, a, s_next, reward, settled, duration FROM transitions ORDER BY agent, n").fetchall()
+    found: dict[str, list[tuple[Any, ...]]] = {agent: [] for agent in AGENTS}
+    for agent, *row in rows:
+        found[agent].append(tuple(row))
+    return found

@@ -1,0 +1,43 @@
+"""The issue's first run: the iCub at the table, three curious agents, everything but the monitor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.system.live import AGENTS, launch
+
+pytestmark = pytest.mark.system
+
+
+def test_two_minutes_at_the_table(tmp_path: Path) -> None:
+    summary = launch(tmp_path, "default", duration=120).summary(timeout=200)
+    print(summary_line(summary))
+    for agent in AGENTS:
+        assert summary["agents"][agent]["transitions"] >= 12
+        assert 2.0 < summary["agents"][agent]["mean_action_time_s"] < 10.0
+    assert summary["table_contact_ticks"] >= 20
+    assert summary["pairs_watched"] > 50
+    assert summary["deepest_solid_contact_m"] <= 0.010
+    assert summary["closest_gap_m"] is not None
+    assert not any(summary["restarts"].values())
+
+
+def test_without_contact_forces_solids_touch(tmp_path: Path) -> None:
+    summary = launch(tmp_path, "default", "services.model.contact_forces=false", duration=75).summary(timeout=150)
+    print(summary_line(summary))
+    assert summary["solid_contact_ticks"] > 0
+    assert summary["deepest_solid_contact_m"] > 0.0005
+
+
+def test_at_200_hertz(tmp_path: Path) -> None:
+    summary = launch(tmp_path, "default", "services.robot_sim.rate=200", duration=20).summary(timeout=90)
+    print(summary_line(summary))
+    assert summary["ticks"] > 3000
+    assert summary["command_age_ticks"]["p50"] <= 2
+
+
+def summary_line(summary: dict[str, object]) -> str:
+    names = ("agents", "table_contact_ticks", "closest_gap_m", "deepest_solid_contact_m", "pairs_watched", "command_age_ticks")
+    return "; ".join(f"{name} {summary[name]}" for name in (*names, "hold_ticks", "missed_ticks", "rejected_commands"))
