@@ -74,9 +74,10 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
         held.append((first.k - k) * 0.01)
         rested.append((rest.k - k) * 0.01)
         way.append(float(np.abs(np.subtract(rest.q, start.q)).max()))
+    degrees = np.rad2deg(way)
     print(
-        f"{who} killed: holds after {np.median(held):.3f} s median, {max(held):.3f} s worst; at rest after {np.median(rested):.3f} s "
-        f"median, {max(rested):.3f} s worst; stopping distance {np.rad2deg(np.median(way)):.2f} deg median, {np.rad2deg(max(way)):.2f} worst"
+        f"{who} killed (median, worst): holds after {np.median(held):.3f}, {max(held):.3f} s; at rest after {np.median(rested):.3f}, "
+        f"{max(rested):.3f} s; stopping distance {np.median(degrees):.2f}, {max(degrees):.2f} deg"
     )
     assert max(held) <= limit
     assert max(rested) <= limit + 0.2  # 60 deg/s at 600 deg/s^2 is 0.1 s, and the motors' delay and lag
