@@ -32,28 +32,12 @@ class BulletBackend:
         self._substeps = parameters.substeps(dt)
         self._substep = dt / self._substeps
         self._listed = load_solid_pairs()
-        self._scene: BulletScene | None = None
-        self.reset(seed)
+        self._build(seed)
 
     def reset(self, seed: int) -> None:
         """Back home, at rest, in hold, the world as it was."""
-        if self._scene is not None:
-            self._scene.close()
-        self.world = self._load_world()
-        self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
-        self._scene = scene = BulletScene(self._robot, self.world, self._substep)
-        scene.set_posture(self._robot.home)
-        self._obstacles = [name for name, thing in self.world.objects.items() if thing.role == "obstacle"]
-        others = [name for name in self.world.objects if name not in self._obstacles]
-        links, against = self._listed.links(), self._listed.against_table()
-        watched = [(link, obstacle) for link in against for obstacle in self._obstacles]
-        scene.watch(links, watched + [(link, other) for link in scene.links for other in others])
-        self.pairs_watched = len(links) + len(watched)
-        self._names = {index: name for name, index in scene.links.items()}
-        driven = self._robot.limits[scene.motors]
-        self._lower, self._upper = driven[:, 0], driven[:, 1]
-        self._forces = [self._robot.motor_table[motor].max_torque for motor in scene.motors]
-        self._contact = NO_CONTACT
+        self._scene.close()
+        self._build(seed)
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s], the same as at the start."""
@@ -76,6 +60,23 @@ class BulletBackend:
         links = [link for link in self._scene.links if link.endswith(TOUCHING)]
         gaps = [self._scene.distance(link, obstacle, FAR) for link in links for obstacle in self._obstacles]
         return max(min(gaps), 0.0) if gaps else -1.0
+
+    def _build(self, seed: int) -> None:
+        self.world = self._load_world()
+        self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
+        self._scene = scene = BulletScene(self._robot, self.world, self._substep)
+        scene.set_posture(self._robot.home)
+        self._obstacles = [name for name, thing in self.world.objects.items() if thing.role == "obstacle"]
+        others = [name for name in self.world.objects if name not in self._obstacles]
+        links, against = self._listed.links(), self._listed.against_table()
+        watched = [(link, obstacle) for link in against for obstacle in self._obstacles]
+        scene.watch(links, watched + [(link, other) for link in scene.links for other in others])
+        self.pairs_watched = len(links) + len(watched)
+        self._names = {index: name for name, index in scene.links.items()}
+        driven = self._robot.limits[scene.motors]
+        self._lower, self._upper = driven[:, 0], driven[:, 1]
+        self._forces = [self._robot.motor_table[motor].max_torque for motor in scene.motors]
+        self._contact = NO_CONTACT
 
     def _advance(self, h: float) -> None:
         scene, motors = self._scene, self.motors

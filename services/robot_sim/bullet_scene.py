@@ -17,6 +17,7 @@ from mobee.robot.robot import Array, Robot
 from services.robot_sim.backend import BackendUnavailable
 
 GRAVITY = -9.81  # m/s^2
+SIMULATED = "icub"  # the robot that the URDF describes
 BASE = -1  # PyBullet's index of the base link
 
 
@@ -29,6 +30,11 @@ class BulletScene:
 
     def __init__(self, robot: Robot, world: World, substep: float) -> None:
         """`substep`: s.  Raises BackendUnavailable for a robot that the URDF does not describe."""
+        if robot.name != SIMULATED:
+            raise BackendUnavailable(
+                f"the pybullet back-end simulates the robot {SIMULATED!r} only, not {robot.name!r}: there is no URDF of it. "
+                'Use the kinematic back-end: backend = "kinematic".'
+            )
         self.client = BulletClient(pybullet.DIRECT)
         self.client.setPhysicsEngineParameter(fixedTimeStep=substep, numSubSteps=1, deterministicOverlappingPairs=1)
         self.client.setGravity(0.0, 0.0, GRAVITY)
@@ -40,13 +46,6 @@ class BulletScene:
             self.links[info[12].decode()] = index
             if info[2] == pybullet.JOINT_REVOLUTE:
                 joints[info[1].decode()] = index
-        missing = sorted(set(joints) - set(robot.motors))
-        if missing:
-            self.close()
-            raise BackendUnavailable(
-                f"the pybullet back-end simulates the robot 'icub' only: {robot.name!r} has no motor {missing[0]!r}. "
-                'Use the kinematic back-end: backend = "kinematic".'
-            )
         driven = [(i, joints[name]) for i, name in enumerate(robot.motors) if name in joints]
         self.motors = np.array([motor for motor, _ in driven])
         self.joints = [joint for _, joint in driven]

@@ -167,11 +167,6 @@ class Gate:
         self.mode, self.seq, self.age = command.mode, command.seq, k - command.re_k
         return self._shaped(command.mode, current.reference, q)
 
-    @property
-    def applied_velocity(self) -> Array:
-        """What is asked of the motors in velocity and position mode now, (n,) rad/s."""
-        return self._shaper.velocity
-
     def _shaped(self, mode: Mode, reference: Array, q: Array) -> Drive:
         if mode == "velocity":
             return Drive(mode, self._shaper.to_velocity(reference, q))

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.robot_sim.backend import SolidContact
+from services.robot_sim.counters import Counters
+from services.robot_sim.stops import Stops
+from tests.services.robot_sim.gated import Gated
+
+
+def test_the_oldest_command_of_a_tick_counts_and_holds_are_counted_apart() -> None:
+    counters, fresh, old = Counters(), Gated().owned(), Gated().owned()
+    idle = Gated()
+    for _ in range(10):
+        fresh.command()
+        if fresh.k == 0:
+            old.command(ttl=95)
+        for gated in (fresh, old):
+            gated.tick()
+        counters.count_gates([fresh.gate, old.gate, idle.gate])
+    numbers = counters.numbers(missed=0, pairs_watched=3)
+    assert counters.ages == {age: 1 for age in range(1, 10)} | {1: 2}  # in the last tick `old` holds
+    assert (numbers["armed_ticks"], numbers["hold_ticks"], numbers["ticks"]) == (9, 1, 10)
+    assert (numbers["age_p50"], numbers["age_p99"], numbers["age_max"]) == (4, 9, 9)
+
+
+def test_without_a_command_there_is_no_age() -> None:
+    counters = Counters()
+    counters.count_gates([Gated().gate])
+    numbers = counters.numbers(0, 0)
+    assert (numbers["age_p99"], numbers["age_max"], numbers["armed_ticks"], numbers["hold_ticks"]) == (-1, -1, 0, 0)
+
+
+def test_the_deepest_contact_and_the_closest_gap_are_kept() -> None:
+    counters = Counters()
+    for depth in (0.0, 0.002, 0.001):
+        counters.count_contact(SolidContact(depth, "l_hand table"))
+    for gap in (-1.0, 0.3, 0.1, -1.0):
+        counters.count_gap(gap)
+    numbers = counters.numbers(0, 0)
+    assert (numbers["solid_depth_max"], numbers["solid_ticks"], numbers["gap_min"]) == (0.002, 2, 0.1)
+
+
+def test_a_stop_is_timed_from_the_last_tick_under_command_to_rest() -> None:
+    stops, q = Stops(), np.zeros(3)
+    stops.obeys("torso", 0, q, np.array([0.5, 0.0, 0.0]))
+    stops.obeys("torso", 10_000_000, q, np.array([0.5, 0.0, 0.0]))
+    assert stops.look("torso", 20_000_000, q + 0.01, np.array([0.2, 0.0, 0.0])) is None
+    assert stops.look("torso", 40_000_000, q + 0.02, np.zeros(3)) == pytest.approx((0.03, 0.02))
+    assert stops.look("torso", 50_000_000, q + 0.02, np.zeros(3)) is None
+    assert stops.count == 1
+
+
+def test_a_part_that_rested_under_command_does_not_stop() -> None:
+    stops = Stops()
+    stops.obeys("torso", 0, np.zeros(3), np.full(3, 0.5))
+    stops.obeys("torso", 10_000_000, np.zeros(3), np.zeros(3))
+    assert stops.look("torso", 20_000_000, np.zeros(3), np.zeros(3)) is None
