@@ -1,0 +1,55 @@
+"""What the robot touches, in a world whose objects come and go."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import mobee
+
+robot = mobee.load_robot("icub")
+world = mobee.load_world("table")
+model = mobee.Model(robot, world)
+
+
+def show(what: str, q: np.ndarray) -> None:
+    """Print the contacts of a pose: solids are the bodies themselves, fields the volumes around them."""
+    pose = model.evaluate(q)
+    print(f"{what}: {pose.count} solid contacts, {len(pose.contacts) - pose.count} of fields")
+    for contact in pose.contacts[:2]:
+        print(f"    {contact.kind} {contact.first} in {contact.second}: {1000 * contact.depth:.0f} mm, way out {contact.normal.round(2)}")
+
+
+print("the world:", ", ".join(f"{thing.name} ({thing.kind}, {thing.role})" for thing in world.objects.values()))
+show("at home", robot.home)
+
+low = robot.home.copy()
+low[robot.motor_index("l_shoulder_pitch")] = np.deg2rad(-20)
+show("left hand low", low)
+
+# Objects come: here a post where the hand is.
+palm = model.evaluate(robot.home).position("left_palm")
+world.add("post", mobee.cylinder(0.02, 0.3), position=palm, color=(0.2, 0.3, 0.8))
+show("a post at the left palm", robot.home)
+
+# A ghost is only shown; it touches nothing.
+world.set_role("post", "ghost")
+show("the post as a ghost", robot.home)
+
+# A target is an obstacle for all but the hand that reaches for it.
+world.set_role("post", "target")
+model.reaching = "left_palm"
+show("the post as the palm's target", robot.home)
+model.reaching = None
+
+# An attached object moves with a link, and does not touch it.
+world.attach("post", "l_hand")
+model.evaluate(low)
+world.detach("post")
+print(f"carried and let go, the post is at {world.objects['post'].position.round(3)} m")
+
+world.remove("post")
+print(f"removed; {world.version} edits so far. Other threads may edit while the model evaluates.")
+
+# Learning asks for counts of many poses at once.
+counts = model.evaluate(np.random.default_rng(0).uniform(*robot.limits.T, size=(50, len(robot.motors)))).count
+print(f"of 50 random poses {np.count_nonzero(counts)} are in solid contact")
