@@ -86,11 +86,14 @@ class Service:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         try:
             _ignore_signals()
-            if error is not None and not isinstance(error, SystemExit):
-                is_mistake = isinstance(error, MobeeError) and not self._is_ready  # its text says all; see entry.py
-                self.log.error("ended by %s", error, exc_info=None if is_mistake else error)
+            if error is not None and not isinstance(error, SystemExit) and not self._says_all(error):
+                self.log.error("ended by %s", error, exc_info=error)
         finally:  # even if a signal came in between
             self.bus.session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
+
+    def _says_all(self, error: BaseException) -> bool:
+        """Whether its text is enough for a person (entry.py prints it); a wrong value once all runs is a fault of ours."""
+        return type(error) is MobeeError or (isinstance(error, MobeeError) and not self._is_ready)
 
     def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
         """Have the newest message of a stream handled; older ones waiting are overwritten."""

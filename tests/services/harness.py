@@ -370,13 +370,15 @@ class FakeController:
         self.miss = 0.0  # rad by which every motor misses its goal
         self.touched: list[str] = []
         self.goals: list[Goal] = []
-        self.answers_goals = True
+        self.loses_answers = 0  # how many answers to goals get lost on the way
+        self.on_goal: Callable[[Goal], None] = lambda goal: None
+        self.takes = 0
         limits = rig.robot.limits[rig.robot.part(part).slice]
         self.q = limits.mean(axis=1)
         self.epoch, self.owner = 1000, ""
         self.status, self.action_id, self.since_k, self.start_k = "idle", "", 0, 0
         self._target = self.q
-        self._requests: dict[str, Reply] = {}
+        self._started: dict[str, Started] = {}  # by request
         self._lock = threading.RLock()
         self._clock = rig.bus.publisher(keys.CLOCK, Clock, LATEST)
         self._motion = rig.bus.publisher(keys.motion(part), Motion, LATEST)
@@ -450,7 +452,7 @@ class FakeController:
         with self._lock:
             if self.owner not in ("", request.instance) and (request.who, self.owner) in self.rig.alive:
                 raise Refusal("owned")
-            self.owner, self.epoch = request.instance, self.epoch + 1
+            self.owner, self.epoch, self.takes = request.instance, self.epoch + 1, self.takes + 1
             return Taken(v=VERSION, epoch=self.epoch)
 
     def _goal(self, request: Goal, key: str) -> Started:
@@ -459,9 +461,16 @@ class FakeController:
                 raise Refusal("epoch")
             if self.status == "held":
                 raise Refusal("held")
-            self.goals.append(request)
-            if not self.answers_goals:
+            if request.id not in self._started:
+                self._start(request)
+            if self.loses_answers:
+                self.loses_answers -= 1
                 raise Refusal("no_answer")
-            self.action_id, self._target, self.start_k = request.action_id, np.array(request.q), self.rig.bus.k
-            self._become("moving")
-            return Started(v=VERSION, k=self.rig.bus.k)
+            return self._started[request.id]
+
+    def _start(self, request: Goal) -> None:
+        self.goals.append(request)
+        self.on_goal(request)
+        self.action_id, self._target, self.start_k = request.action_id, np.array(request.q), self.rig.bus.k
+        self._become("moving")
+        self._started[request.id] = Started(v=VERSION, k=self.rig.bus.k)
