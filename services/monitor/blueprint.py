@@ -14,15 +14,16 @@ WINDOW = 30.0  # s of plot
 def blueprint() -> rrb.Blueprint:
     """The robot large, its pictures and the log below it, plots on the right, no side panels."""
     left = rrb.Vertical(_scene(), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
-    plots = [_plot(part, f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
+    plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
     learning = rrb.Tabs(
-        _plot("reward", "intrinsic reward, nats", "plots/reward"),
-        _plot("value", "value of the state", "plots/value"),
-        _plot("transitions", "transitions", "plots/transitions"),
+        _plot("reward, nats", "plots/reward"),
+        _plot("value", "plots/value"),
+        _plot("transitions", "plots/transitions"),
     )
-    right = rrb.Vertical(*plots, _plot("forces", "forces by kind, norm, rad/s²", "plots/forces"), learning)
+    forces = _plot("forces, rad/s²", "plots/forces")
+    right = rrb.Vertical(*plots, rrb.Horizontal(forces, learning), row_shares=[1, 1, 1, 0.9])
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[1.9, 1]),
+        rrb.Horizontal(left, right, column_shares=[1.75, 1]),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TopPanel(state="hidden"),
@@ -53,7 +54,7 @@ def _log() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/events", name="events", columns=columns)
 
 
-def _plot(name: str, title: str, origin: str) -> rrb.TimeSeriesView:
+def _plot(title: str, origin: str) -> rrb.TimeSeriesView:
     window = rrb.VisibleTimeRange(
         TIMELINE, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-WINDOW), end=rrb.TimeRangeBoundary.cursor_relative()
     )

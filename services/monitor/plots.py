@@ -24,7 +24,7 @@ class Plots:
             colors = palette.JOINTS[: len(motors)]
             goals = [palette.faded(color, 0.6) for color in colors]
             widths = [1.6] * len(motors) + [0.8] * len(motors)
-            self._style(f"joints/{part}", [*colors, *goals], widths, names + [""] * len(motors))
+            self._style(f"joints/{part}", [*colors, *goals], widths, names + ["goal"] * len(motors))
         self._style("forces", list(palette.FORCES.values()), [1.4] * len(palette.FORCES), list(palette.FORCES))
         for quantity in LEARNED:
             for part, color in palette.PARTS.items():

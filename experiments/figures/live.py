@@ -1,0 +1,143 @@
+"""The picture of the running system: starts the default scenario, opens its page in headless Chromium, takes a screenshot.
+
+`python -m experiments.figures.live` writes docs/figures/live.png in about a minute and a half.  Chromium draws in software
+here and would starve the robot: it runs at the lowest priority and on one core (2 cores are enough for both).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser")
+DRAW_IN_SOFTWARE = (
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+)
+SIZE = {"width": 1280, "height": 800}
+DRAWN = 120_000  # bytes: a page without its scene packs into less
+READY = 60.0  # s for the system to come up
+PATIENCE = 120.0  # s for the first picture
+FIGURES = Path(__file__).parents[2] / "docs" / "figures"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Take the screenshots; returns 0, or 1 with one line that says what is missing."""
+    options = _options(argv)
+    chromium = find_chromium()
+    if chromium is None:
+        print("live picture: no Chromium. Install it: apt-get install chromium", file=sys.stderr)
+        return 1
+    options.out.mkdir(parents=True, exist_ok=True)
+    with _attached(options.url) if options.url else _launched(options.scenario, options.set) as url:
+        step_back()
+        for path in take(url, chromium, options.out, options.shots, options.gap, options.warm_up):
+            print(path)
+    return 0
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Take a picture of the running system.")
+    parser.add_argument("--url", default="", help="page of a system that runs already")
+    parser.add_argument("--scenario", default="default", help="what to start otherwise")
+    parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", help="change a setting of the scenario")
+    parser.add_argument("--shots", type=int, default=1)
+    parser.add_argument("--gap", type=float, default=10.0, help="s between two shots")
+    parser.add_argument("--warm-up", type=float, default=45.0, help="s from the first picture to the first shot")
+    parser.add_argument("--out", type=Path, default=FIGURES, help="folder for live.png, or live-1.png, live-2.png, ...")
+    return parser.parse_args(argv)
+
+
+def find_chromium() -> str | None:
+    """The system's Chromium, if there is one."""
+    return next((path for path in CHROMIUM if Path(path).exists()), shutil.which("chromium"))
+
+
+def step_back() -> None:
+    """From here on this process and its children take only time that is left over on one core."""
+    os.nice(19)
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def take(url: str, chromium: str, folder: Path, shots: int, gap: float, warm_up: float) -> Iterator[Path]:
+    """Screenshots of the page at `url`, `gap` seconds apart."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAW_IN_SOFTWARE))
+        page = browser.new_page(viewport=SIZE, color_scheme="dark")
+        page.goto(f"{url}&renderer=webgl")
+        give_up = time.monotonic() + PATIENCE
+        while len(page.screenshot(timeout=0)) < DRAWN:
+            if time.monotonic() > give_up:
+                raise SystemExit(f"live picture: the page at {url} drew no scene within {PATIENCE:g} s")
+            time.sleep(2.0)
+        time.sleep(warm_up)
+        for shot in range(1, shots + 1):
+            path = folder / ("live.png" if shots == 1 else f"live-{shot}.png")
+            page.screenshot(path=path, timeout=0)
+            yield path
+            if shot < shots:
+                time.sleep(gap)
+        browser.close()
+
+
+@contextmanager
+def _attached(url: str) -> Iterator[str]:
+    yield url
+
+
+@contextmanager
+def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
+    """A system of its own on free ports, stopped as by Ctrl-C afterwards; the address of its page."""
+    router, web, grpc = free_ports(3)
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
+        for setting in (f"services.monitor.web_port={web}", f"services.monitor.grpc_port={grpc}", *settings):
+            command += ["--set", setting]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True) as launcher:
+            try:
+                _wait_for(web, launcher)
+                yield f"http://127.0.0.1:{web}/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc}%2Fproxy"
+            finally:
+                launcher.send_signal(signal.SIGINT)
+                launcher.wait(30.0)
+
+
+def _wait_for(port: int, launcher: subprocess.Popen[bytes]) -> None:
+    give_up = time.monotonic() + READY
+    while True:
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        if launcher.poll() is not None or time.monotonic() > give_up:
+            raise SystemExit("live picture: the system did not come up")
+        time.sleep(0.2)
+
+
+def free_ports(count: int) -> list[int]:
+    """Ports of loopback that nobody listens on."""
+    probes = [socket.socket() for _ in range(count)]
+    for probe in probes:
+        probe.bind(("127.0.0.1", 0))
+    ports = [int(probe.getsockname()[1]) for probe in probes]
+    for probe in probes:
+        probe.close()
+    return ports
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
