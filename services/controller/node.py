@@ -70,7 +70,7 @@ class ControllerNode:
             self._step()
             return
         k = clock.k
-        self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt, lambda: self._wait_is_over(k))
+        self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt / clock.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
         self._forces = forces

@@ -38,6 +38,7 @@ class Node:
         self._bus = service.bus
         self._dt_ns = round(1e9 / config.rate)
         self._dt = self._dt_ns / 1e9
+        self._period = self._dt / config.speed  # s of real time a tick
         self._bus.run = _new_run()
         self._paused = False
         self._guard = Guard(service, robot, backend, self._dt)
@@ -47,7 +48,7 @@ class Node:
         self._truth = self._bus.publisher(keys.SIM_TRUTH, Truth, DATA)
         self._truth_period = max(1, round(config.rate / config.truth_rate))  # ticks
         self._deepest = SolidContact()  # since the last truth message
-        self._rate = Rate(self._dt)
+        self._rate = Rate(self._period)
         self._counters = Counters()
         service.describe = self._describe
         service.mark = self._mark
@@ -62,7 +63,7 @@ class Node:
         gc.collect()
         gc.freeze()  # what lives as long as the process is not looked at again
         gc.set_threshold(20_000, 20, 100)
-        self._rate = Rate(self._dt)
+        self._rate = Rate(self._period)
         router_check = time.monotonic()
         while True:
             deadline = self._rate.next()
@@ -87,8 +88,8 @@ class Node:
         self._count()
         run = bus.run
         for share, part in self._phases.next():
-            if self._dt >= SPREAD:
-                self._service.spin(start + share * self._dt)
+            if self._period >= SPREAD:
+                self._service.spin(start + share * self._period)
                 if bus.run != run:  # reset meanwhile
                     return
             self._sensors.publish(part, share, backend.motors, self._guard.gates[part])
@@ -96,7 +97,7 @@ class Node:
             self._publish_truth()
 
     def _publish_clock(self, mode: str) -> None:
-        self._clock.put(dt=self._dt_ns, mode=mode, rate=1.0)
+        self._clock.put(dt=self._dt_ns, mode=mode, rate=self._config.speed)
 
     def _count(self) -> None:
         motors, gates = self._backend.motors, self._guard.gates
