@@ -215,7 +215,7 @@ class Service:
         self._router = router
 
     def _answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
-        key = str(query.key_expr) if "*" in declared else declared  # a caller may ask with wildcards, a reply may have none
+        key = str(query.key_expr) if "*" in declared else declared  # answers to one wildcard call must differ by key
         with query:
             try:
                 reply_type, payload = self._reply(query, cls, handler, key, part_of_key)

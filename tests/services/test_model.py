@@ -253,6 +253,8 @@ def test_a_perceived_object_is_felt(run: Stage) -> None:
 def test_perception_never_makes_an_object_vanish_that_it_did_not_bring(run: Stage) -> None:
     table = run.world()["table"]
     run.perceive(table.position, valid_for=1, name="table", geometry=table.geometry, role="obstacle")
+    run.perceive([-0.4, 0.1, 0.3], valid_for=3)
+    wait_for(lambda: "ball" in run.world(), "the ball")
     run.edit("add", AddObject, name="ball", geometry=BALL, position=[-0.5, 0.0, 0.3], quaternion=UPRIGHT, role="obstacle")
     run.perceive([-0.5, 0.1, 0.3], valid_for=1)
     wait_for(lambda: run.world()["ball"].position == [-0.5, 0.1, 0.3], "the move")
