@@ -51,10 +51,18 @@ def call(
 
 
 def ask(
-    session: zenoh.Session, who: str, key: str, reply: type[_R], done: Callable[[_R | CallFailed], None], *, timeout: float = TIMEOUT
+    session: zenoh.Session,
+    who: str,
+    key: str,
+    reply: type[_R],
+    done: Callable[[_R | CallFailed], None],
+    *,
+    request: type[Request] = Empty,
+    timeout: float = TIMEOUT,
+    **fields: object,
 ) -> None:
-    """Call without arguments that does not wait: `done` gets the answer or the failure, once, on a thread of Zenoh."""
-    message = Empty(v=VERSION, id=uuid.uuid4().hex, who=who)
+    """Call that does not wait: `done` gets the answer or the failure, once, on a thread of Zenoh."""
+    message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
     answers: list[zenoh.Reply] = []
 
     def finish() -> None:
@@ -66,7 +74,7 @@ def ask(
                 result = failed
         done(result)
 
-    session.get(key, payload=encode(message), encoding=encoding_of(Empty), timeout=timeout, handler=Callback(answers.append, finish))
+    session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout, handler=Callback(answers.append, finish))
 
 
 def _read(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R:

@@ -153,13 +153,22 @@ class Service:
         """Ask another service, as rpc.call; raises rpc.CallFailed."""
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, tries=tries, **fields)
 
-    def ask(self, key: str, reply: type[_R], done: Callable[[_R | rpc.CallFailed], None], *, timeout: float = rpc.TIMEOUT) -> None:
-        """Call without arguments that does not wait: `done` handles the answer or the failure in the main thread."""
+    def ask(
+        self,
+        key: str,
+        reply: type[_R],
+        done: Callable[[_R | rpc.CallFailed], None],
+        *,
+        request: type[Request] = Empty,
+        timeout: float = rpc.TIMEOUT,
+        **fields: object,
+    ) -> None:
+        """Call that does not wait: `done` handles the answer or the failure in the main thread."""
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
             self.inbox.put(lambda: done(answer))
 
-        rpc.ask(self.bus.session, self.who, key, reply, enqueue, timeout=timeout)
+        rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, **fields)
 
     def ready(self) -> None:
         """Tell the world: after every subscriber and queryable is declared."""

@@ -16,13 +16,17 @@ SHOWS = 0.1  # s after which the state of a part must show that it was armed
 
 
 class Drives:
-    """The drive epoch of each part, and whether robot_sim obeys it."""
+    """The drive epoch of each part, and whether robot_sim obeys it.
+
+    Never waits for an answer: while one part is armed the others need their commands.
+    """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         self._service = service
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         self._next_try = dict.fromkeys(robot.parts, 0.0)
         self._shows_by = dict.fromkeys(robot.parts, 0.0)
+        self._asking: dict[str, object] = {}  # part -> mark of the attempt under way
 
     def armed(self, part: str, state: State) -> bool:
         """Whether the part does what this controller commands, as of its newest state; or will have, if it was armed just now."""
@@ -34,24 +38,53 @@ class Drives:
         return time.monotonic() < self._shows_by[part]
 
     def forget(self) -> None:
-        """A new run of robot_sim: all epochs are void."""
+        """A new run of robot_sim: all epochs are void, and answers still to come are too."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
+        self._asking.clear()
 
-    def try_arm(self, part: str, state: State) -> bool:
-        """Take and arm a part that is idle or in hold; True when it is armed now."""
+    def try_arm(self, part: str, state: State) -> None:
+        """Begin to take and arm a part that is idle or in hold; `armed` says when it is done."""
         now = time.monotonic()
-        if state.gate not in ("idle", "hold", "armed") or now < self._next_try[part]:
-            return False
+        if state.gate not in ("idle", "hold", "armed") or now < self._next_try[part] or part in self._asking:
+            return
         self._next_try[part] = now + RETRY
-        try:
-            self.epochs[part] = self._service.call(keys.drive(part, "take"), Take, Taken, instance=self._service.instance).epoch
-            reply = self._service.call(keys.drive(part, "arm"), WithEpoch, Driven, epoch=self.epochs[part])
-        except CallFailed as error:
-            self.epochs[part] = 0
-            self._service.log.info("%s cannot be armed yet: %s", part, error)
-            return False
-        if reply.gate == "armed":
-            self._shows_by[part] = time.monotonic() + SHOWS
-            self._service.bus.event("info", "armed", f"{part} is under control, epoch {self.epochs[part]}")
-        return reply.gate == "armed"
+        self.epochs[part] = 0
+        attempt = self._asking[part] = object()
+        self._service.ask(
+            keys.drive(part, "take"),
+            Taken,
+            lambda answer: self._taken(part, attempt, answer),
+            request=Take,
+            instance=self._service.instance,
+        )
+
+    def _taken(self, part: str, attempt: object, answer: Taken | CallFailed) -> None:
+        if self._asking.get(part) is not attempt:
+            return
+        if isinstance(answer, CallFailed):
+            self._failed(part, str(answer))
+            return
+        epoch = answer.epoch
+        self._service.ask(
+            keys.drive(part, "arm"),
+            Driven,
+            lambda driven: self._driven(part, attempt, epoch, driven),
+            request=WithEpoch,
+            epoch=epoch,
+        )
+
+    def _driven(self, part: str, attempt: object, epoch: int, answer: Driven | CallFailed) -> None:
+        if self._asking.get(part) is not attempt:
+            return
+        if isinstance(answer, CallFailed) or answer.gate != "armed":
+            self._failed(part, str(answer) if isinstance(answer, CallFailed) else f"gate {answer.gate}")
+            return
+        del self._asking[part]
+        self.epochs[part] = epoch
+        self._shows_by[part] = time.monotonic() + SHOWS
+        self._service.bus.event("info", "armed", f"{part} is under control, epoch {epoch}")
+
+    def _failed(self, part: str, why: str) -> None:
+        del self._asking[part]
+        self._service.log.info("%s cannot be armed yet: %s", part, why)

@@ -101,7 +101,9 @@ class ControllerNode:
         for part, action in self._actions.items():
             state = self._body.states[part]
             lacking = "no fresh forces" if not fresh else "no fresh state" if clock.t - state.t > STALE else ""
-            if lacking or not (self._drives.armed(part, state) or self._drives.try_arm(part, state)):
+            if lacking or not self._drives.armed(part, state):
+                if not lacking:
+                    self._drives.try_arm(part, state)
                 if action.status != "held":
                     self._held(part, clock.k, lacking or f"gate {state.gate}")
                 self._law.rest(part, np.array(state.q))

@@ -231,6 +231,8 @@ class FakeSim:
         self.silent: set[str] = set()  # parts that send no state
         self.refuses_to_arm: set[str] = set()
         self.takes: list[str] = []
+        self.answers = threading.Event()  # cleared: drive calls are heard and not answered
+        self.answers.set()
         self.gates = {part: FakeGate(velocity=np.zeros(len(p)), epoch=100) for part, p in rig.robot.parts.items()}
         self.commands: dict[str, list[Command]] = {part: [] for part in rig.robot.parts}
         self._lock = threading.Lock()
@@ -319,6 +321,7 @@ class FakeSim:
 
     def _take(self, request: Take, key: str) -> Taken:
         part = key.split("/")[0]
+        self.answers.wait()
         with self._lock:
             gate = self.gates[part]
             gate.epoch, gate.owner, gate.state = gate.epoch + 1, request.instance, "hold"

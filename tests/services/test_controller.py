@@ -461,6 +461,21 @@ def test_a_part_that_the_gate_drops_is_held_and_armed_again_at_rest(run: Stage) 
     run.play(lambda: run.motion("left_arm").status == "settled", "the next action")
 
 
+def test_while_one_part_waits_to_be_armed_the_others_get_their_commands(run: Stage) -> None:
+    takes = len(run.sim.takes)
+    run.sim.answers.clear()
+    try:
+        run.sim.hold("left_arm")
+        since = run.rig.bus.k
+        run.ticks(20)
+        assert len(wait_for(lambda: len(run.commands("torso", since)) == 20 and run.commands("torso", since), "commands")) == 20
+        assert run.motion("left_arm").status == "held"
+    finally:
+        run.sim.answers.set()
+    run.play(lambda: run.motion("left_arm").status == "idle", "its return")
+    assert len(run.sim.takes) - takes < 10  # a controller that waits for each answer asks anew every tick
+
+
 def test_a_part_whose_state_stands_still_is_not_under_control(run: Stage) -> None:
     events = run.rig.record(keys.event("controller"), Event)
     run.sim.silent = {"right_arm"}
