@@ -20,7 +20,7 @@ def printed(number: str, folder: Path, *options: str) -> str:
     """What an example prints when it is run as a reader would, from any folder."""
     command = [sys.executable, str(EXAMPLES[number]), *options]
     ended = subprocess.run(
-        command, cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": str(folder)}, capture_output=True, text=True, timeout=120
+        command, cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": str(folder)}, capture_output=True, text=True, timeout=280
     )
     assert ended.returncode == 0, ended.stderr
     return ended.stdout

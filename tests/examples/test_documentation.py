@@ -1,0 +1,92 @@
+"""The code in README.md and in docs/ runs as it stands: a fence with a second word is a file of that name."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page: str, folder: Path) -> list[str]:
+    """The Python blocks of a page; its named blocks are written into the folder."""
+    found = re.findall(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE)
+    for _, name, text in found:
+        if name:
+            (folder / name).write_text(text)
+    return [text for language, name, text in found if language == "python" and not name]
+
+
+def run(folder: Path, *arguments: str) -> str:
+    ended = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=280)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+def launch(folder: Path, scenario: str, endpoint: str, *options: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--endpoint", endpoint, *options]
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL, stdout=subprocess.PIPE)
+
+
+def test_the_main_flow_in_the_readme_runs(tmp_path: Path) -> None:
+    (main_flow,) = blocks("README.md", tmp_path)
+    palm, transition = run(tmp_path, "-c", main_flow).splitlines()
+    assert re.match(r"\[ *-0\.3038\d* +-0\.1499\d* +0\.0299\d*\] \(\)$", palm)
+    assert transition.startswith("Transition(n=3, ") and transition.endswith(" 3")
+
+
+def test_the_readers_own_robot_learns(tmp_path: Path) -> None:
+    (flow,) = blocks("docs/robots.md", tmp_path)
+    motors, transition = run(tmp_path, "-c", flow).splitlines()
+    assert motors.startswith("('pan', 'bend') [")
+    assert transition.startswith("Transition(n=10, ")
+
+
+@pytest.mark.system
+def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None:
+    blocks("docs/robots.md", tmp_path)
+    launcher = launch(tmp_path, "pointer.toml", f"tcp/127.0.0.1:{free_port}", "--duration", "5")
+    summary = launcher.communicate(timeout=120)[0].decode()
+    assert launcher.returncode == 0, summary
+    assert re.search(r"^  arm +\d+ transitions", summary, re.MULTILINE)
+
+
+@pytest.mark.system
+def test_the_readers_own_agent_moves_the_free_arm(tmp_path: Path, free_port: int) -> None:
+    blocks("docs/agents.md", tmp_path)
+    endpoint = f"tcp/127.0.0.1:{free_port}"
+    launcher = launch(tmp_path, "free_arm.toml", endpoint)
+    try:
+        wait_for_router(endpoint, tmp_path)
+        assert run(tmp_path, "my_agent.py", endpoint).startswith("Transition(n=2, ")
+    finally:
+        launcher.terminate()
+        launcher.communicate(timeout=60)
+
+
+def wait_for_router(endpoint: str, folder: Path) -> None:
+    give_up = time.monotonic() + 60
+    status = [sys.executable, "-m", "mobee_cli", "status", "--endpoint", endpoint]
+    while subprocess.run(status, cwd=folder, capture_output=True).returncode != 0:
+        assert time.monotonic() < give_up
+        time.sleep(0.2)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
+def test_links_lead_to_files_of_the_project(page: Path) -> None:
+    targets = re.findall(r"\]\((?!https?://)([^)#]+)\)", page.read_text())
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_the_readme_names_every_command_and_no_other() -> None:
+    named = set(re.findall(r"mobee (\w+)", " ".join(re.findall(r"`([^`]+)`", (ROOT / "README.md").read_text()))))
+    told = subprocess.run([sys.executable, "-m", "mobee_cli", "--help"], capture_output=True, text=True).stdout
+    verbs = set(re.findall(r"^  (\w+) ", told, re.MULTILINE))
+    assert named <= verbs
+    assert [verb for verb in verbs if not re.search(rf"`(mobee )?{verb}\b", (ROOT / "README.md").read_text())] == []
