@@ -36,7 +36,8 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
     """The struct from its defaults, then `--config FILE` (TOML), then the other flags; exits with 2 on a mistake."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    given = sys.argv[1:] if argv is None else argv
+    arguments = [piece for word in given for piece in (word.split("=", 1) if word.startswith("--config=") else [word])]
     default = cls()
     try:
         if "--config" in arguments:
@@ -45,7 +46,9 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
                 raise ConfigError("--config needs a file")
             default = read_toml(Path(arguments[at + 1]), cls)
             del arguments[at : at + 2]
-        parsed = tyro.cli(cls, default=default, args=arguments, prog=prog)
+        parsed = tyro.cli(
+            cls, default=default, args=arguments, prog=prog, description=f"{cls.__doc__}  --config FILE: a TOML file with any of these."
+        )
         return msgspec.convert(msgspec.to_builtins(parsed), cls)  # constructing a struct does not check its bounds
     except (ConfigError, msgspec.ValidationError) as error:
         print(f"{prog}: {error}", file=sys.stderr)

@@ -40,6 +40,14 @@ def test_a_file_overrides_defaults_and_flags_override_the_file(tmp_path: Path) -
     assert config == Config(seed=9, robot="icub_2014", gains="published_2014", share=1.0, posture={"head": [0.1, 2.0]})
 
 
+def test_the_file_may_be_given_with_an_equals_sign_and_the_help_speaks_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert load_config(Config, [f"--config={write(tmp_path, 'seed = 7')}"], "probe").seed == 7
+    with pytest.raises(SystemExit) as caught:
+        load_config(Config, ["--help"], "probe")
+    assert caught.value.code == 0
+    assert "--config FILE" in capsys.readouterr().out
+
+
 def test_an_unknown_field_is_told_with_file_line_and_nearest_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write(tmp_path, "# settings\nseed = 1\ndawdel = 2.0\n")
     text = line(["--config", file], capsys)
