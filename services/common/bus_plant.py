@@ -109,7 +109,8 @@ class BusPlant:
         return part in self._epochs and motion is not None and motion.epoch == self._epochs[part]
 
     def _take(self, part: str) -> None:
-        if self._owns(part) or not self._service.alive.get("controller"):
+        waits_for_motion = part in self._epochs and part not in self._motion  # a new run: the goal is still ours
+        if self._owns(part) or waits_for_motion or not self._service.alive.get("controller"):
             return
         try:
             reply = self._service.call(keys.goal(part, "take"), Take, Taken, instance=self._service.instance)
