@@ -26,6 +26,7 @@ Kinematics and solids derive from robotology/icub-models (Istituto Italiano di T
 this file is distributed under the same licence. Origin of every number: README.md beside this file.
 """
 HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 60.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
+GAZE = {"neck_pitch": -26.0, "eyes_tilt": -18.0, "eyes_vergence": 11.0}  # on the table in front of the body, clear of the limits' forces
 EYES = {"eyes_version": (-30.0, 30.0), "eyes_vergence": (0.0, 50.0)}  # version +- vergence / 2 just fills the URDF's pan limits
 # A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
 ANCHORS = {
@@ -152,7 +153,7 @@ def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
             low, high = EYES[name]
         elif name in joints:
             low, high = max(low, joints[name]["limits_deg"][0]), min(high, joints[name]["limits_deg"][1])
-        home = HOME.get(name[2:], 0.0) if part.endswith("arm") else 0.0
+        home = HOME.get(name[2:], 0.0) if part.endswith("arm") else GAZE.get(name, 0.0)
         element(parent, "motor", name=name, minPos=low, maxPos=high, home=home)
 
 
