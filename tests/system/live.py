@@ -95,7 +95,7 @@ def until(condition: Callable[[], Any], timeout: float, what: str) -> Any:
         value = condition()
         if value:
             return value
-        time.sleep(0.005)
+        time.sleep(0.01)
     raise AssertionError(f"not within {timeout:g} s: {what}")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, load_robot, load_world
@@ -14,21 +13,49 @@ pytestmark = pytest.mark.system
 
 ACTIONS = 30
 SEED = 4
+GAINS = "default"
+ATTEMPTS = 3
+
+Row = tuple[int, int, int, int]  # n, s, a, s'
 
 
 def test_thirty_actions_end_in_the_same_states(tmp_path: Path) -> None:
-    scenario = Path(__file__).with_name("one_arm.toml")
-    with running(tmp_path, str(scenario), f"shared.seed={SEED}", "services.robot_sim.speed=4.0") as (system, _):
-        until(lambda: len(transitions(system.run_dir)["left_arm"]) >= ACTIONS, 150.0, f"{ACTIONS} actions on the bus")
-        live = transitions(system.run_dir)["left_arm"][:ACTIONS]
+    live = None
+    for attempt in range(ATTEMPTS):
+        live = on_the_bus(tmp_path / str(attempt))
+        if live is not None:
+            break
+    assert live is not None, f"a stall of this machine interrupted an action in each of {ATTEMPTS} attempts"
+    assert live == offline()
+    assert len({row[3] for row in live}) > 10
+
+
+def on_the_bus(folder: Path) -> list[Row] | None:
+    """The transitions of the agent's process; None if an action was interrupted, which is no outcome on either plant."""
+    folder.mkdir()
+    scenario = str(Path(__file__).with_name("one_arm.toml"))
+    with running(folder, scenario, f"shared.seed={SEED}", f"shared.gains={GAINS}") as (system, watcher):
+
+        def made() -> int:
+            return len(transitions(system.run_dir)["left_arm"])
+
+        until(lambda: made() >= ACTIONS or watcher.stat("agent_left_arm").numbers["interrupted"], 100.0, f"{ACTIONS} actions on the bus")
+        if made() < ACTIONS:
+            print("interrupted, once more:", [event.text for event in watcher.events if event.level != "info"])
+            return None
+        return [row[:4] for row in transitions(system.run_dir)["left_arm"][:ACTIONS]]
+
+
+def offline() -> list[Row]:
     robot = load_robot("icub")
+    world = load_world("table")
+    world.remove("ball")  # nobody sees it in this scenario
     space = Lattice(robot, ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"])
-    plant = OfflinePlant(Model(robot, load_world("table")), gains=Gains.published_2014(), motors=MotorParameters(encoder_noise=0.0))
+    plant = OfflinePlant(Model(robot, world), gains=Gains.named(GAINS), motors=MotorParameters(encoder_noise=0.0))
     agent = CuriousAgent(space, plant, seed=SEED)
-    offline = []
+    rows: list[Row] = []
     for _ in range(ACTIONS):
         agent.step()
         assert agent.last is not None
-        offline.append((agent.last.n, agent.last.s, agent.last.a, agent.last.s_next))
-    print("differing durations, s:", np.round([row[6] for row in live], 2))
-    assert [row[:4] for row in live] == offline
+        rows.append((agent.last.n, agent.last.s, agent.last.a, agent.last.s_next))
+    return rows
