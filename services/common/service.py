@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import secrets
 import signal
@@ -172,6 +173,8 @@ class Service:
 
     def ready(self) -> None:
         """Tell the world: after every subscriber and queryable is declared."""
+        gc.collect()
+        gc.freeze()  # what lives as long as the process is not looked at again: a full collection would stall a tick
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)

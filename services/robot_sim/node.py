@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import secrets
 import time
 from collections.abc import Mapping
@@ -60,9 +59,6 @@ class Node:
 
     def run(self) -> None:
         """Tick until the process is told to end."""
-        gc.collect()
-        gc.freeze()  # what lives as long as the process is not looked at again
-        gc.set_threshold(20_000, 20, 100)
         self._rate = Rate(self._period)
         router_check = time.monotonic()
         while True:

@@ -116,12 +116,19 @@ def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher
 
 @pytest.mark.parametrize("who", ["vision", "renderer", "monitor"])
 def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: str) -> None:
+    """A stall of the machine may hold the robot at any time; a dependence on the one killed would at every kill."""
     _, watcher = live
-    until(lambda: any(watcher.speed(part) > 0.1 for part in AGENTS), 40.0, "a part moves")
-    held = sum(s.gate != "armed" for part in PARTS for s in watcher.states[part])
-    _, pid = kill(watcher, who)
-    wait_back(watcher, who, pid)
-    assert sum(s.gate != "armed" for part in PARTS for s in watcher.states[part]) == held
+    held = []
+    for _ in range(3):
+        until(lambda: all(watcher.states[part][-1].gate == "armed" for part in PARTS), 20.0, "every part obeys")
+        until(lambda: any(watcher.speed(part) > 0.1 for part in AGENTS), 40.0, "a part moves")
+        before = watcher.k
+        _, pid = kill(watcher, who)
+        wait_back(watcher, who, pid)
+        held.append(sum(s.gate != "armed" for part in PARTS for s in watcher.states[part] if s.k > before))
+        if not held[-1]:
+            return
+    raise AssertionError(f"states in hold after each kill of {who}: {held}")
 
 
 def test_without_launcher_and_router_the_robot_holds_and_everything_ends(tmp_path: Path) -> None:
