@@ -1,0 +1,1 @@
+"""What `mobee bench` will run: own figures beside the peers."""

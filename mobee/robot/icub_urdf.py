@@ -6,7 +6,7 @@ import importlib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import defusedxml.ElementTree  # type: ignore[import-untyped]  # ships no type information
+import defusedxml.ElementTree
 
 from mobee.errors import MobeeError
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-import defusedxml  # type: ignore[import-untyped]  # ships no type information
-import defusedxml.sax  # type: ignore[import-untyped]
+import defusedxml
+import defusedxml.sax
 import numpy as np
 
 from mobee.errors import RobotFileError

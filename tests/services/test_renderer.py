@@ -41,6 +41,9 @@ def scene() -> Iterator[Scene]:
     made.close()
 
 
+AHEAD = {"neck_pitch": 0.0, "eyes_tilt": 0.0, "eyes_vergence": 0.0}
+
+
 def test_at_zero_the_eyes_look_ahead_and_stand_upright() -> None:
     transforms = np.broadcast_to(np.eye(4), (len(ROBOT.links), 4, 4))
     for eye, side in (("left", -0.034), ("right", 0.034)):
@@ -55,7 +58,7 @@ def test_motors_turn_both_eyes_the_same_way(motor: str, column: int, row: int) -
         head, torso = ROBOT.part("head"), ROBOT.part("torso")
         views = [
             frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice])[1]
-            for q in (np.zeros(41), posture(ROBOT, {motor: 10.0, "eyes_vergence": 0.0}))
+            for q in (posture(ROBOT, AHEAD), posture(ROBOT, AHEAD | {motor: 10.0}))
         ]
         turned = views[0].T @ views[1][:, 2]  # the new direction of view, in the old picture's axes
         np.testing.assert_allclose(turned[:2], np.sin(np.deg2rad(10.0)) * np.array([column, row]), atol=1e-9)

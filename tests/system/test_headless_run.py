@@ -20,24 +20,33 @@ def test_two_minutes_at_the_table(tmp_path: Path) -> None:
     assert summary["table_contact_ticks"] >= 20
     assert summary["pairs_watched"] > 50
     assert summary["deepest_solid_contact_m"] <= 0.010
-    assert summary["closest_gap_m"] is not None
+    assert summary["closest_gap_m"] > 0.005
     assert not any(summary["restarts"].values())
 
 
 def test_without_contact_forces_solids_touch(tmp_path: Path) -> None:
-    summary = launch(tmp_path, "default", "services.model.contact_forces=false", duration=75).summary(timeout=150)
+    summary = launch(tmp_path, "default", "services.model.contact_forces=false", duration=50).summary(timeout=150)
     print(summary_line(summary))
     assert summary["solid_contact_ticks"] > 0
-    assert summary["deepest_solid_contact_m"] > 0.0005
+    assert summary["deepest_solid_contact_m"] > 0.0
+    assert summary["closest_gap_m"] < 0.001
 
 
 def test_at_200_hertz(tmp_path: Path) -> None:
-    summary = launch(tmp_path, "default", "services.robot_sim.rate=200", duration=20).summary(timeout=90)
+    summary = launch(tmp_path, "default", "services.robot_sim.rate=200", duration=15).summary(timeout=90)
     print(summary_line(summary))
-    assert summary["ticks"] > 3000
+    assert summary["ticks"] > 2500
     assert summary["command_age_ticks"]["p50"] <= 2
 
 
 def summary_line(summary: dict[str, object]) -> str:
-    names = ("agents", "table_contact_ticks", "closest_gap_m", "deepest_solid_contact_m", "pairs_watched", "command_age_ticks")
+    names = (
+        "agents",
+        "table_contact_ticks",
+        "closest_gap_m",
+        "deepest_solid_contact_m",
+        "solid_contact_ticks",
+        "pairs_watched",
+        "command_age_ticks",
+    )
     return "; ".join(f"{name} {summary[name]}" for name in (*names, "hold_ticks", "missed_ticks", "rejected_commands"))

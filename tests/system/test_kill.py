@@ -122,10 +122,10 @@ def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: st
     for _ in range(3):
         until(lambda: all(watcher.states[part][-1].gate == "armed" for part in PARTS), 20.0, "every part obeys")
         until(lambda: any(watcher.speed(part) > 0.1 for part in AGENTS), 40.0, "a part moves")
-        before = watcher.k
+        before, run = watcher.k, watcher.run
         _, pid = kill(watcher, who)
         wait_back(watcher, who, pid)
-        held.append(sum(s.gate != "armed" for part in PARTS for s in watcher.states[part] if s.k > before))
+        held.append(sum(s.gate != "armed" for part in PARTS for s in watcher.states[part] if s.run == run and s.k > before))
         if not held[-1]:
             return
     raise AssertionError(f"states in hold after each kill of {who}: {held}")

@@ -1,0 +1,43 @@
+"""The commands of docker/compose.yaml as plain processes: the same system without its launcher."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.docker.compose_commands import as_processes
+from tests.system.live import AGENTS, Watcher, transitions, until
+
+pytestmark = pytest.mark.system
+
+
+@contextmanager
+def composed(folder: Path, port: int) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
+    processes = {}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        for name, argv in as_processes(port).items():
+            log = (folder / f"{name}.log").open("wb")
+            processes[name] = subprocess.Popen(argv, cwd=folder, stdout=log, stderr=log, env=environment, start_new_session=True)
+        yield processes
+    finally:
+        for process in reversed(processes.values()):
+            process.send_signal(signal.SIGTERM)
+        for name, process in processes.items():
+            assert process.wait(10.0) == 0, (name, (folder / f"{name}.log").read_text()[-1500:])
+
+
+def test_the_composed_system_learns(tmp_path: Path, free_port: int) -> None:
+    with composed(tmp_path, free_port) as processes:
+        until(lambda: (tmp_path / "transitions.sqlite").exists(), 60.0, "the agents have begun")
+        with Watcher(f"tcp/127.0.0.1:{free_port}") as watcher:
+            until(lambda: any(watcher.speed(part) > 0.1 for part in AGENTS), 60.0, "the robot moves")
+            until(lambda: watcher.stat("vision").numbers["located"] > 0, 30.0, "the ball is located")
+        until(lambda: all(transitions(tmp_path)[agent] for agent in AGENTS), 60.0, "a transition of each agent")
+        assert all(process.poll() is None for process in processes.values())
