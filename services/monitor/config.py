@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -16,10 +16,12 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     serve: bool = True
     """Whether a page is served; a recording is made in any case when there is a run_dir."""
+    bind: Literal["127.0.0.1", "0.0.0.0"] = "127.0.0.1"
+    """Address the page is served at; every interface only inside a container whose ports are published on loopback."""
     web_port: Port = 9090
-    """Where the page is, on 127.0.0.1."""
+    """Where the page is."""
     grpc_port: Port = 9876
-    """Where the page gets its data, on 127.0.0.1."""
+    """Where the page gets its data."""
     run_dir: str = ""
     """Folder for recording.rrd; empty: no recording."""
     rate: Annotated[float, Meta(ge=1, le=20)] = 20.0

@@ -69,9 +69,9 @@ def page_url(config: Config) -> str:
 
 def _start_page(config: Config, folder: str) -> subprocess.Popen[bytes]:
     for name, port in (("web_port", config.web_port), ("grpc_port", config.grpc_port)):
-        _require_free(name, port)
-    numbers = [str(os.getpid()), str(config.web_port), str(config.grpc_port), config.memory_limit]
-    page = subprocess.Popen([sys.executable, "-m", "services.monitor.page", *numbers], stdin=subprocess.DEVNULL, env=_private(folder))
+        _require_free(config, name, port)
+    words = [str(os.getpid()), config.bind, str(config.web_port), str(config.grpc_port), config.memory_limit]
+    page = subprocess.Popen([sys.executable, "-m", "services.monitor.page", *words], stdin=subprocess.DEVNULL, env=_private(folder))
     give_up = time.monotonic() + START
     while not all(_answers(port) for port in (config.web_port, config.grpc_port)):
         if page.poll() is not None or time.monotonic() > give_up:
@@ -88,14 +88,14 @@ def _private(folder: str) -> dict[str, str]:
     return surroundings
 
 
-def _require_free(name: str, port: int) -> None:
+def _require_free(config: Config, name: str, port: int) -> None:
     """A page that was just killed may hold its port for a moment more."""
     give_up = time.monotonic() + 1.0
     while True:
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
-                probe.bind((HOST, port))
+                probe.bind((config.bind, port))
                 return
             except OSError:
                 if time.monotonic() > give_up:

@@ -16,12 +16,12 @@ HOST = "127.0.0.1"
 PR_SET_PDEATHSIG = 1
 
 
-def arguments(web_port: int, grpc_port: int, memory_limit: str) -> list[str]:
+def arguments(bind: str, web_port: int, grpc_port: int, memory_limit: str) -> list[str]:
     """What Rerun's program is told."""
     return [
         "rerun",
         "--serve-web",
-        *("--bind", HOST),
+        *("--bind", bind),
         *("--port", str(grpc_port)),
         *("--web-viewer-port", str(web_port)),
         *("--server-memory-limit", memory_limit),
@@ -42,7 +42,7 @@ def main() -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != int(parent):  # died before the kernel was told
         return
-    os.execv(program(), arguments(int(rest[0]), int(rest[1]), rest[2]))
+    os.execv(program(), arguments(rest[0], int(rest[1]), int(rest[2]), rest[3]))
 
 
 if __name__ == "__main__":

@@ -25,10 +25,7 @@ def compose_commands() -> dict[str, list[str]]:
 def as_processes(port: int) -> dict[str, list[str]]:
     """Service name -> argv that runs it here, all of them around a router at 127.0.0.1:`port`; the router comes first.
 
-    The processes write below their working directory, as the containers do.
+    The processes write below their working directory, as the containers do; the page stays on loopback.
     """
-    endpoint = f"tcp/127.0.0.1:{port}"
-    return {
-        name: INTERPRETERS[command[0]] + [endpoint if word in ROUTER else word for word in command[1:]]
-        for name, command in compose_commands().items()
-    }
+    here = dict.fromkeys(ROUTER, f"tcp/127.0.0.1:{port}") | {"0.0.0.0": "127.0.0.1"}
+    return {name: INTERPRETERS[command[0]] + [here.get(word, word) for word in command[1:]] for name, command in compose_commands().items()}

@@ -27,10 +27,14 @@ PARTS = ("torso", "head", "left_arm", "right_arm")
 AGENTS = ("torso", "left_arm", "right_arm")
 
 
-def free_endpoint() -> str:
+def free_port() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return str(probe.getsockname()[1])
+
+
+def free_endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @dataclass

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.docker.compose_commands import as_processes
-from tests.system.live import AGENTS, Watcher, transitions, until
+from tests.system.live import AGENTS, Watcher, free_endpoint, free_port, transitions, until
 
 pytestmark = pytest.mark.system
 
@@ -23,6 +23,8 @@ def composed(folder: Path, port: int) -> Iterator[dict[str, subprocess.Popen[byt
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     try:
         for name, argv in as_processes(port).items():
+            if name == "monitor":  # another system may be up on this machine
+                argv += ["--web-port", free_port(), "--grpc-port", free_port()]
             log = (folder / f"{name}.log").open("wb")
             processes[name] = subprocess.Popen(argv, cwd=folder, stdout=log, stderr=log, env=environment, start_new_session=True)
         yield processes
@@ -33,10 +35,11 @@ def composed(folder: Path, port: int) -> Iterator[dict[str, subprocess.Popen[byt
             assert process.wait(10.0) == 0, (name, (folder / f"{name}.log").read_text()[-1500:])
 
 
-def test_the_composed_system_learns(tmp_path: Path, free_port: int) -> None:
-    with composed(tmp_path, free_port) as processes:
+def test_the_composed_system_learns(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with composed(tmp_path, int(endpoint.rsplit(":", 1)[1])) as processes:
         until(lambda: (tmp_path / "transitions.sqlite").exists(), 60.0, "the agents have begun")
-        with Watcher(f"tcp/127.0.0.1:{free_port}") as watcher:
+        with Watcher(endpoint) as watcher:
             until(lambda: any(watcher.speed(part) > 0.1 for part in AGENTS), 60.0, "the robot moves")
             until(lambda: watcher.stat("vision").numbers["located"] > 0, 30.0, "the ball is located")
         until(lambda: all(transitions(tmp_path)[agent] for agent in AGENTS), 60.0, "a transition of each agent")

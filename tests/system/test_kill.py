@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from services.common.rpc import CallFailed
-from tests.system.live import AGENTS, PARTS, Launch, Watcher, free_endpoint, running, transitions, until
+from tests.system.live import AGENTS, PARTS, Launch, Watcher, free_port, running, transitions, until
 
 pytestmark = pytest.mark.system
 
@@ -21,8 +21,7 @@ STOPPED = 0.01  # rad/s
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Watcher]]:
-    ports = [free_endpoint().rsplit(":", 1)[1] for _ in range(2)]
-    settings = [f"services.monitor.web_port={ports[0]}", f"services.monitor.grpc_port={ports[1]}"]
+    settings = [f"services.monitor.web_port={free_port()}", f"services.monitor.grpc_port={free_port()}"]
     with running(tmp_path_factory.mktemp("kill"), "default", *settings, headless=False) as pair:
         yield pair
 
