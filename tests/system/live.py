@@ -125,6 +125,11 @@ class Watcher:
     def __exit__(self, *_: object) -> None:
         self.session.close()
 
+    def close_streams(self) -> None:
+        """Listen no more; calls can still be made."""
+        for subscription in self._subscriptions:
+            subscription.undeclare()
+
     def _subscribe(self, key: str, cls: type[Message], into: list[Any]) -> None:
         def note(sample: zenoh.Sample) -> None:
             into.append(decode(cls, sample.payload.to_bytes(), str(sample.encoding)))
