@@ -31,7 +31,7 @@ class Counters:
         """Once a tick: ages and holds."""
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
-        ages = [gate.age for gate in owned if gate.age >= 0]
+        ages = [gate.age for gate in owned if gate.mode != "hold"]  # a hold that is commanded is a hold too
         if ages:
             self.ages[max(ages)] += 1
         if len(ages) < len(owned):

@@ -25,6 +25,16 @@ def test_the_oldest_command_of_a_tick_counts_and_holds_are_counted_apart() -> No
     assert (numbers["age_p50"], numbers["age_p99"], numbers["age_max"]) == (4, 9, 9)
 
 
+def test_a_commanded_hold_is_a_hold_and_no_age() -> None:
+    counters, gated = Counters(), Gated().owned()
+    for mode in ("velocity", "hold", "hold"):
+        gated.command(mode)
+        gated.tick()
+        counters.count_gates([gated.gate])
+    numbers = counters.numbers(0, 0)
+    assert (numbers["armed_ticks"], numbers["hold_ticks"], counters.ages) == (1, 2, {1: 1})
+
+
 def test_without_a_command_there_is_no_age() -> None:
     counters = Counters()
     counters.count_gates([Gated().gate])
