@@ -44,7 +44,7 @@ class Clock(Message, frozen=True, kw_only=True):
 
     dt: Annotated[int, Meta(gt=0)]  # ns a tick
     mode: Literal["free", "lock", "paused"]
-    rate: float  # simulated seconds a second that are asked for
+    rate: Annotated[float, Meta(gt=0)]  # simulated seconds a second that are asked for
 
 
 class State(Message, frozen=True, kw_only=True):

@@ -149,12 +149,18 @@ def test_no_number_that_is_not_finite_passes_wherever_it_stands(bad: float) -> N
         ref[place] = bad
         assert reason_of(Command, encode(command(ref=ref)), part=3) == "value"
     assert reason_of(Command, encode(command(ref=[float("inf"), float("-inf"), 0.0]))) == "value"
-    clock = Clock(**HEADER, dt=10, mode="free", rate=bad)
-    assert reason_of(Clock, encode(clock)) == "value"
+    truth = messages.Truth(**HEADER, q=[], depth=bad, pair="", gap=0.0, objects=[])
+    assert reason_of(messages.Truth, encode(truth)) == "value"
     item = messages.ContactItem(first="a", second="b", kind="solid", depth=0.0, point=[0.0, bad, 0.0], normal=[0.0, 0.0, 1.0])
     assert reason_of(Contacts, encode(Contacts(**HEADER, re_k=7, contacts=[item]))) == "value"
     event = messages.Event(**HEADER, level="info", code="c", text="t", values={"x": bad})
     assert reason_of(messages.Event, encode(event)) == "value"
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0])
+def test_a_clock_that_does_not_go_forward_is_refused(rate: float) -> None:
+    """Receivers divide by the rate."""
+    assert reason_of(Clock, encode(Clock(**HEADER, dt=10, mode="free", rate=rate))) == "decode"
 
 
 def test_large_numbers_whose_sum_overflows_are_finite() -> None:
