@@ -13,6 +13,7 @@ from typing import Any
 Handler = Callable[[], None]
 CROWDED = 1000  # waiting messages and calls at which further messages are dropped
 CROWDED_WITH_CALLS = 2 * CROWDED  # at which further calls are dropped: a flood of messages must not make the service deaf
+CROWDED_WITH_STOPS = 2 * CROWDED_WITH_CALLS  # at which even emergency stops are dropped: no flood but one of stops gets there
 GRACE = 0.002  # s for which `spin` goes on with what is waiting when its time is up
 
 

@@ -24,7 +24,7 @@ from mobee.robot.robot import Robot
 from services.common import log, rpc
 from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
-from services.common.inbox import CROWDED_WITH_CALLS, Inbox, Newest
+from services.common.inbox import CROWDED, CROWDED_WITH_CALLS, Inbox, Newest
 from services.common.session import open_client
 
 _M = TypeVar("_M", bound=Message)
@@ -101,11 +101,16 @@ class Service:
         slot = Newest(self.inbox, lambda sample: self._deliver(cls, sample, handler, part))
         self._kept.append(self.bus.session.declare_subscriber(key, slot.offer))
 
-    def on_each(self, key: str, cls: type[_M], handler: Callable[[_M], None], *, history: bool = False, any_run: bool = False) -> None:
-        """Have every message of a stream handled, with `history` also those from before this service came."""
+    def on_each(
+        self, key: str, cls: type[_M], handler: Callable[[_M], None], *, history: bool = False, any_run: bool = False, crowd: int = CROWDED
+    ) -> None:
+        """Have every message of a stream handled, with `history` also those from before this service came.
+
+        `crowd`: how many may be waiting for the main thread before this stream's messages are dropped.
+        """
 
         def enqueue(sample: zenoh.Sample) -> None:
-            self.inbox.offer(lambda: self._deliver(cls, sample, handler, None, any_run))
+            self.inbox.offer(lambda: self._deliver(cls, sample, handler, None, any_run), crowd)
 
         if history:
             settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)

@@ -9,6 +9,7 @@ from bus_schema.messages import Command, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.robot.robot import Robot
 from services.common.delivery import LATEST
+from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
 from services.robot_sim.backend import Backend
 from services.robot_sim.gate import Gate
@@ -63,7 +64,7 @@ class Guard:
         service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
         for verb in ("arm", "release", "hold"):
             service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
-        service.on_each(keys.ESTOP, EStop, self._on_estop, any_run=True)
+        service.on_each(keys.ESTOP, EStop, self._on_estop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_request(keys.ESTOP_RESET, Empty, self._reset_estop)
         service.on_alive(self._on_alive)
 
