@@ -91,7 +91,8 @@ class OfflinePlant:
                 low, high = limits[i]
                 raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
         self.controller.set_attractor(part, target)
-        self._actions[part] = _Action(self.time, SettleTest(self.controller.gains.settle, self.time))
+        asked = self.time - self.dt  # in the tick just over, as live: the next one is the first to see it
+        self._actions[part] = _Action(asked, SettleTest(self.controller.gains.settle, asked))
 
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts."""

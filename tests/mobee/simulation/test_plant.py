@@ -36,7 +36,7 @@ def test_an_action_ends_settled_near_its_target(gains: Gains) -> None:
     outcome = plant.act("arm", np.array([0.4, -0.3]))
     assert outcome.settled and outcome.touched == ()
     assert outcome.q == pytest.approx([0.4, -0.3], abs=0.05)
-    assert outcome.duration == pytest.approx(plant.time - plant.dt)
+    assert outcome.duration == pytest.approx(plant.time)
     assert np.array_equal(outcome.q, plant.measure("arm"))
 
 
@@ -101,6 +101,16 @@ def test_without_contact_forces_the_part_goes_through() -> None:
     stopped = OfflinePlant(touching(+0.1)).act("trunk", target)
     assert through.q == pytest.approx(target, abs=0.05)
     assert stopped.q[0] > -0.4
+
+
+def test_a_second_of_action_is_a_second_of_control() -> None:
+    """The goal counts from the tick after it was set, as in the controller's process."""
+    at_once = Settle(speed=1e3, acceleration=1e3, first_look=1.0)
+    plant = arm_plant(gains=replace(Gains.default(), settle=at_once))
+    for _ in range(2):
+        before = plant.time
+        assert plant.act("arm", np.array([0.1, 0.1])).duration == pytest.approx(1.0)
+        assert plant.time - before == pytest.approx(1.0)
 
 
 def test_a_timeout_is_an_outcome() -> None:
