@@ -63,6 +63,14 @@ def _is_free(port: int) -> bool:
     return True
 
 
+def check_gains(scenario: Scenario) -> None:
+    """Raise ConfigError when services of one law would use different sets of gains: nothing would tell later."""
+    named = {part.who: part.config.gains for part in scenario.parts if hasattr(part.config, "gains")}
+    if len(set(named.values())) > 1:
+        said = ", ".join(f"{who} {gains}" for who, gains in named.items())
+        raise ConfigError(f"{scenario.where('shared.gains')}: gains differ: {said}. They share one law: set it once, as shared.gains.")
+
+
 def check_robots(scenario: Scenario) -> None:
     """Raise ConfigError in one line when a robot or world that a service names cannot be read."""
     from mobee.robot.load import load_robot, load_world

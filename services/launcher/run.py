@@ -20,7 +20,7 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
-from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_ports, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
 from services.launcher.child import Program
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
@@ -52,6 +52,7 @@ def launch(options: Options) -> int:
     started = time.monotonic()
     try:
         scenario = read_scenario(options.scenario, options.settings, leave_out=["monitor"] if options.headless else [])
+        check_gains(scenario)
         check_robots(scenario)
         check_extras(scenario)
         check_ports(scenario)

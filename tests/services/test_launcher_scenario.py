@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.common.config import ConfigError
-from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_ports, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
 from services.launcher.scenario import read_scenario, shipped
 from services.launcher.toml import to_toml
 from tests.services.launched import mobee, toys
@@ -52,6 +52,12 @@ def test_shipped_scenarios_are_right(name: str) -> None:
     scenario = read_scenario(name)
     check_robots(scenario)
     assert scenario.title
+
+
+def test_model_and_controller_must_use_one_set_of_gains() -> None:
+    check_gains(read_scenario("default", ["shared.gains=default"]))
+    with pytest.raises(ConfigError, match="model default, controller published_2014"):
+        check_gains(read_scenario("default", ["services.model.gains=default"]))
 
 
 def test_parts_come_in_the_order_of_their_start() -> None:
