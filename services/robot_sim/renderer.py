@@ -18,6 +18,7 @@ from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.config import load_config
 from services.common.delivery import BULK
+from services.common.entry import explained
 from services.common.figures import Percentiles
 from services.common.service import Service
 from services.robot_sim.renderer_config import RendererConfig
@@ -101,11 +102,12 @@ class RendererNode:
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the renderer until it is told to end."""
     config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
-    robot = load_robot(config.robot)
-    with Service("renderer", config, robot) as service:
-        RendererNode(service, config, robot)
-        service.ready()
-        service.run()
+    with explained("services.robot_sim.renderer"):
+        robot = load_robot(config.robot)
+        with Service("renderer", config, robot) as service:
+            RendererNode(service, config, robot)
+            service.ready()
+            service.run()
 
 
 if __name__ == "__main__":
