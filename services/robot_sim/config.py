@@ -20,7 +20,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     rate: Annotated[float, Meta(ge=1, le=1000)] = 100.0
     """Ticks a second."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
-    """Simulated seconds a second; the limits on the age of messages stay in real time."""
+    """Simulated seconds a second; a command's ttl stays in real time, its age is counted in ticks."""
     world: str = "table"
     """Shipped world, or path to a world file."""
     lag: NotNegative = 0.05
