@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from mobee import load_robot
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
 from services.monitor.config import Config
 from services.monitor.node import MonitorNode
@@ -15,11 +16,12 @@ from services.monitor.output import open_output
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the monitor until it is told to end."""
     config = load_config(Config, argv, "services.monitor")
-    robot = load_robot(config.robot)
-    with open_output(config) as output, Service("monitor", config, robot) as service:
-        MonitorNode(service, config, robot, output)
-        service.ready()
-        service.run()
+    with explained("services.monitor"):
+        robot = load_robot(config.robot)
+        with open_output(config) as output, Service("monitor", config, robot) as service:
+            MonitorNode(service, config, robot, output)
+            service.ready()
+            service.run()
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from mobee import load_robot
 from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
 from services.vision.config import Config
 from services.vision.node import VisionNode
@@ -14,11 +15,12 @@ from services.vision.node import VisionNode
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the target locator until it is told to end."""
     config = load_config(Config, argv, "services.vision")
-    robot = load_robot(config.robot)
-    with Service("vision", config, robot) as service:
-        VisionNode(service, config, robot)
-        service.ready()
-        service.run()
+    with explained("services.vision"):
+        robot = load_robot(config.robot)
+        with Service("vision", config, robot) as service:
+            VisionNode(service, config, robot)
+            service.ready()
+            service.run()
 
 
 if __name__ == "__main__":
