@@ -37,12 +37,14 @@ class Screen:
             return
         columns, rows = shutil.get_terminal_size()
         lines = [f"mobee: {self._title}   up {_clock(time.monotonic() - self._started)}", f"run    {directory}"]
-        lines += [f"page   {page}" for page in _pages(children)]
+        lines += [f"page   {page}" if len(page) + 7 < columns else page for page in _pages(children)]  # cut short it would lead nowhere
         lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  says"]
         lines += [_row(child) for child in children]
         news = [line for text in self._news for line in textwrap.wrap(text, columns - 1, subsequent_indent=" " * 9)]
-        lines += ["", *news, "" if last else "Ctrl-C stops everything."]
-        lines = lines[: rows - 1]  # what scrolled away could not be drawn over
+        end = [] if last else ["Ctrl-C stops everything."]
+        lines = lines[: rows - 1 - len(end)]  # what scrolled away could not be drawn over
+        room = rows - 2 - len(end) - len(lines)
+        lines += ["", *news[-room:], *end] if room > 0 else end
         text = "".join(f"\x1b[2K{_paint(line[: columns - 1])}\n" for line in lines)
         up = f"\x1b[{self._height}A" if self._height else ""
         sys.stderr.write(f"{up}{text}\x1b[J")

@@ -51,6 +51,29 @@ def test_the_screen_fits_the_terminal(monkeypatch: pytest.MonkeyPatch, children:
     lines = lines_of(terminal.getvalue())
     assert max(map(len, lines)) < columns
     assert len(lines) < rows
+    assert lines[-1] == "Ctrl-C stops everything."
+
+
+def test_where_not_all_news_fit_the_newest_stay(monkeypatch: pytest.MonkeyPatch, children: list[Child]) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setenv("LINES", "12")
+    screen = Screen("a test")
+    for number in range(5):
+        screen.tell(f"news {number} " + "and what it means " * 5)
+    screen.tell("all ready")
+    screen.draw(children, Path("runs/x"))
+    assert [line[9:] for line in lines_of(terminal.getvalue())[-2:-1]] == ["all ready"]
+
+
+def test_the_address_of_the_page_is_whole_where_it_just_fits(monkeypatch: pytest.MonkeyPatch, children: list[Child]) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    address = "http://127.0.0.1:9090/?url=x"
+    monkeypatch.setenv("COLUMNS", str(len(address) + 1))
+    Screen("a test").draw(children, Path("runs/x"))
+    assert address in lines_of(terminal.getvalue())
 
 
 def test_a_second_drawing_covers_the_first(monkeypatch: pytest.MonkeyPatch, children: list[Child]) -> None:
