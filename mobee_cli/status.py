@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import shutil
 import time
 from typing import Any
@@ -87,12 +88,14 @@ def _as_text(status: dict[str, Any]) -> str:
             f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>7}{_say(service['restarts']):>10}  "
             f"{' '.join(says.split())}"[:columns].rstrip()
         )
+    pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
+    lines += [f"page  {page}" for page in pages]  # whole: cut short it would lead nowhere
     if status["parts"]:
         lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>14}{'command age':>13}{'faults':>8}"]
         for part, state in sorted(status["parts"].items()):
             lines.append(
                 f"{part:<16}{state['gate']:<9}{_say(state.get('mode')):<10}{_say(state.get('epoch')):>14}"
-                f"{_say(state.get('cmd_age')):>13}{_say(state.get('faults')):>8}"
+                f"{_say(_age(state)):>13}{_say(state.get('faults')):>8}"
             )
     if status["agents"]:
         lines += ["", f"{'agent':<16}{'transitions':>12}{'timeouts':>10}{'interrupted':>13}{'mean action s':>15}"]
@@ -103,6 +106,12 @@ def _as_text(status: dict[str, Any]) -> str:
                 f"{_say(numbers.get('interrupted')):>13}{'-' if mean < 0 else f'{mean:.2f}':>15}"
             )
     return "\n".join(lines)
+
+
+def _age(state: dict[str, Any]) -> Any:
+    """Ticks; None while no command is in force."""
+    age = state.get("cmd_age")
+    return None if age == -1 else age
 
 
 def _say(value: Any) -> str:
