@@ -38,6 +38,7 @@ def test_a_wrong_option_is_said_in_one_line(arguments: list[str], capsys: pytest
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1
     assert said.startswith(f"mobee {arguments[0]}")
+    assert " _" not in said  # no name of our own code
 
 
 @pytest.mark.parametrize("verb", [["status"], ["stop"], ["estop"], ["estop", "--reset"], ["topic", "list"], ["topic", "echo", "clock"]])
