@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import socket
 import sys
+import warnings
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -72,7 +73,7 @@ def check_gains(scenario: Scenario) -> None:
 
 
 def check_robots(scenario: Scenario) -> None:
-    """Raise ConfigError in one line when a robot or world that a service names cannot be read."""
+    """Raise ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored."""
     from mobee.robot.load import load_robot, load_world
 
     read_robot, read_world = cache(load_robot), cache(load_world)
@@ -88,7 +89,11 @@ def check_robots(scenario: Scenario) -> None:
 
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:
     try:
-        return read(getattr(part.config, field))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # a misspelt table would be no table
+            return read(getattr(part.config, field))
+    except UserWarning as warning:
+        raise ConfigError(f"{warning}. The launcher ignores nothing: correct it or take it out.") from None
     except UnknownName as error:
         raise ConfigError(f"{scenario.where(f'services.{part.who}.{field}')}: {field}: {error}") from None
     except MobeeError as error:

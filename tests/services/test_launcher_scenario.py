@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.robot import load
 from services.common.config import ConfigError
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
 from services.launcher.scenario import read_scenario, shipped
@@ -129,6 +130,22 @@ def test_a_mistaken_setting_is_named(scenario: Path, setting: str, said: str) ->
     text = mistake(scenario, setting)
     assert text.startswith(f"--set {setting}")
     assert said in text
+
+
+@pytest.mark.parametrize(
+    ("right", "typo", "said"),
+    [
+        ("<box ", "<bax ", "<bax>: unknown tag is ignored. Did you mean 'box'?"),
+        ("role=", "rol=", "<sphere>: unknown attribute 'rol' is ignored. Did you mean 'role'?"),
+    ],
+)
+def test_a_typo_in_a_world_that_a_library_would_ignore_is_refused(tmp_path: Path, right: str, typo: str, said: str) -> None:
+    lines = (Path(load.__file__).parent / "worlds" / "table.xml").read_text().splitlines()
+    number = next(number for number, line in enumerate(lines, 1) if right in line)
+    lines[number - 1] = lines[number - 1].replace(right, typo)
+    world = tmp_path / "mine.xml"
+    world.write_text("\n".join(lines))
+    assert mistake("default", f"shared.world={world}").startswith(f"{world}:{number}: {said}")
 
 
 def test_an_unknown_scenario_names_the_nearest() -> None:
