@@ -86,7 +86,7 @@ class ControllerNode:
         clock, self._clock = self._clock, None
         if clock is None or not self._body.update():
             return
-        fresh = self._forces is not None and abs(clock.k - self._forces.re_k) <= OLDEST
+        fresh = self._forces is not None and self._are_fresh(self._forces, clock.k)
         self._supervise(clock, fresh)
         gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
         if fresh and self._forces is not None:
@@ -95,6 +95,10 @@ class ControllerNode:
             self._starve(clock.k)
         self._publish_motion(clock)
         self._ticks += 1
+
+    def _are_fresh(self, forces: ForcesMessage, k: int) -> bool:
+        """Whether they answer a tick near k, and were formed of states of all parts near that tick: a contact concerns many."""
+        return abs(k - forces.re_k) <= OLDEST and max(forces.part_age.values(), default=0) <= STALE
 
     def _supervise(self, clock: Clock, fresh: bool) -> None:
         """Arm what can be armed; what is not under control has no action and rests where it is."""

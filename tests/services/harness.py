@@ -346,6 +346,7 @@ class FakeModel:
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
         self.touched: dict[str, list[str]] = {}
+        self.part_age: dict[str, int] = {}  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
         rig.listen(keys.CLOCK, self._answer)
 
@@ -359,7 +360,8 @@ class FakeModel:
 
     def put(self, re_k: int) -> None:
         zeros = [0.0] * len(self.collision)
-        self._forces.put(re_k=re_k, limits=zeros, constraints=zeros, collision=self.collision.tolist(), part_age={}, touched=self.touched)
+        collision, age = self.collision.tolist(), self.part_age
+        self._forces.put(re_k=re_k, limits=zeros, constraints=zeros, collision=collision, part_age=age, touched=self.touched)
 
 
 class FakeController:

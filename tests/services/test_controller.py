@@ -121,7 +121,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 def run(stage: Stage) -> Iterator[Stage]:
     """The stage in a new run with all parts under control."""
     stage.sim.frozen, stage.sim.silent, stage.sim.refuses_to_arm = False, set(), set()
-    stage.model.silent, stage.model.behind, stage.model.touched = False, 0, {}
+    stage.model.silent, stage.model.behind, stage.model.touched, stage.model.part_age = False, 0, {}, {}
     stage.model.collision[:] = 0.0
     stage.sim.new_run()
     stage.under_control()
@@ -237,6 +237,8 @@ def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_no_actio
     for part in PARTS:
         assert wait_for(lambda part=part: run.commands(part, k - 1), "the command")[-1].mode == "hold"
     refused("held", lambda: run.goal("left_arm", epoch, near("left_arm")))
+    refused("held", lambda: run.force("left_arm", epoch, f=[1.0] * 16))
+    run.force("left_arm", epoch)  # clearing is always right
     run.ticks(150)  # beyond any look of the settle test
     assert run.statuses() == {"held"}
     assert "settled" not in {m.status for m in run.motions["left_arm"] if m.action_id == "interrupted"}
@@ -254,6 +256,15 @@ def test_forces_that_lag_by_more_than_three_ticks_are_no_forces(run: Stage) -> N
     run.ticks(10)
     assert run.statuses() == {"idle"}
     run.model.behind = 4
+    run.ticks(2)
+    assert run.statuses() == {"held"}
+
+
+def test_forces_of_a_posture_in_which_one_part_is_old_are_no_forces(run: Stage) -> None:
+    run.model.part_age = dict.fromkeys(PARTS, 20_000_000) | {"left_arm": 100_000_000}
+    run.ticks(10)
+    assert run.statuses() == {"idle"}
+    run.model.part_age["left_arm"] += 1
     run.ticks(2)
     assert run.statuses() == {"held"}
 
