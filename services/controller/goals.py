@@ -68,6 +68,8 @@ class GoalDesk:
 
     def _force(self, part: str, request: Force) -> Done:
         self._check_epoch(part, request.epoch)
+        if self._actions[part].status == "held" and (request.f is not None or request.marker is not None):
+            raise CallRefused("held", f"{part} is in hold, in which forces end; wait until its motion says otherwise")
         try:
             self._apply(part, request)
         except MobeeError as error:
