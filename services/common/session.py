@@ -60,12 +60,13 @@ def open_router(endpoint: str) -> zenoh.Session:
         return zenoh.open(_config(settings))
     except zenoh.ZError as error:
         raise BusUnreachable(
-            f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop` ends it; "
-            "or choose another endpoint with --endpoint."
+            f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop --endpoint {endpoint}` ends it; "
+            "or choose another endpoint with --endpoint, such as tcp/127.0.0.1:7448."
         ) from None
 
 
 def _reason(error: zenoh.ZError) -> str:
     """Zenoh's message without the lines of its own source files."""
     text = re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
+    text = re.sub(r'^Json5Err\(Message \{ msg: "(.*?)", location:.*', r"\1", text)
     return re.sub(r"Unable to connect to any of \[.*\]!", "nobody answers", text)
