@@ -178,9 +178,9 @@ def missing(monkeypatch: pytest.MonkeyPatch, package: str, *settings: str) -> st
 @pytest.mark.parametrize(
     ("package", "service", "remedy"),
     [
-        ("icub_models", "robot_sim", "mobee[sim]"),
-        ("cv2", "vision", "mobee[vision]"),
-        ("rerun", "monitor", "mobee[viz]"),
+        ("icub_models", "robot_sim", ".[sim]"),
+        ("cv2", "vision", ".[vision]"),
+        ("rerun", "monitor", ".[viz]"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch, package: str, service: str, remedy: str) -> None:
