@@ -96,7 +96,8 @@ class RendererNode:
             "pair_ms_p50": self._pair_time.at(50),
             "pair_ms_p99": self._pair_time.at(99),
         }
-        return f"{self._pairs} pairs of pictures, {numbers['frame_ms_p50']:.0f} ms a picture", numbers
+        each = f", {numbers['frame_ms_p50']:.0f} ms a picture" if self._pairs else ""
+        return f"{self._pairs} pairs of pictures{each}", numbers
 
 
 def main(argv: Sequence[str] | None = None) -> None:
