@@ -193,7 +193,7 @@ def test_a_second_launcher_at_the_same_endpoint_is_refused_in_one_line(launch: L
     assert second.end() == (3, {})
     assert len(second.news.splitlines()) == 1
     assert f"cannot listen at {endpoint}" in second.news
-    assert f"`mobee stop --endpoint {launched.endpoint}`" in second.news
+    assert f"`mobee stop --endpoint {endpoint}`" in second.news
     assert not (second.folder / "runs").exists()
 
 
