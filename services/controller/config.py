@@ -18,7 +18,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """What the motors are commanded."""
     speed_scale: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """Share of the motors' top speed that is used."""
-    ttl: Annotated[int, Meta(ge=20, le=1000)] = 100
+    ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Milliseconds after which robot_sim holds a part that it hears nothing for."""
     posture: dict[str, list[float]] = {}
     """Where a part that nobody owns shall be, rad, by part; a part that is not named stays where it is."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from bus_schema import keys
-from bus_schema.messages import State
+from bus_schema.messages import EStop, State
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed
@@ -26,6 +26,7 @@ class Drives:
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         self._next_try = dict.fromkeys(robot.parts, 0.0)
         self._shows_by = dict.fromkeys(robot.parts, 0.0)
+        self._stopped = False  # an emergency stop outlives a robot_sim that dies under it
         self._asking: dict[str, object] = {}  # part -> mark of the attempt under way
 
     def armed(self, part: str, state: State) -> bool:
@@ -43,10 +44,14 @@ class Drives:
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._asking.clear()
 
+    def note_stop(self, message: EStop) -> None:
+        """An emergency stop, or its reset: between them nothing is armed."""
+        self._stopped = message.set
+
     def try_arm(self, part: str, state: State) -> None:
         """Begin to take and arm a part that is idle or in hold; `armed` says when it is done."""
         now = time.monotonic()
-        if state.gate not in ("idle", "hold", "armed") or now < self._next_try[part] or part in self._asking:
+        if self._stopped or state.gate not in ("idle", "hold", "armed") or now < self._next_try[part] or part in self._asking:
             return
         self._next_try[part] = now + RETRY
         self.epochs[part] = 0

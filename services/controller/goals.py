@@ -11,6 +11,7 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
+from mobee.collision.touch import links_moved
 from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service
@@ -83,7 +84,8 @@ class GoalDesk:
             self.clear(part)
             return
         if request.marker is not None:
-            self._robot.marker(request.marker)
+            if self._robot.marker(request.marker).link not in links_moved(self._robot)[part]:
+                raise InvalidValue(f"{part} does not move the marker {request.marker!r}: push it through a part that does")
             self._pushes.setdefault(part, {})[request.marker] = np.array(request.push)
         if request.f is not None:
             self._forces[self._robot.part(part).slice] = request.f

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Command, Motion
+from bus_schema.messages import Clock, Command, EStop, Motion
 from bus_schema.messages import Forces as ForcesMessage
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
@@ -15,6 +15,7 @@ from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.delivery import LATEST
+from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import Service
 from services.controller.action import Action
 from services.controller.config import Config
@@ -47,6 +48,7 @@ class ControllerNode:
         self._goals = GoalDesk(service, robot, self._law, self._actions, self._stay)
         service.on_run(self._new_run)
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
+        service.on_each(keys.ESTOP, EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_clock(self._tick)
 
     def _check_posture(self) -> None:

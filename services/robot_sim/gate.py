@@ -165,13 +165,17 @@ class Gate:
         if command.mode != self.mode:
             self._shaper.start(q, velocity)
         self.mode, self.seq, self.age = command.mode, command.seq, k - command.re_k
-        return self._shaped(command.mode, current.reference, q)
+        return self._shaped(command.mode, current.reference, q, velocity)
 
-    def _shaped(self, mode: Mode, reference: Array, q: Array) -> Drive:
+    def _shaped(self, mode: Mode, reference: Array, q: Array, velocity: Array) -> Drive:
         if mode == "velocity":
             return Drive(mode, self._shaper.to_velocity(reference, q))
         if mode == "position":
             return Drive(mode, self._shaper.to_position(reference))
+        if mode == "torque" and self._shaper.runs_out(q, velocity):
+            self._enter("hold", "a torque drives a motor into its limit")
+            self.mode = "hold"
+            return HOLD
         return Drive(mode, reference) if mode == "torque" else HOLD
 
     def _enter(self, state: GateState, why: str, **values: float) -> None:

@@ -75,6 +75,8 @@ class Guard:
 
     def _take(self, request: Take, key: str) -> Taken:
         gate = self.gates[key.split("/")[0]]
+        if gate.owner is not None and gate.owner[1] != request.instance and gate.owner[1] in self._service.alive.get(gate.owner[0], ()):
+            raise CallRefused("owned", f"{gate.part} belongs to {gate.owner[0]}, which lives; it must release the part first")
         return Taken(v=VERSION, epoch=gate.take(request.who, request.instance))
 
     def _drive(self, request: WithEpoch, key: str) -> Driven:
@@ -127,4 +129,6 @@ class Guard:
             for gate in self.gates.values():
                 gate.reset_stop()
             self._service.bus.event("warning", "estop_reset", f"emergency stop reset by {request.who}")
+        # Told in any case: those who remember a stop of the run before must hear it.
+        self._estop.put(set=False, source=request.who, reason="reset")
         return Done(v=VERSION)

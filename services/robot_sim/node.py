@@ -108,7 +108,7 @@ class Node:
         self._watch_stops()
 
     def _watch_stops(self) -> None:
-        now, motors, stops = time.monotonic_ns(), self._backend.motors, self._counters.stops
+        now, motors, stops = self._bus.t, self._backend.motors, self._counters.stops
         for part, gate in self._guard.gates.items():
             where = self._robot.parts[part].slice
             q, velocity = motors.q[where], motors.motor_velocities[where]

@@ -25,10 +25,14 @@ class Shaper:
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
         """The velocity to ask for now; before a position limit no more than can still be braked."""
-        up = self._braked_within(np.maximum(self._limits.upper - q, 0.0))
-        down = self._braked_within(np.maximum(q - self._limits.lower, 0.0))
+        down, up = self._brakeable(q)
         self._approach(np.clip(wanted, -down, up))
         return self.velocity
+
+    def runs_out(self, q: Array, velocity: Array) -> bool:
+        """Whether some motor is a tick of braking too fast, rad/s, to stop before its position limit."""
+        down, up = self._brakeable(q)
+        return bool(((velocity > up + self._change) | (velocity < -down - self._change)).any())
 
     def to_position(self, wanted: Array) -> Array:
         """The position to ask for now, on the way to `wanted` and arriving there at rest."""
@@ -37,6 +41,10 @@ class Shaper:
         self._approach(np.sign(rest) * fastest)
         self.position = self.position + self.velocity * self._dt
         return self.position
+
+    def _brakeable(self, q: Array) -> tuple[Array, Array]:
+        """The largest speeds downwards and upwards that can be braked before a limit."""
+        return self._braked_within(np.maximum(q - self._limits.lower, 0.0)), self._braked_within(np.maximum(self._limits.upper - q, 0.0))
 
     def _approach(self, velocity: Array) -> None:
         self.velocity = self.velocity + np.clip(velocity - self.velocity, -self._change, self._change)

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus_schema import encoding_of, keys
-from bus_schema.messages import Clock, Command, Event, Forces, Motion, State
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.messages import Clock, Command, EStop, Event, Forces, Motion, State
 from bus_schema.rpc import Done, Empty, Force, Goal, Started, Take, Taken, WithEpoch
 from mobee import Controller, Gains, Model, load_robot
 from mobee.control import Forces as Acting
@@ -429,6 +429,7 @@ def test_a_wrong_force_is_refused(run: Stage) -> None:
     assert "left_palm" in refused("force", lambda: run.force("left_arm", epoch, marker="left_plam", push=[0.0, 0.0, 1.0]))
     refused("force", lambda: run.force("left_arm", epoch, marker="left_palm"))
     refused("force", lambda: run.force("left_arm", epoch, push=[0.0, 0.0, 1.0]))
+    assert "does not move" in refused("force", lambda: run.force("left_arm", epoch, marker="right_palm", push=[0.0, 0.0, 1.0]))
     refused("length", lambda: run.force("left_arm", epoch, f=[1.0]))
     refused("epoch", lambda: run.force("left_arm", epoch - 1, f=[0.0] * 16))
 
@@ -445,6 +446,26 @@ def test_forces_end_with_a_hold_and_with_their_owner(run: Stage) -> None:
 
 
 # What holds when
+
+
+def test_between_an_emergency_stop_and_its_reset_nothing_is_armed(run: Stage) -> None:
+    """Also not by a robot_sim that died under the stop and has come back without knowing of it."""
+
+    def tell(stop: bool) -> None:
+        header = {"v": VERSION, "run": "another", "src": "test", "seq": 0, "k": 0, "t": 0, "tw": 0}
+        message = EStop(**header, set=stop, source="test", reason="test")  # type: ignore[arg-type]
+        run.rig.session.put(keys.ESTOP, encode(message), encoding=encoding_of(EStop))
+
+    run.ticks(30)
+    tell(True)
+    run.ticks(30)
+    run.sim.new_run()
+    epochs = {part: gate.epoch for part, gate in run.sim.gates.items()}
+    run.ticks(100)
+    assert {part: gate.epoch for part, gate in run.sim.gates.items()} == epochs
+    assert {run.motion(part).status for part in ROBOT.parts} == {"held"}
+    tell(False)
+    run.play(lambda: all(run.motion(part).status == "idle" for part in ROBOT.parts), "all parts to be armed", ticks=1000)
 
 
 def test_a_part_that_the_gate_drops_is_held_and_armed_again_at_rest(run: Stage) -> None:

@@ -57,6 +57,10 @@ class Bench:
     def drive(self, part: str, verb: str, epoch: int) -> str:
         return str(self.rig.call(keys.drive(part, verb), WithEpoch, Driven, who="controller", epoch=epoch).gate)
 
+    def free(self, part: str) -> None:
+        """Have the part belong to nobody."""
+        self.drive(part, "release", self.take(part))
+
     def take(self, part: str, instance: str = "c1") -> int:
         return int(self.rig.call(keys.drive(part, "take"), Take, Taken, who="controller", instance=instance).epoch)
 
@@ -178,6 +182,7 @@ def test_the_arm_holds_at_once_when_a_token_is_gone(bench: Bench, who: str) -> N
     instance = "rig" if who == "router" else "victim"
     if who != "router":
         bench.rig.token(who, instance)
+    bench.free("left_arm")
     epoch = bench.take("left_arm", instance if who == "controller" else "c1")
     wait_for(lambda: _armed(bench, "left_arm", epoch), "arming")
     bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.5))
@@ -201,10 +206,22 @@ def _armed(bench: Bench, part: str, epoch: int) -> bool:
 
 
 def test_who_has_no_token_cannot_arm(bench: Bench) -> None:
+    bench.free("left_arm")
     epoch = bench.take("left_arm", "nobody")
     with pytest.raises(CallFailed, match="declare it") as caught:
         bench.drive("left_arm", "arm", epoch)
     assert caught.value.code == "no_token"
+
+
+def test_nobody_takes_a_part_whose_owner_lives(bench: Bench) -> None:
+    bench.free("left_arm")
+    epoch = bench.arm("left_arm")
+    bench.rig.token("controller", "stranger")
+    with pytest.raises(CallFailed, match="must release") as caught:
+        bench.take("left_arm", "stranger")
+    assert caught.value.code == "owned"
+    assert bench.drive("left_arm", "arm", epoch) == "armed"
+    bench.rig.drop_token("controller", "stranger")
 
 
 def test_of_two_owners_the_older_can_do_nothing_any_more(bench: Bench) -> None:

@@ -302,3 +302,19 @@ def test_an_emergency_stop_stays_through_everything_but_its_reset(deeds: list[ob
         gated.tick()
         assert gated.gate.state == "estop"
         assert gated.drive.mode == "hold"
+
+
+@pytest.mark.parametrize("parameters", [MotorParameters.ideal(), MotorParameters()])
+def test_a_torque_that_drives_a_motor_into_its_limit_ends_in_a_hold_before_it(parameters: MotorParameters) -> None:
+    gated = Gated(parameters).owned()
+    for _ in range(1000):
+        if gated.gate.state != "armed":
+            break
+        gated.command("torque", [20.0, 0.0, 0.0])
+        gated.tick()
+    assert "torque" in gated.told[-1][1]
+    for _ in range(50):
+        gated.tick()
+    assert gated.q[0] <= LIMITS.upper[0] + 1e-6
+    assert abs(gated.velocity[0]) < 0.01
+    assert gated.q[0] > LIMITS.upper[0] - 0.2  # not long before it either
