@@ -27,6 +27,8 @@ def free_port() -> int:
 
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What ./test found before pytest, repeated just above the closing line."""
+    """What was left out, and what ./test found before pytest, just above the closing line."""
+    if any("live picture" in str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())):
+        terminalreporter.write_line("skipped: live picture")
     if summary := os.environ.get("MOBEE_CHECKS"):
         terminalreporter.write_line(summary, red="FAILED" in summary)

@@ -9,6 +9,7 @@ from services.monitor.palette import PARTS
 TIMELINE = "robot_time"
 ROOT = "root_link"  # frame of everything in the scene
 WINDOW = 30.0  # s of plot
+SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
 
 
 def blueprint() -> rrb.Blueprint:
@@ -16,7 +17,7 @@ def blueprint() -> rrb.Blueprint:
     left = rrb.Vertical(_scene(), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
     plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
     learning = rrb.Tabs(
-        _plot("reward, nats", "plots/reward"),
+        _plot("reward, nats", "plots/reward", rrb.ScalarAxis(range=SURPRISE)),
         _plot("value", "plots/value"),
         _plot("transitions", "plots/transitions"),
     )
@@ -54,8 +55,8 @@ def _log() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/events", name="events", columns=columns)
 
 
-def _plot(title: str, origin: str) -> rrb.TimeSeriesView:
+def _plot(title: str, origin: str, axis: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
     window = rrb.VisibleTimeRange(
         TIMELINE, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-WINDOW), end=rrb.TimeRangeBoundary.cursor_relative()
     )
-    return rrb.TimeSeriesView(origin=f"/{origin}", name=title, time_ranges=window, plot_legend=rrb.PlotLegend("LeftTop"))
+    return rrb.TimeSeriesView(origin=f"/{origin}", name=title, time_ranges=window, plot_legend=rrb.PlotLegend("LeftTop"), axis_y=axis)
