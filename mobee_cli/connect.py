@@ -28,4 +28,4 @@ def connected(endpoint: str) -> Iterator[Any]:
     try:
         yield session
     finally:
-        session.close()  # type: ignore[no-untyped-call]
+        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types

@@ -96,7 +96,7 @@ class Child:
     def terminate(self) -> None:
         """Ask the process to end."""
         if self.running():
-            self.process.terminate()  # type: ignore[union-attr]
+            self.process.terminate()  # type: ignore[union-attr]  # running() says that there is one
 
     def kill(self) -> None:
         """End the process and whatever it started, and wait until it is gone."""

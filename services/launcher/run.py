@@ -67,7 +67,7 @@ def launch(options: Options) -> int:
         service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
         service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
     except OSError as error:
-        session.close()  # type: ignore[no-untyped-call]
+        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
         return _refuse(
             f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
         )
@@ -115,7 +115,7 @@ class _Run:
         finally:
             self._supervisor.kill_all()
             self._screen.draw(self._children, self._directory, last=True)
-        token.undeclare()  # type: ignore[no-untyped-call]
+        token.undeclare()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
         return self._report(ready, duration)
 
     def _over(self) -> bool:
