@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -13,7 +14,8 @@ from mobee.errors import UnknownName
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
-ShapeKind = Literal["sphere", "capsule", "cylinder", "box"]
+ShapeKind = Literal["sphere", "capsule", "cylinder", "box", "convex"]
+LinkPair = frozenset[int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +69,7 @@ class Shape:
     """A volume on a link: a solid, or a larger field that only generates force.
 
     `size`: sphere (r,); capsule and cylinder (r, height along local z; a capsule's caps lie beyond it);
-    box (x, y, z) full edges; all in m.  `position`, `rotation`: root frame, zero pose.
+    box (x, y, z) full edges; convex (): the hull of `vertices`; all in m.  `position`, `rotation`: root frame, zero pose.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Shape:
     rotation: Array  # (3, 3)
     role: Literal["solid", "field"]
     part: str
+    vertices: Array | None = None  # (v, 3) m about `position`, in the shape's own axes; convex only
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +112,8 @@ class Robot:
     """A kinematic tree with everything the model, the controller and the agents need to know of it.
 
     `field_pairs` and `solid_pairs` are (p, 2) indices into `shapes`: what is tested against each other.
-    `base_shapes` marks shapes that are never tested against world objects (they stand on them).
+    `base_shapes` marks shapes that are never tested against world objects (they stand on them).  `untested` says of every two
+    links that are never tested against each other why, `where` from which file and line a thing was read: ("joint", its name).
     """
 
     name: str
@@ -123,6 +127,8 @@ class Robot:
     field_pairs: Ints
     solid_pairs: Ints
     base_shapes: frozenset[int] = field(default_factory=frozenset)
+    untested: Mapping[LinkPair, str] = field(default_factory=dict)
+    where: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
     @cached_property
     def motors(self) -> tuple[str, ...]:
