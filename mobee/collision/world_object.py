@@ -1,0 +1,100 @@
+"""One object of the world, and what may be said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.collision.geometry import Geometry
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array, ShapeKind
+
+Role = Literal["obstacle", "target", "ghost"]
+Color = tuple[float, float, float, float]
+
+LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
+# What numpy.allclose(r @ r.T, eye, atol=1e-6) allows, at a tenth of its time: a flood of edits runs through here.
+_ORTHONORMAL = 1e-6 + 1e-5 * np.eye(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldObject:
+    """A volume in the world.
+
+    `position`, `rotation`: in the root frame; once attached, in the frame of `link`, which is the root frame at zero pose.
+    """
+
+    name: str
+    kind: ShapeKind
+    size: tuple[float, ...]  # as Geometry
+    position: Array  # (3,) m
+    rotation: Array  # (3, 3)
+    role: Role = "obstacle"
+    color: Color | None = None  # red, green, blue, opacity in 0..1
+    link: str | None = None
+
+
+def placed(thing: WorldObject, link_pose: Array) -> WorldObject:
+    """An attached object as a free one, where its link (4, 4) carries it now."""
+    turn, shift = link_pose[:3, :3], link_pose[:3, 3]
+    return replace(thing, position=turn @ thing.position + shift, rotation=turn @ thing.rotation, link=None)
+
+
+def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
+    """Position (3,) and rotation (3, 3) of a free object in the frame of a link at (4, 4)."""
+    back = link_pose[:3, :3].T
+    return back @ (thing.position - link_pose[:3, 3]), back @ thing.rotation
+
+
+def valid_shape(name: str, shape: Geometry) -> Geometry:
+    """The shape, if it is one of the four primitives with all of its lengths; raises InvalidValue."""
+    lengths = LENGTHS.get(shape.kind)
+    if lengths is None:
+        raise InvalidValue(f"world object {name!r}: a {shape.kind!r} cannot be in the world; valid: {', '.join(LENGTHS)}.")
+    if len(shape.size) != lengths:
+        raise InvalidValue(f"world object {name!r}: {shape.kind} of size {shape.size}; it must be {lengths} lengths in metres.")
+    return shape
+
+
+def valid_position(name: str, given: ArrayLike) -> Array:
+    """A copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
+    value = np.array(given, dtype=np.float64)
+    if value.shape != (3,) or not np.isfinite(value).all():
+        raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
+    return value
+
+
+def valid_rotation(name: str, given: ArrayLike) -> Array:
+    """A copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed."""
+    value = np.array(given, dtype=np.float64)
+    if value.shape != (3, 3) or not (abs(value @ value.T - np.eye(3)) <= _ORTHONORMAL).all() or not _is_right_handed(value):
+        raise InvalidValue(f"world object {name!r}: rotation {given!r}; it must be a (3, 3) rotation matrix.")
+    return value
+
+
+def _is_right_handed(rotation: Array) -> bool:
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0)
+
+
+def valid_role(name: str, role: Role) -> Role:
+    """The role; raises InvalidValue for anything but "obstacle", "target" and "ghost"."""
+    if role not in get_args(Role):
+        raise InvalidValue(f"world object {name!r}: role {role!r}; valid: {', '.join(get_args(Role))}.")
+    return role
+
+
+def valid_color(name: str, given: Sequence[float] | None) -> Color | None:
+    """Red, green, blue and opacity (1 if not given); raises InvalidValue unless each is 0 to 1."""
+    if given is None:
+        return None
+    channels = tuple(float(c) for c in given)
+    if len(channels) == 3:
+        channels = (*channels, 1.0)
+    if len(channels) != 4 or not all(0.0 <= c <= 1.0 for c in channels):
+        raise InvalidValue(f"world object {name!r}: color {given!r}; it must be red, green, blue and optionally opacity, each 0 to 1.")
+    return channels[0], channels[1], channels[2], channels[3]
