@@ -123,9 +123,9 @@ class World:
                 raise InvalidValue(f"world object {name!r} is not attached to any link.")
             self._snapshot = changed(self._snapshot, placed(old, _link_pose(self._followed, old.link)))
 
-    def follow(self, links: Mapping[str, Array] | tuple[str, ...], transforms: Array | None = None) -> None:
+    def follow(self, links: tuple[str, ...] | dict[str, Array], transforms: Array | None = None) -> None:
         """Told by a Model at every single-pose evaluation: the robot's links, and their poses (L, 4, 4), which nobody changes."""
-        if not isinstance(links, tuple):
+        if isinstance(links, dict):
             links, transforms = tuple(links), np.array(list(links.values()))
         if transforms is not None:
             self._followed = links, transforms
