@@ -125,10 +125,11 @@ class World:
 
     def follow(self, links: tuple[str, ...] | dict[str, Array], transforms: Array | None = None) -> None:
         """Told by a Model at every single-pose evaluation: the robot's links, and their poses (L, 4, 4), which nobody changes."""
-        if isinstance(links, dict):
-            links, transforms = tuple(links), np.array(list(links.values()))
-        if transforms is not None:
-            self._followed = links, transforms
+        if isinstance(links, tuple):
+            if transforms is not None:
+                self._followed = links, transforms
+        else:
+            self._followed = tuple(links), np.array(list(links.values()))
 
     def _get(self, name: str) -> WorldObject:
         if name not in self._snapshot.objects:
