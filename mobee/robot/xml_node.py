@@ -5,22 +5,23 @@ from __future__ import annotations
 import difflib
 import math
 import warnings
-import xml.sax
-import xml.sax.handler
 import xml.sax.xmlreader
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-import defusedxml
-import defusedxml.sax
 import numpy as np
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Array
+from mobee.robot.xml_file import LARGEST, LineHandler, parse_xml
 
 DEEPEST = 200  # elements; a reader that recurses must not be led into its own limit
+MOST_ELEMENTS = 50_000
+FARTHEST = 1e18  # beyond it the readers' arithmetic would overflow; some files write 1e16 for "no limit"
+SMALLEST = 1e-9
+LISTED = 40  # names in one message
 FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
 
@@ -39,7 +40,7 @@ class Node:
 
     def fail(self, what: str, problem: str, remedy: str) -> NoReturn:
         """Raise RobotFileError with file, line, field, problem and remedy."""
-        raise RobotFileError(f"{self.file}:{self.line}: <{self.tag}> {what}: {problem}. {remedy}")
+        raise RobotFileError(f"{self.file}:{self.line}: <{shown(self.tag)}> {what}: {problem}. {remedy}")
 
     def number(self, name: str, default: float | None = None) -> float:
         """A finite number, in the unit of the file; without a default the attribute is required."""
@@ -54,16 +55,19 @@ class Node:
         try:
             value = float(text)
         except ValueError:
-            self.fail(name, f"{text!r} is not a number", "Write a decimal number such as -0.25")
-        if not math.isfinite(value):
-            self.fail(name, f"{text!r} is not finite", "Write a decimal number such as -0.25")
+            value = None
+        if value is None or "_" in text or not text.isascii():  # both are numbers to Python only
+            self.fail(name, f"{shown(text)!r} is not a number", "Write a decimal number such as -0.25")
+        if not abs(value) <= FARTHEST:
+            problem = "is too large" if math.isfinite(value) else "is not finite"
+            self.fail(name, f"{shown(text)!r} {problem}", "Write a decimal number such as -0.25")
         return value
 
-    def positive(self, name: str, default: float | None = None) -> float:
+    def positive(self, name: str, default: float | None = None, unit: str = "metres") -> float:
         """A number above zero."""
         value = self.number(name, default)
-        if value <= 0:
-            self.fail(name, f"{value:g} is not positive", "Write a size above 0, in metres")
+        if value < SMALLEST:
+            self.fail(name, f"{value:g} is {'not positive' if value <= 0 else 'too small'}", f"Write a value above 0, in {unit}")
         return value
 
     def vector(self, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
@@ -87,9 +91,11 @@ class Node:
 
     def text(self, name: str) -> str:
         """A required, non-empty text."""
-        if not self.attributes.get(name, "").strip():
-            self.missing(name)
-        return self.attributes[name].strip()
+        return self.optional(name) or self.missing(name)
+
+    def optional(self, name: str) -> str:
+        """A text, empty when it is left out."""
+        return self.attributes.get(name, "").strip()
 
     def flag(self, name: str, default: bool = False) -> bool:
         """A yes or no."""
@@ -97,84 +103,82 @@ class Node:
             return default
         value = self.attributes[name].strip().lower()
         if value not in FLAGS:
-            self.fail(name, f"{self.attributes[name]!r} is neither true nor false", "Write true or false")
+            self.fail(name, f"{shown(self.attributes[name])!r} is neither true nor false", "Write true or false")
         return FLAGS[value]
 
     def choice(self, name: str, given: str, valid: Collection[str], kind: str) -> str:
         """The given name if it is one of the valid ones; else an error with the nearest."""
         if given not in valid:
-            self.fail(name, f"unknown {kind} {given!r}", f"{nearest(given, valid)}Valid: {', '.join(sorted(valid)) or 'none'}")
+            self.fail(name, f"unknown {kind} {shown(given)!r}", f"{nearest(given, valid)}Valid: {listed(valid)}")
         return given
 
     def missing(self, name: str) -> NoReturn:
         """Raise the error of a required attribute that is not there, naming a misspelt one if it looks like it."""
         given = sorted(self.attributes)
-        near = difflib.get_close_matches(name, given, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(name, given, n=1, cutoff=0.5) if len(given) <= LISTED else []
         remedy = f"Did you misspell it as {near[0]!r}? " if near else ""
-        self.fail(name, "is required and missing", f'{remedy}Add {name}="..." (given: {", ".join(given) or "nothing"})')
+        self.fail(name, "is required and missing", f'{remedy}Add {name}="..." (given: {listed(given) if given else "nothing"})')
 
     def check_attributes(self, known: Collection[str]) -> None:
         """Warn of attributes that the grammar does not know."""
         for name in self.attributes:
             if name not in known:
-                self.warn(f"unknown attribute {name!r} is ignored. {nearest(name, known)}Valid: {', '.join(sorted(known))}")
+                self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
     def warn(self, problem: str) -> None:
         """Warn with file, line and tag."""
-        warnings.warn(f"{self.file}:{self.line}: <{self.tag}>: {problem}", stacklevel=2)
+        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", stacklevel=2)
 
 
 def nearest(given: str, valid: Collection[str]) -> str:
     """A sentence that proposes the nearest valid name, or nothing."""
     lower = {name.lower(): name for name in valid}
-    near = difflib.get_close_matches(given.lower(), lower, n=1)
+    near = difflib.get_close_matches(given.lower(), lower, n=1) if len(given) <= 100 else []
     return f"Did you mean {lower[near[0]]!r}? " if near else ""
+
+
+def listed(names: Collection[str]) -> str:
+    """The names, sorted, for a message: the first ones where there are many."""
+    words = [shown(name) for name in sorted(names)]
+    rest = f" and {len(words) - LISTED} more" if len(words) > LISTED else ""
+    return (", ".join(words[:LISTED]) or "none") + rest
+
+
+def shown(text: str) -> str:
+    """A text as a message may hold it: not longer than 60 characters."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def read_xml(path: Path) -> Node:
     """The root node of an XML file.
 
     Entities and external references are refused (they can exhaust memory or read other files).
-    Raises RobotFileError when the file is missing, not XML or hostile.
+    Raises RobotFileError when the file is missing, not XML, hostile, or larger than any robot needs.
     """
-    handler = _Builder(path)
-    try:
-        defusedxml.sax.parseString(path.read_bytes(), handler)
-    except OSError as error:
-        raise RobotFileError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
-    except defusedxml.DefusedXmlException as error:
-        raise RobotFileError(
-            f"{path}:{handler.line}: entities and external references are refused ({type(error).__name__}). Write their text out."
-        ) from error
-    except xml.sax.SAXParseException as error:
-        raise RobotFileError(
-            f"{path}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()} in column {(error.getColumnNumber() or 0) + 1}. "
-            "Close every tag and quote every value."
-        ) from error
-    if handler.root is None:
-        raise RobotFileError(f"{path}: holds no element.")
-    return handler.root
+    builder = _Builder(path)
+    parse_xml(path, builder)
+    if builder.root is None:
+        raise RobotFileError(f"{path}:1: holds no element. Write a root element.")
+    return builder.root
 
 
-class _Builder(xml.sax.handler.ContentHandler):
+class _Builder(LineHandler):
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.path = path
         self.root: Node | None = None
         self.open: list[Node] = []
-        self.locator: xml.sax.xmlreader.Locator | None = None
-
-    @property
-    def line(self) -> int:
-        return (self.locator.getLineNumber() or 0) if self.locator else 0
-
-    def setDocumentLocator(self, locator: xml.sax.xmlreader.Locator) -> None:  # noqa: N802, the name is sax's
-        self.locator = locator
+        self.elements = 0
+        self.length = 0  # of attributes: a DTD can give a long default value to every element
 
     def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:  # noqa: N802
         node = Node(self.path, self.line, name.lower(), dict(attrs.items()))
+        self.elements += 1
+        self.length += sum(map(len, node.attributes.values()))
         if len(self.open) >= DEEPEST:
             node.fail("position in the file", f"is nested more than {DEEPEST} elements deep", "Close the elements before it")
+        if self.elements > MOST_ELEMENTS or self.length > LARGEST:
+            node.fail("size of the file", f"more than {MOST_ELEMENTS} elements or {LARGEST} characters", "Divide the file")
         if self.open:
             self.open[-1].children.append(node)
         else:

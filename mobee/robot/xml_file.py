@@ -1,0 +1,79 @@
+"""Opens a foreign XML file: what is missing, too large, no XML or hostile is refused in one sentence."""
+
+from __future__ import annotations
+
+import os
+import stat
+import xml.sax
+import xml.sax.handler
+import xml.sax.xmlreader
+from pathlib import Path
+
+import defusedxml
+import defusedxml.sax
+
+from mobee.errors import RobotFileError
+
+LARGEST = 8_000_000  # bytes; the largest shipped file has 40 thousand
+REMEDIES = {
+    "encoding": "Save the file as UTF-8",
+    "invalid token": 'Save the file as UTF-8 and write &lt; and &amp; for "<" and "&"',
+    "no element found": "The file ends too early: close every tag, or restore it from where it came from",
+    "duplicate attribute": "Remove one of the two",
+    "junk after": "Put everything inside one root element",
+    "undefined entity": "Write the character itself",
+}
+
+
+class LineHandler(xml.sax.handler.ContentHandler):
+    """A handler of SAX events that knows the line it has reached."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._locator: xml.sax.xmlreader.Locator | None = None
+
+    @property
+    def line(self) -> int:
+        """The line of the element that is being read."""
+        return (self._locator.getLineNumber() or 1) if self._locator else 1
+
+    def setDocumentLocator(self, locator: xml.sax.xmlreader.Locator) -> None:  # noqa: N802, the name is sax's
+        """Called by sax before anything else."""
+        self._locator = locator
+
+
+def parse_xml(path: Path, handler: LineHandler) -> None:
+    """Send the elements of an XML file to `handler`.
+
+    Entities and external references are refused (they can exhaust memory or read other files).
+    Raises RobotFileError when the file is missing, not a regular file, larger than 8 MB, not XML or hostile.
+    """
+    content = _content(path)
+    try:
+        defusedxml.sax.parseString(content, handler)
+    except defusedxml.DefusedXmlException as error:
+        raise RobotFileError(
+            f"{path}:{handler.line}: entities and external references are refused ({type(error).__name__}). Write their text out."
+        ) from error
+    except xml.sax.SAXParseException as error:
+        line, column, problem = error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1, error.getMessage()
+        remedy = next((REMEDIES[key] for key in REMEDIES if key in problem), "Close every tag and quote every value")
+        raise RobotFileError(f"{path}:{line}: not well-formed XML: {problem} in column {column}. {remedy}.") from error
+    except (LookupError, ValueError) as error:  # Python's codecs, where expat does not know the declared encoding
+        raise RobotFileError(f"{path}:1: not well-formed XML: its encoding cannot be read ({error}). Save the file as UTF-8.") from error
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            reason = os.strerror(21) if path.is_dir() else "Not a regular file"
+            raise RobotFileError(f"{path}: cannot be read ({reason}). Give the path of an XML file.")
+        with path.open("rb") as file:
+            content = file.read(LARGEST + 1)
+    except OSError as error:
+        raise RobotFileError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    except ValueError as error:
+        raise RobotFileError(f"{str(path)!r}: cannot be read ({error}). Check the path.") from error
+    if len(content) > LARGEST:
+        raise RobotFileError(f"{path}:1: the file is larger than {LARGEST // 1_000_000} MB. Keep meshes in files of their own.")
+    return content
