@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mobee.robot.robot import Array, Marker, Shape
+from mobee.robot.xml_convex import read_convex
 from mobee.robot.xml_draft import Draft, Place
 from mobee.robot.xml_node import Node
 from mobee.robot.xml_volume import PLACE, Z, align, direction, read_volume
@@ -35,13 +36,14 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
-    """Add the solid or field of a <sphere>, <capsule>, <cylinder> or <box>."""
-    volume = read_volume(node)
+    """Add the solid or field of a <sphere>, <capsule>, <cylinder>, <box> or <convex>."""
+    volume = read_convex(node) if node.tag == "convex" else read_volume(node)
     name = node.attributes.get("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
     if any(name == shape.name for shape in draft.shapes):
         node.fail("name", f"a second shape {name!r}", "Rename one of the two")
     role = "field" if node.flag("field") else "solid"
-    shape = Shape(name, place.link, volume.kind, volume.size, place.point + volume.centre, volume.rotation, "solid", place.part)
+    centre = place.point + volume.centre
+    shape = Shape(name, place.link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
     place = replace(place, base=node.flag("base", default=place.base))
     add_shape(draft, replace(shape, role="field") if role == "field" else shape, place)
 

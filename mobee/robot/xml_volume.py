@@ -24,12 +24,13 @@ KINDS: dict[str, ShapeKind] = {"sphere": "sphere", "capsule": "capsule", "cylind
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Volume:
-    """A shape's kind, size as in mobee.robot.robot.Shape, centre (3,) m and orientation (3, 3), relative to its parent point."""
+    """Kind, size and vertices as in mobee.robot.robot.Shape, centre (3,) m and orientation (3, 3), relative to its parent point."""
 
     kind: ShapeKind
     size: tuple[float, ...]
     centre: Array
     rotation: Array
+    vertices: Array | None = None
 
 
 def read_volume(node: Node) -> Volume:
@@ -38,12 +39,17 @@ def read_volume(node: Node) -> Volume:
     kind = KINDS[node.tag]
     if kind == "sphere":
         return Volume(kind, (node.positive("radius"),), centre, np.eye(3))
-    axis = direction(node, AXIS, (0.0, 1.0, 0.0))
     if kind == "box":
-        turn = turn_about(axis, np.deg2rad(node.number("angle", 0.0)))
         size = (node.positive("width"), node.positive("height"), node.positive("depth"))
-        return Volume(kind, size, centre, turn @ align(Y, axis))
+        return Volume(kind, size, centre, box_rotation(node))
+    axis = direction(node, AXIS, (0.0, 1.0, 0.0))
     return Volume(kind, (node.positive("radius"), node.positive("height")), centre, align(Z, axis))
+
+
+def box_rotation(node: Node) -> Array:
+    """The orientation (3, 3) that turns y the shortest way to (hx, hy, hz), then by `angle` [deg] about it."""
+    axis = direction(node, AXIS, (0.0, 1.0, 0.0))
+    return turn_about(axis, np.deg2rad(node.number("angle", 0.0))) @ align(Y, axis)
 
 
 def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:

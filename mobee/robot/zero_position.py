@@ -11,12 +11,14 @@ from mobee.robot.pairs import LinkPair, joined_links, tested_pairs
 from mobee.robot.pairs_2014 import published_pairs
 from mobee.robot.robot import Clause, Ints, Joint, Motor, Part, Robot
 from mobee.robot.xml_body import read_marker, read_shape, read_skeleton
+from mobee.robot.xml_convex import CONVEX_ATTRIBUTES
 from mobee.robot.xml_draft import Draft, Place, enter
 from mobee.robot.xml_motors import finish_joints, order_motors, read_clauses, read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
 
 AXES = ("x", "y", "z")
+BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
 KNOWN = {
     "zeropositionkinematictree": frozenset({"version", "robotName", "adjacency"}),
     "bodypart": frozenset({"name"}),
@@ -29,7 +31,7 @@ KNOWN = {
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
     "ignore": frozenset({"first", "second", "role"}),
-} | {tag: known | {"name", "field", "base"} for tag, known in VOLUME_TAGS.items()}
+} | {tag: known | {"name", "field", "base"} for tag, known in BODY_TAGS.items()}
 
 
 def read_robot(path: Path) -> Robot:
@@ -55,7 +57,7 @@ def _read_children(parent: Node, draft: Draft, place: Place) -> None:
             node.warn(f"unknown tag is ignored with all inside. {nearest(node.tag, KNOWN)}Valid: {', '.join(sorted(KNOWN))}")
             continue
         node.check_attributes(KNOWN[node.tag])
-        if node.tag in VOLUME_TAGS:
+        if node.tag in BODY_TAGS:
             read_shape(node, draft, place)
         else:
             READERS.get(node.tag, _misplaced)(node, draft, place)
