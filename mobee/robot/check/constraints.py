@@ -1,0 +1,110 @@
+"""Linear constraints: clauses that contradict the limits or each other, that home violates, and rows that do nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mobee.robot.check.feasible import conflict
+from mobee.robot.check.finding import Finding
+from mobee.robot.check.subject import Subject
+from mobee.robot.check.words import some
+from mobee.robot.robot import Array, Clause
+
+ROUNDING = np.deg2rad(0.01)
+
+
+def constraints(subject: Subject) -> Iterator[Finding]:
+    """All that can be said of the robot's clauses."""
+    robot = subject.robot
+    dead = False
+    for index, clause in enumerate(robot.clauses):
+        least, most = row_range(clause, subject.range)
+        if most.max() <= 0:
+            dead = True
+            yield _impossible(subject, index, most)
+        else:
+            yield from _idle_rows(subject, index, least, most)
+        if most.max() > 0 and (clause.a @ robot.home + clause.b).max() < -ROUNDING:
+            yield _violated_at_home(subject, index)
+    if not dead:
+        yield from _contradiction(subject, robot.clauses)
+
+
+def row_range(clause: Clause, limits: Array) -> tuple[Array, Array]:
+    """Smallest and largest a.q + b of every row within the limits (n, 2), each (rows,) rad."""
+    ends = clause.a[:, :, None] * limits[None]
+    return ends.min(axis=2).sum(axis=1) + clause.b, ends.max(axis=2).sum(axis=1) + clause.b
+
+
+def _impossible(subject: Subject, index: int, most: Array) -> Finding:
+    return Finding(
+        "error",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"{_name(subject, index)} cannot be satisfied within the limits: a.q + b reaches {_degrees(most.max())} at most",
+        "the controller would push for ever against the limits",
+        'check the sign: a row is satisfied when a.q + b > 0, and negate="true" flips it; b is in degrees',
+    )
+
+
+def _violated_at_home(subject: Subject, index: int) -> Finding:
+    clause, home = subject.robot.clauses[index], subject.robot.home
+    return Finding(
+        "warning",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"home violates {_name(subject, index)}: a.q + b is {_degrees((clause.a @ home + clause.b).max())} there",
+        "the robot is pushed away from home before anything has happened",
+        "move the home or correct the constraint (satisfied is a.q + b > 0)",
+    )
+
+
+def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Iterator[Finding]:
+    """Rows that are true in every pose, which makes the clause useless, and rows that are true in none."""
+    where, name = subject.where("clause", str(index)), _name(subject, index)
+    if least.max() > 0:
+        yield Finding(
+            "note",
+            "constraint",
+            where,
+            f"{name} is satisfied in every pose within the limits: a.q + b is never below {_degrees(least.max())}",
+            "it excludes nothing; at most it pushes near its boundary",
+            "remove it, or check sign and unit (degrees)",
+        )
+        return
+    for row in np.flatnonzero(most <= 0):
+        yield Finding(
+            "note",
+            "constraint",
+            where,
+            f"row {row + 1} of {name} is satisfied in no pose within the limits: a.q + b stays below {_degrees(most[row])}",
+            "the other rows decide alone",
+            "remove the row, or check sign and unit (degrees)",
+        )
+
+
+def _contradiction(subject: Subject, clauses: Sequence[Clause]) -> Iterator[Finding]:
+    starts = np.concatenate([np.nan_to_num(subject.robot.home)[None], subject.samples])
+    fighting = conflict(clauses, subject.range, starts)
+    if fighting:
+        others = ", ".join(subject.where("clause", str(index)) for index in fighting[1:])
+        yield Finding(
+            "error",
+            "constraint",
+            subject.where("clause", str(fighting[0])),
+            f"{_name(subject, fighting[0])} contradicts {others}: no pose within the limits was found that satisfies them together",
+            "wherever the robot is, a constraint pushes it",
+            "check the signs: a row is satisfied when a.q + b > 0; all lists of a part must hold together",
+        )
+
+
+def _name(subject: Subject, index: int) -> str:
+    clause = subject.robot.clauses[index]
+    motors = [subject.robot.motors[column] for column in np.flatnonzero(clause.a.any(axis=0))]
+    return f"the constraint on {some(motors)}"
+
+
+def _degrees(value: float) -> str:
+    return f"{np.rad2deg(value):.4g} deg"

@@ -1,0 +1,68 @@
+"""Checks a file: what its reader warns of, then what is wrong with the robot or world in it."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mobee.collision.world import World
+from mobee.robot.check.finding import SEVERITIES, Finding
+from mobee.robot.check.robot import check_robot
+from mobee.robot.check.world import check_world
+from mobee.robot.load import WORLDS, load_robot, load_world, shipped_robots, shipped_worlds
+from mobee.robot.robot import Robot
+from mobee.robot.xml_node import read_xml
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What a file holds, and what is wrong with it."""
+
+    content: Robot | World
+    findings: tuple[Finding, ...]
+
+
+def check_file(name_or_path: str | Path, world: World | None = None) -> Checked:
+    """Everything that is wrong with a shipped robot or world, or with a file of one; errors first.
+
+    `world`: what a robot is also checked against, at home.  Raises RobotFileError or UnknownName when it cannot be read at all.
+    """
+    path = world_file(name_or_path)
+    said: list[Finding] = []
+    content: Robot | World
+    if path is None:
+        with _listening(said):
+            content = load_robot(name_or_path)
+        found = check_robot(content, world)
+    else:
+        with _listening(said):
+            content = load_world(path)
+        lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in read_xml(path)}
+        found = check_world(content, lines)
+    return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
+
+
+def world_file(name_or_path: str | Path) -> Path | None:
+    """The file of a world; None when it is a robot's, or is none at all."""
+    given, path = str(name_or_path), Path(name_or_path)
+    if given in shipped_worlds() and given not in shipped_robots():
+        return WORLDS / f"{given}.xml"
+    if path.suffix != ".xml" or not path.is_file():
+        return None
+    return path if read_xml(path).tag == "world" else None
+
+
+@contextmanager
+def _listening(said: list[Finding]) -> Iterator[None]:
+    """What a reader warns of meanwhile, as findings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
+        where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
+        said.append(Finding("warning", "reader", where, what, "what is ignored is missing from the robot", remedy))

@@ -1,0 +1,51 @@
+"""All checks of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from mobee.collision.world import World
+from mobee.robot.check.constraints import constraints
+from mobee.robot.check.fields import fields
+from mobee.robot.check.finding import SEVERITIES, Finding
+from mobee.robot.check.joints import coupling, joint_limits
+from mobee.robot.check.markers import unreachable_markers
+from mobee.robot.check.motors import home_limits, idle_motors, idle_parts
+from mobee.robot.check.names import identical_shapes, names_differing_in_case
+from mobee.robot.check.subject import Subject
+from mobee.robot.check.touching import always_touching, foreign_solids, home_contacts
+from mobee.robot.check.units import radians, size
+from mobee.robot.robot import Robot
+
+Check = Callable[[Subject], Iterator[Finding]]
+
+CHECKS: tuple[Check, ...] = (
+    joint_limits,
+    home_limits,
+    coupling,
+    idle_motors,
+    idle_parts,
+    size,
+    radians,
+    always_touching,
+    home_contacts,
+    foreign_solids,
+    fields,
+    constraints,
+    unreachable_markers,
+    identical_shapes,
+    names_differing_in_case,
+)
+
+
+def check_robot(robot: Robot, world: World | None = None) -> list[Finding]:
+    """Everything that is wrong with a robot, errors first; with a world also what it touches there at home.
+
+    Poses are sampled with a fixed seed: the same robot is answered the same way.
+    """
+    subject = Subject(robot, world)
+    with np.errstate(invalid="ignore"):  # joints without limits are a finding, not a failure of the others
+        found = [finding for check in CHECKS for finding in check(subject)]
+    return sorted(found, key=lambda finding: SEVERITIES.index(finding.severity))

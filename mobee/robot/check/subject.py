@@ -1,0 +1,106 @@
+"""The robot that is checked, with the evidence that several checks need: its poses and what touches in them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from mobee.collision.contact import Contact
+from mobee.collision.world import World
+from mobee.model import Model
+from mobee.robot.robot import Array, Robot
+
+POSES = 256  # a pair that touches in all of them cannot be kept apart
+SEED = 20141030  # any: the same file is answered the same way every time
+
+Touch = tuple[str, str, str]  # first, second, kind
+
+
+class Subject:
+    """A robot, perhaps in a world, and what can be asked about it."""
+
+    def __init__(self, robot: Robot, world: World | None = None) -> None:
+        self.robot = robot
+        self.world = world
+
+    def where(self, kind: str, name: str) -> str:
+        """File and line of a thing; the robot's own where the reader kept none."""
+        return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
+
+    @cached_property
+    def range(self) -> Array:
+        """Motor limits (n, 2) rad, half a turn where a motor has none."""
+        return np.clip(np.nan_to_num(self.robot.limits, nan=0.0), -np.pi, np.pi) if self._unbounded else self.robot.limits
+
+    @property
+    def _unbounded(self) -> bool:
+        return not np.isfinite(self.robot.limits).all()
+
+    @cached_property
+    def samples(self) -> Array:
+        """Poses (POSES, n) rad, uniform within the limits."""
+        low, high = self.range.T
+        return np.random.default_rng(SEED).uniform(low, np.maximum(high, low), (POSES, len(low)))
+
+    @cached_property
+    def at_home(self) -> tuple[Contact, ...]:
+        """Contacts at home, with the world if there is one."""
+        return Model(self.robot, self.world).evaluate(np.nan_to_num(self.robot.home)).contacts
+
+    @cached_property
+    def always(self) -> frozenset[Touch]:
+        """Pairs of the robot's shapes that overlap at home and in every sampled pose."""
+        model = Model(self.robot)
+        left = Counter(touches(model.evaluate(np.nan_to_num(self.robot.home)).contacts))
+        for q in self.samples:
+            if not left:
+                break
+            left &= Counter(touches(model.evaluate(q).contacts))
+        return frozenset(left)
+
+    @cached_property
+    def foreign(self) -> tuple[Contact, ...]:
+        """Fields (`first`) that reach, at home, into solids of other parts (`second`) without meeting a field of the solid's link."""
+        robot, shapes = self.robot, self.robot.shapes
+        tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
+        near = [
+            (i, j)
+            for (i, one), (j, other) in product(enumerate(shapes), repeat=2)
+            if (one.role, other.role) == ("field", "solid") and one.part != other.part and frozenset((one.link, other.link)) in tested
+        ]
+        bodies = tuple(replace(shape, role="solid") for shape in shapes)
+        pairs = np.array(near, dtype=np.intp).reshape(-1, 2)
+        probe = replace(robot, shapes=bodies, field_pairs=pairs[:0], solid_pairs=pairs)
+        places = {shape.name: shape.link for shape in shapes}
+        felt = {end for c in self.at_home if c.kind == "field" for end in ((c.first, c.second_link), (c.second, c.first_link))}
+        met = Model(probe).evaluate(np.nan_to_num(robot.home)).contacts
+        return tuple(contact for contact in met if (contact.first, places[contact.second]) not in felt)
+
+    @cached_property
+    def moved(self) -> frozenset[int]:
+        """Links that some motor moves in the root frame."""
+        driven = set(np.flatnonzero(self.robot.coupling[0].any(axis=1)))
+        found: set[int] = set()
+        for index, joint in enumerate(self.robot.joints):
+            if index in driven or joint.parent in found:
+                found.add(index + 1)
+        return frozenset(found)
+
+    @cached_property
+    def below(self) -> tuple[frozenset[int], ...]:
+        """For every joint the links that it carries, its own first."""
+        carried: list[set[int]] = [{index + 1} for index in range(len(self.robot.joints))]
+        for index in reversed(range(len(self.robot.joints))):
+            parent = self.robot.joints[index].parent
+            if parent > 0:
+                carried[parent - 1] |= carried[index]
+        return tuple(frozenset(links) for links in carried)
+
+
+def touches(contacts: tuple[Contact, ...]) -> set[Touch]:
+    """The pairs of these contacts."""
+    return {(contact.first, contact.second, contact.kind) for contact in contacts}

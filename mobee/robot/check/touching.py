@@ -1,0 +1,74 @@
+"""What touches at home, and what touches in every pose."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+from mobee.collision.contact import Contact
+from mobee.robot.check.finding import Finding
+from mobee.robot.check.subject import Subject
+from mobee.robot.check.words import length
+
+
+def always_touching(subject: Subject) -> Iterator[Finding]:
+    """Pairs that overlap in every sampled pose."""
+    links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
+    for first, second, kind in sorted(subject.always):
+        yield Finding(
+            "warning",
+            "always-touching",
+            subject.where("shape", first),
+            f"{kind}s {first!r} and {second!r} overlap in every pose tried",
+            "their contact says nothing, and hides others behind a force that never ends"
+            if kind == "field"
+            else "every pose counts as a collision, so no plan is ever valid",
+            f"make one smaller, or leave the pair out: <ignore first={links[first]!r} second={links[second]!r}/>".replace("'", '"'),
+        )
+
+
+def home_contacts(subject: Subject) -> Iterator[Finding]:
+    """Solids that collide and fields that push at home, where they do not in every pose."""
+    world = subject.world.objects if subject.world else {}
+    for contact in subject.at_home:
+        if (contact.first, contact.second, contact.kind) in subject.always:
+            continue
+        pair = f"{contact.first!r} and {contact.second!r}{' of the world' if contact.second in world else ''}"
+        if contact.kind == "solid":
+            yield Finding(
+                "error",
+                "home-collision",
+                subject.where("shape", contact.first),
+                f"at home {pair} collide, {length(contact.depth)} deep",
+                "the robot starts in a collision that it could not have moved into",
+                "move the home, make a shape smaller, or correct where one is placed",
+            )
+        else:
+            yield Finding(
+                "warning",
+                "home-force",
+                subject.where("shape", contact.first),
+                f"at home fields {pair} overlap by {length(contact.depth)}"
+                if contact.second not in world
+                else f"at home field {pair} overlap by {length(contact.depth)}",
+                "the force pushes the robot away from its home before anything has happened",
+                "make a field smaller, or move the home",
+            )
+
+
+def foreign_solids(subject: Subject) -> Iterator[Finding]:
+    """Parts whose fields reach, at home, into solids of another part whose own fields are not felt there."""
+    reached: dict[tuple[str, str], list[Contact]] = defaultdict(list)
+    parts = {shape.name: shape.part for shape in subject.robot.shapes}
+    for contact in subject.foreign:
+        reached[parts[contact.first], parts[contact.second]].append(contact)
+    for (part, other), contacts in sorted(reached.items()):
+        deepest = max(contacts, key=lambda contact: contact.depth)
+        yield Finding(
+            "note",
+            "foreign-solid",
+            subject.where("shape", deepest.first),
+            f"at home field {deepest.first!r} of part {part!r} reaches {length(deepest.depth)} into solid {deepest.second!r} of {other!r}",
+            f"fields feel fields only: {part} comes this near without a force",
+            f"give the link of {deepest.second!r} a field that encloses it, or make {deepest.first!r} smaller",
+        )

@@ -1,0 +1,32 @@
+"""How findings say numbers and lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sized
+
+import numpy as np
+
+from mobee.robot.robot import Array
+
+
+def interval(limits: Array, kind: str) -> str:
+    """An interval given in rad or m, as a person says it."""
+    low, high = np.rad2deg(limits) if kind == "revolute" else np.asarray(limits)
+    return f"{low:.4g} to {high:.4g} {'deg' if kind == 'revolute' else 'm'}"
+
+
+def length(metres: float) -> str:
+    """A length in the unit in which it is easily read."""
+    return f"{1e3 * metres:.3g} mm" if metres < 0.1 else f"{metres:.3g} m"
+
+
+def some(names: Iterable[str], most: int = 4) -> str:
+    """The first names of a list, and how many more there are."""
+    listed = list(names)
+    more = f" and {len(listed) - most} more" if len(listed) > most else ""
+    return ", ".join(listed[:most]) + more
+
+
+def count(things: Sized, noun: str) -> str:
+    """A number of things."""
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"

@@ -1,0 +1,91 @@
+"""`mobee check`: what is wrong with a robot or a world, with the line of each."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import textwrap
+from collections import Counter
+from dataclasses import asdict
+from typing import Any
+
+from mobee.collision.world import World
+from mobee.errors import MobeeError
+from mobee.robot.check import Finding, UntestedGroup, check_file, untested_groups
+from mobee.robot.check.finding import SEVERITIES
+from mobee.robot.check.words import count
+from mobee.robot.load import load_world
+from mobee.robot.robot import Robot
+from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+
+_NOTES = "Exit code: 0 nothing but notes, 1 at least one warning or error, 2 the file cannot be read."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """File and options."""
+    parser.epilog = _NOTES
+    parser.add_argument("file", help="shipped robot or world, or path of a .xml or .urdf file")
+    parser.add_argument("--world", metavar="FILE", help="also what the robot touches at home in this world")
+    parser.add_argument("--pairs", action="store_true", help="list every pair of links that is never tested, and why")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check and print."""
+    try:
+        checked = check_file(arguments.file, load_world(arguments.world) if arguments.world else None)
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    content = checked.content
+    groups = untested_groups(content) if isinstance(content, Robot) else []
+    if arguments.json:
+        print(json.dumps(_as_json(content, checked.findings, groups), indent=2))
+    else:
+        lines = [*_findings(checked.findings), *(_pairs(content, groups, arguments.pairs) if isinstance(content, Robot) else [])]
+        print("\n".join([*lines, _summary(content, checked.findings)]))
+    return FAILED if any(finding.severity != "note" for finding in checked.findings) else 0
+
+
+def _findings(findings: tuple[Finding, ...]) -> list[str]:
+    lines = []
+    for finding in findings:
+        lines.append(f"{finding.where}: {finding.severity}: {finding.what}")
+        for text in (finding.why, finding.remedy):
+            lines += _wrapped(text, "    ") if text else []
+    return lines
+
+
+def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
+    """The summary of what is never tested, or all of it."""
+    tested = f"{len(robot.solid_pairs)} pairs of solids and {len(robot.field_pairs)} of fields are tested"
+    lines = ["", f"{tested}. Never{'' if every else ' (--pairs names them)'}:"]
+    for group in groups:
+        shapes = f"{group.solids} pairs of solids, {group.fields} of fields"
+        lines += _wrapped(f"{group.reason}: {len(group.links)} pairs of links ({shapes})", "  ", "    ")
+        if every:
+            lines += _wrapped(", ".join(one if one == other else f"{one} - {other}" for one, other in group.links), "    ")
+    return lines
+
+
+def _summary(content: Robot | World, findings: tuple[Finding, ...]) -> str:
+    counts = Counter(finding.severity for finding in findings)
+    said = ", ".join(f"{counts[severity]} {severity}{'' if counts[severity] == 1 else 's'}" for severity in SEVERITIES if counts[severity])
+    if isinstance(content, World):
+        return f"{count(content.objects, 'object')}: {said or 'nothing is wrong'}"
+    held = (count(content.parts, "part"), count(content.motors, "motor"), count(content.joints, "joint"), count(content.shapes, "shape"))
+    return f"\n{content.name}: {', '.join(held)}: {said or 'nothing is wrong'}"
+
+
+def _wrapped(text: str, indent: str, then: str | None = None) -> list[str]:
+    columns = shutil.get_terminal_size().columns  # 80 in a pipe
+    after = indent if then is None else then
+    return textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=after, break_long_words=False, break_on_hyphens=False)
+
+
+def _as_json(content: Robot | World, findings: tuple[Finding, ...], groups: list[UntestedGroup]) -> dict[str, Any]:
+    listed: dict[str, Any] = {"findings": [asdict(finding) for finding in findings]}
+    if isinstance(content, Robot):
+        tested = {"solid_pairs": len(content.solid_pairs), "field_pairs": len(content.field_pairs)}
+        listed |= {"robot": content.name, "tested": tested, "untested": [asdict(group) for group in groups]}
+    return listed
