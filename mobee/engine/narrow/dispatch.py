@@ -1,0 +1,50 @@
+"""Any two volumes: the function for their kinds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mobee.engine.compiled import inner
+from mobee.engine.narrow.box_box import box_box
+from mobee.engine.narrow.features import BOX, CAPSULE, SPHERE
+from mobee.engine.narrow.general import general
+from mobee.engine.narrow.rounded import capsule_capsule, sphere_capsule, sphere_sphere
+from mobee.engine.narrow.rounded_box import capsule_box, sphere_box
+from mobee.engine.narrow.slots import KIND, turn_round
+from mobee.robot.robot import Array
+
+
+@inner
+def overlap(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+    """How deep two volumes overlap [m]; if they do not, minus a lower bound of their distance.
+
+    P: the slots of a pose; a, b: offsets of two of them; V: the vertices of the convex volumes.  If the depth is positive,
+    out[:3] is the unit normal (moving a by depth * normal separates them, and no way is shorter) and out[3:6] the point midway
+    between the two deepest points, root frame.
+    """
+    if P[np.uint64(a) + KIND] <= P[np.uint64(b) + KIND]:
+        return _ordered(P, a, b, V, out)
+    depth = _ordered(P, b, a, V, out)
+    if depth > 0.0:
+        turn_round(out)
+    return depth
+
+
+@inner
+def _ordered(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+    """The first of a kind not after the second's."""
+    first, second = P[np.uint64(a) + KIND], P[np.uint64(b) + KIND]
+    if second == SPHERE:
+        return sphere_sphere(P, a, b, V, out)
+    if second == CAPSULE:
+        return sphere_capsule(P, a, b, V, out) if first == SPHERE else capsule_capsule(P, a, b, V, out)
+    if second == BOX:
+        if first == SPHERE:
+            return sphere_box(P, a, b, V, out)
+        if first == CAPSULE:
+            return capsule_box(P, a, b, V, out)
+        if first == BOX:
+            return box_box(P, a, b, V, out)
+    return general(P, a, b, V, out)
