@@ -1,0 +1,101 @@
+"""MuJoCo on the workload: the same tree, volumes and tested pairs, forward kinematics and collision detection only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mobee.collision.world import WorldObject
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array, Ints, Robot, Shape
+
+_ARENA = 64 * 2**20  # bytes; holds some 100 000 contacts, so that none is left out
+
+
+class MujocoMissing(MobeeError):
+    """Raised when the benchmark is asked for and MuJoCo is not installed."""
+
+
+def load_mujoco() -> Any:
+    """The package mujoco; raises MujocoMissing."""
+    try:
+        import mujoco
+    except ImportError:
+        raise MujocoMissing("MuJoCo is not installed; from MoBeE's folder: pip install '.[bench]'") from None
+    return mujoco
+
+
+class MujocoPeer:
+    """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo never tests them together."""
+
+    def __init__(self, robot: Robot, objects: Mapping[str, WorldObject]) -> None:
+        self._mujoco = load_mujoco()
+        self._coupling = robot.coupling
+        self.model = _spec(self._mujoco, robot, objects).compile()
+        self.data = self._mujoco.MjData(self.model)
+        geoms = [shape.name for shape in robot.shapes] + list(objects)
+        self._volume = np.empty(self.model.ngeom, dtype=np.intp)  # of each geom: MuJoCo numbers them body by body
+        for volume, name in enumerate(geoms):
+            self._volume[self.model.geom(name).id] = volume
+
+    def joint_angles(self, q: Array) -> Array:
+        """MuJoCo's qpos (..., joints) of motor positions (..., n): the coupling is not part of what is timed."""
+        matrix, offset = self._coupling
+        order = np.argsort([self.model.joint(f"joint{index}").qposadr[0] for index in range(len(offset))])
+        return np.ascontiguousarray((q @ matrix.T + offset)[..., order])
+
+    def detect(self, angles: Array) -> int:
+        """Forward kinematics and every contact of one pose; returns how many points of contact there are."""
+        data = self.data
+        data.qpos[:] = angles
+        self._mujoco.mj_kinematics(self.model, data)
+        self._mujoco.mj_collision(self.model, data)
+        return int(data.ncon)
+
+    def touching(self) -> tuple[Ints, Array]:
+        """The pairs (c, 2) of volumes in contact at the last detection, smaller index first, and their greatest depths (c,) m."""
+        contact = self.data.contact
+        pairs = np.sort(self._volume[np.array(contact.geom).reshape(-1, 2)], axis=1)
+        unique, which = np.unique(pairs, axis=0, return_inverse=True)
+        depths = np.zeros(len(unique))
+        np.maximum.at(depths, which, -np.array(contact.dist))
+        return unique, depths
+
+    def overflowed(self) -> bool:
+        """Whether contacts were left out for want of memory."""
+        return bool(self.data.warning[self._mujoco.mjtWarning.mjWARN_CONTACTFULL].number)
+
+
+def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
+    spec = mujoco.MjSpec()
+    spec.memory = _ARENA
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)  # the robot's own table says which links are tested
+    bodies = [spec.worldbody.add_body(name="link0")]
+    origins = [np.zeros(3)]
+    for index, joint in enumerate(robot.joints):
+        parent = bodies[joint.parent]
+        body = parent.add_body(
+            name=f"link{index + 1}", pos=joint.point - origins[joint.parent], mass=1.0, inertia=np.ones(3), explicitinertial=True
+        )
+        body.add_joint(name=f"joint{index}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis)
+        bodies.append(body)
+        origins.append(joint.point)
+    for shape in robot.shapes:
+        _add(mujoco, bodies[shape.link], shape, shape.position - origins[shape.link])
+    for thing in objects.values():
+        _add(mujoco, spec.worldbody, thing, thing.position)
+    for one, other in map(sorted, robot.untested):
+        spec.add_exclude(bodyname1=f"link{one}", bodyname2=f"link{other}")
+    return spec
+
+
+def _add(mujoco: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
+    kinds = {"sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "box": mujoco.mjtGeom.mjGEOM_BOX}
+    size = np.zeros(3)
+    size[: len(volume.size)] = volume.size
+    size[slice(None) if volume.kind == "box" else slice(1, None)] /= 2.0  # MuJoCo has half lengths
+    turn = np.empty(4)
+    mujoco.mju_mat2Quat(turn, np.ascontiguousarray(volume.rotation).reshape(9))
+    body.add_geom(name=volume.name, type=kinds[volume.kind], size=size, pos=position, quat=turn, margin=0.0)
