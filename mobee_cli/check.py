@@ -58,11 +58,11 @@ def _findings(findings: tuple[Finding, ...]) -> list[str]:
 
 def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
     """The summary of what is never tested, or all of it."""
-    tested = f"{len(robot.solid_pairs)} pairs of solids and {len(robot.field_pairs)} of fields are tested"
-    lines = ["", f"{tested}. Never{'' if every else ' (--pairs names them)'}:"]
+    tested = f"{count(robot.solid_pairs, 'pair')} of solids, {len(robot.field_pairs)} of fields"
+    lines = ["", f"Tested: {tested}. Never tested{'' if every else ' (--pairs names them)'}:"]
     for group in groups:
-        shapes = f"{group.solids} pairs of solids, {group.fields} of fields"
-        lines += _wrapped(f"{group.reason}: {len(group.links)} pairs of links ({shapes})", "  ", "    ")
+        shapes = f"{group.solids} of solids, {group.fields} of fields"
+        lines += _wrapped(f"{group.reason}: {count(group.links, 'pair')} of links ({shapes})", "  ", "    ")
         if every:
             lines += _wrapped(", ".join(one if one == other else f"{one} - {other}" for one, other in group.links), "    ")
     return lines

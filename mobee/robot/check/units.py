@@ -14,7 +14,7 @@ from mobee.robot.robot import Array, Motor, Shape
 
 LARGEST, SMALLEST = 10.0, 0.01  # m: robots are between
 TURN_AS_DEGREES = np.deg2rad(6.3)  # rad: 2 pi, read as degrees
-QUARTERS = np.deg2rad(np.pi / 4 * np.arange(1, 9))  # rad: 45, 90, ... deg written in radians and read as degrees
+QUARTERS = np.deg2rad(np.pi / 4 * np.array([1, 2, 3, 4, 6, 8]))  # rad: 45, 90, ... deg written in radians and read as degrees
 
 
 def size(subject: Subject) -> Iterator[Finding]:
@@ -92,7 +92,7 @@ def _turns(subject: Subject, motor: Motor) -> bool:
 
 
 def _is_quarter(motor: Motor) -> bool:
-    """Whether an end of the range is a multiple of pi/4, read as degrees and to four digits."""
+    """Whether an end of the range is pi/4, pi/2, ..., read as degrees and to three digits."""
     ends = np.abs(motor.limits)
     if ends.max() > TURN_AS_DEGREES:
         return False

@@ -1,0 +1,14 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.mobee.robot.check.arm import arm, named
+
+
+def test_a_marker_that_no_motor_moves_is_found(tmp_path: Path) -> None:
+    (finding,) = named(arm(tmp_path, ('<bodypart name="arm">', '<bodypart name="arm"><marker name="foot"/>')), "marker")
+    assert finding.what == "no motor moves marker 'foot': it sits on link 'base'"
+
+
+def test_a_marker_behind_a_moved_joint_is_none(tmp_path: Path) -> None:
+    assert named(arm(tmp_path, ("<marker", '<marker name="wrist"/><marker')), "marker") == []

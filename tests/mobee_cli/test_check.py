@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mobee.robot.load import shipped_robots, shipped_worlds
+from mobee_cli.__main__ import main
+from tests.mobee.robot.check.arm import ARM
+from tests.mobee.robot.robot_files import robot_file
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    return robot_file(tmp_path, *ARM.splitlines())
+
+
+@pytest.fixture
+def bad(tmp_path: Path) -> Path:
+    return robot_file(tmp_path, *ARM.replace("<marker", '<marker name="Tip"/><marker').splitlines())
+
+
+@pytest.mark.parametrize("name", [*shipped_robots(), *shipped_worlds()])
+def test_what_is_shipped_passes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", name]) == 0
+    assert "warning" not in capsys.readouterr().out
+
+
+def test_of_a_good_file_it_is_said_that_nothing_is_wrong(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(good)]) == 0
+    assert capsys.readouterr().out.endswith("toy: 1 part, 2 motors, 2 joints, 6 shapes: nothing is wrong\n")
+
+
+def test_a_warning_is_said_with_what_why_and_what_to_do(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(bad)]) == 1
+    what, why, remedy, *_, summary = capsys.readouterr().out.splitlines()
+    assert "warning: marker 'tip' differs from marker 'Tip'" in what
+    assert (why, remedy) == ("    names are told apart by case, and people do not", "    rename one of the two")
+    assert summary.endswith("1 warning")
+
+
+def test_as_json(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(bad), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["robot"] == "toy"
+    assert [finding["check"] for finding in told["findings"]] == ["name-case"]
+    assert ["base", "bend"] in next(group["links"] for group in told["untested"] if "part" in group["reason"])
+
+
+def test_pairs_are_counted_and_on_request_named(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["check", str(good)])
+    brief = capsys.readouterr().out
+    assert "fields of the same part: 3 pairs of links (0 of solids, 3 of fields)" in " ".join(brief.split())
+    assert "base - bend" not in brief
+    main(["check", str(good), "--pairs"])
+    assert "base - bend" in capsys.readouterr().out
+
+
+def test_with_a_world_the_robot_is_looked_at_in_it(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rock = tmp_path / "rock.xml"
+    rock.write_text('<World><sphere name="rock" radius="0.05" px="-0.2" pz="0.2"/></World>')
+    assert main(["check", str(good), "--world", str(rock)]) == 1
+    assert "error: at home 'upper' and 'rock' of the world collide" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["<World", "<Robot/>", ""])
+def test_what_cannot_be_read_is_bad_input_in_one_line(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "broken.xml"
+    path.write_text(text)
+    assert main(["check", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("mobee check: ")
+    assert "broken.xml" in said
+    assert len(said.splitlines()) == 1
