@@ -15,49 +15,85 @@ So hands and forearms are tested against torso, head and the other arm, and only
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
-from mobee.robot.robot import Ints, Joint, Shape
+from mobee.robot.robot import Ints, Joint, LinkPair, Shape
 
 CLUSTER = 0.05  # m between the points of joints that count as one place
+NAMED = 4  # joints of a cluster that a reason lists
 
-LinkPair = frozenset[int]
+
+def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
+    """Pairs of links that meet in one cluster of joints, and why each pair is one."""
+    clusters = _clusters(joints)
+    joined: dict[LinkPair, str] = {}
+    for cluster in clusters:
+        names = ", ".join(joints[k].name for k in cluster[:NAMED]) + (", ..." if len(cluster) > NAMED else "")
+        reason = f"joined at {names}" if len(cluster) == 1 else f"joined at a cluster of joints ({names})"
+        links = sorted({joints[k].parent for k in cluster} | {k + 1 for k in cluster})
+        for pair in combinations(links, 2):
+            joined.setdefault(frozenset(pair), reason)
+    return joined
 
 
-def joined_links(joints: Sequence[Joint]) -> set[LinkPair]:
-    """Pairs of links that meet in one cluster of joints."""
-    cluster: dict[int, int] = {}  # joint -> first joint of its cluster
-    members: dict[int, set[int]] = {}
+def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
+    """The joints of each cluster, in order; a joint belongs to that of the first joint near it that carries it or is beside it."""
+    points = np.array([joint.point for joint in joints]).reshape(-1, 3)
+    beside: dict[int, list[int]] = {}  # link -> joints that it carries
+    home: list[int] = []  # joint -> its cluster
+    clusters: list[list[int]] = []
     for index, joint in enumerate(joints):
-        before = [k for k in range(index) if k == joint.parent - 1 or joints[k].parent == joint.parent]
-        near = (k for k in before if float(np.linalg.norm(joint.point - joints[k].point)) < CLUSTER)
-        first = next(near, None)
-        cluster[index] = index if first is None else cluster[first]
-        members.setdefault(cluster[index], {joint.parent}).add(index + 1)
-    return {frozenset(pair) for links in members.values() for pair in combinations(sorted(links), 2)}
+        before = ([joint.parent - 1] if joint.parent else []) + beside.setdefault(joint.parent, [])
+        near = np.flatnonzero(np.linalg.norm(points[before] - points[index], axis=1) < CLUSTER)
+        if len(near):
+            home.append(home[before[int(near[0])]])
+        else:
+            home.append(len(clusters))
+            clusters.append([])
+        clusters[home[index]].append(index)
+        beside[joint.parent].append(index)
+    return clusters
 
 
-def tested_pairs(
-    shapes: Sequence[Shape],
-    role: str,
-    joined: Collection[LinkPair],
-    subtree: Sequence[int],
-    ignored: Collection[LinkPair],
-) -> Ints:
-    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`.
+def hand_links(subtree: Sequence[int], joints: Sequence[Joint]) -> dict[LinkPair, str]:
+    """Pairs of links of one noSelfCollision subtree; `subtree`: for each link the link that its subtree starts at, -1 for none."""
+    members: dict[int, list[int]] = {}
+    for link, start in enumerate(subtree):
+        if start != -1:
+            members.setdefault(start, []).append(link)
+    return {
+        frozenset(pair): f"same hand (noSelfCollision of joint {joints[start - 1].name})"
+        for start, links in members.items()
+        for pair in combinations(links, 2)
+    }
 
-    `subtree`: for each link the noSelfCollision subtree that it is in, -1 for none.
-    """
-    chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
-    pairs = []
-    for i, j in combinations(chosen, 2):
-        a, b = shapes[i].link, shapes[j].link
-        links = frozenset((a, b))
-        same_hand = subtree[a] == subtree[b] != -1
-        same_part = role == "field" and shapes[i].part == shapes[j].part
-        if a != b and links not in joined and links not in ignored and not same_hand and not same_part:
-            pairs.append((i, j))
-    return np.array(pairs, dtype=np.intp).reshape(-1, 2)
+
+def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair]) -> Ints:
+    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `untested`: link pairs left out."""
+    chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
+    link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
+    tested = ~np.eye(link.max(initial=0) + 1, dtype=bool)
+    for pair in untested:
+        a, b = pair
+        if max(a, b) < len(tested):
+            tested[a, b] = tested[b, a] = False
+    allowed = tested[link[:, None], link]
+    if role == "field":
+        parts = list({shapes[index].part: None for index in chosen})
+        part = np.array([parts.index(shapes[index].part) for index in chosen], dtype=np.intp)
+        allowed &= part[:, None] != part
+    return chosen[np.argwhere(np.triu(allowed, 1))]
+
+
+def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
+    """The pairs of links that these pairs of shapes belong to."""
+    link = np.array([shape.link for shape in shapes], dtype=np.intp)
+    return {frozenset(pair) for some in pairs for pair in map(tuple, np.unique(link[some].reshape(-1, 2), axis=0).tolist())}
+
+
+def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
+    """All pairs, each with the reason of the first rule that leaves it out."""
+    return {pair: reason for rule in reversed(rules) for pair, reason in rule.items()}

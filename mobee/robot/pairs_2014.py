@@ -14,38 +14,59 @@ from itertools import combinations
 
 import numpy as np
 
-from mobee.robot.pairs import LinkPair
-from mobee.robot.robot import Ints, Shape
+from mobee.robot.robot import Ints, LinkPair, Shape
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A <link> or <joint>: the element that carries it (-1: none), its tag, its part, its noSelfCollision subtree (-1: none)."""
+    """A <link> or <joint>: what carries it (-1: none), its tag, part, noSelfCollision subtree (-1: none) and link of the robot."""
 
     parent: int
     tag: str
     part: str
     subtree: int
+    link: int = 0
 
 
-def published_pairs(
-    elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, ignored: Collection[LinkPair]
-) -> Ints:
+def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str) -> Ints:
     """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `hosts`: the element of each shape."""
     chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
     near = neighbours(elements, {hosts[index] for index in chosen})
-    pairs = []
-    for i, j in combinations(chosen, 2):
-        a, b = elements[hosts[i]], elements[hosts[j]]
-        same_hand = a.subtree == b.subtree != -1
-        adjacent = frozenset((hosts[i], hosts[j])) in near
-        if role == "solid":
-            related = a.parent == b.parent or a.parent == hosts[j] or b.parent == hosts[i]
-            adjacent = adjacent and (a.part == b.part or related)
-        left_out = frozenset((shapes[i].link, shapes[j].link)) in ignored
-        if hosts[i] != hosts[j] and not same_hand and not adjacent and not left_out:
-            pairs.append((i, j))
+    pairs = [(i, j) for i, j in combinations(chosen, 2) if not _reason(elements, hosts[i], hosts[j], role, near)]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
+
+
+def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
+    """Pairs of links that are never tested, and why: the rule for solids holds for every element of the one and of the other.
+
+    The elements of a link are those that bear a solid or, if there is none, all of them.
+    """
+    solid = {host for host, shape in zip(hosts, shapes, strict=True) if shape.role == "solid"}
+    near = neighbours(elements, solid)
+    of_link: dict[int, list[int]] = {}
+    for index, element in enumerate(elements):
+        of_link.setdefault(element.link, []).append(index)
+    for link, mine in of_link.items():
+        of_link[link] = [index for index in mine if index in solid] or mine
+    untested = {}
+    for (a, first), (b, second) in combinations(of_link.items(), 2):
+        reasons = [_reason(elements, i, j, "solid", near) for i in first for j in second]
+        if all(reasons):
+            untested[frozenset((a, b))] = reasons[0]
+    return untested
+
+
+def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collection[frozenset[int]]) -> str:
+    """Why shapes of two elements are not tested against each other; empty if they are."""
+    a, b = elements[i], elements[j]
+    if i == j:
+        return "same element"
+    if a.subtree == b.subtree != -1:
+        return "same hand (noSelfCollision)"
+    related = a.part == b.part or a.parent == b.parent or a.parent == j or b.parent == i
+    if frozenset((i, j)) in near and (role == "field" or related):
+        return "neighbours (rule of 2014)"
+    return ""
 
 
 def neighbours(elements: Sequence[Element], bearing: set[int]) -> set[frozenset[int]]:

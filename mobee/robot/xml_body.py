@@ -12,6 +12,8 @@ from mobee.robot.xml_draft import Draft, Place
 from mobee.robot.xml_node import Node
 from mobee.robot.xml_volume import PLACE, Z, align, direction, read_volume
 
+MOST_SHAPES = 2000  # what is tested grows with the square
+
 
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
     """The cylinders that `radius` and `field` of a link or joint stand for."""
@@ -21,7 +23,7 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
         if length == 0:
             node.fail(attribute, "a link without length has no volume", f"Remove {attribute} or give x, y, z")
         rotation = align(Z, axis / np.linalg.norm(axis))
-        name = node.attributes.get("name") or f"{draft.links[place.link]}_{node.tag}"
+        name = node.optional("name") or f"{draft.links[place.link]}_{node.tag}"
         shape = Shape(
             free_name(draft, name if role == "solid" else f"{name}_field"),
             place.link,
@@ -32,34 +34,41 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
             "solid" if role == "solid" else "field",
             place.part,
         )
-        add_shape(draft, shape, place)
+        add_shape(node, draft, shape, place)
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
     """Add the solid or field of a <sphere>, <capsule>, <cylinder>, <box> or <convex>."""
     volume = read_convex(node) if node.tag == "convex" else read_volume(node)
-    name = node.attributes.get("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
-    if any(name == shape.name for shape in draft.shapes):
+    name = node.optional("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
+    if name in draft.shape_names:
         node.fail("name", f"a second shape {name!r}", "Rename one of the two")
     role = "field" if node.flag("field") else "solid"
     centre = place.point + volume.centre
     shape = Shape(name, place.link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
     place = replace(place, base=node.flag("base", default=place.base))
-    add_shape(draft, replace(shape, role="field") if role == "field" else shape, place)
+    add_shape(node, draft, replace(shape, role="field") if role == "field" else shape, place)
 
 
-def add_shape(draft: Draft, shape: Shape, place: Place) -> None:
-    """Append a shape, remembering its element and whether it belongs to the base."""
+def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
+    """Append a shape, remembering its line, its element and whether it belongs to the base."""
+    if len(draft.shapes) >= MOST_SHAPES:
+        node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
     if place.base:
         draft.base_shapes.add(len(draft.shapes))
     draft.shapes.append(shape)
+    draft.shape_names[shape.name] = 0
+    draft.note("shape", shape.name, node)
     draft.hosts.append(place.element)
 
 
 def free_name(draft: Draft, name: str) -> str:
     """The name, with a number behind it if a shape has it already."""
-    used = {shape.name for shape in draft.shapes}
-    return name if name not in used else next(f"{name}_{k}" for k in range(len(used) + 1) if f"{name}_{k}" not in used)
+    free = name
+    while free in draft.shape_names:
+        free = f"{name}_{draft.shape_names[name]}"
+        draft.shape_names[name] += 1
+    return free
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
@@ -77,4 +86,5 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
         left, _, right = np.linalg.svd(rotation)  # the nearest exact rotation to what the digits of the file say
         rotation = left @ right
         normal = normal if given else rotation[:, 2]
+    draft.note("marker", name, node)
     draft.markers[name] = Marker(name, place.link, place.point + node.vector(PLACE), rotation, normal)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from mobee.robot.join import Placed
 from mobee.robot.pairs_2014 import Element
 from mobee.robot.robot import Array, Joint, Marker, Shape
 from mobee.robot.xml_motors import MotorDraft
@@ -23,10 +24,17 @@ class Draft:
     elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
     shapes: list[Shape] = field(default_factory=list)
     hosts: list[int] = field(default_factory=list)  # for each shape its element
+    shape_names: dict[str, int] = field(default_factory=dict)  # and how many more were named after it
     base_shapes: set[int] = field(default_factory=set)
     markers: dict[str, Marker] = field(default_factory=dict)
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
+    others: list[tuple[Node, Placed]] = field(default_factory=list)  # robots of other files, and where they were asked for
+    where: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def note(self, kind: str, name: str, node: Node) -> None:
+        """Remember where a thing was read first."""
+        self.where.setdefault((kind, name), f"{node.file}:{node.line}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,5 +52,5 @@ class Place:
 
 def enter(node: Node, draft: Draft, place: Place) -> Place:
     """The place inside a link or joint."""
-    draft.elements.append(Element(place.element, node.tag, place.part, place.subtree))
+    draft.elements.append(Element(place.element, node.tag, place.part, place.subtree, place.link))
     return replace(place, element=len(draft.elements) - 1)

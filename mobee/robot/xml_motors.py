@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from mobee.robot.robot import Clause, Joint, Motor, Part
 from mobee.robot.xml_node import Node
+
+CONSTRAINT_ATTRIBUTES = frozenset({"a", "q", "b", "negate"})
+NARROWEST = 1e-6  # deg between the limits of a motor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +33,15 @@ def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     low, high = node.number("minPos"), node.number("maxPos")
     if low >= high:
         node.fail("minPos", f"{low:g} is not below maxPos {high:g}", "Swap the two")
+    if high - low < NARROWEST:
+        node.fail("minPos", f"is less than {NARROWEST:g} deg below maxPos", "Write limits in degrees, or a <link> instead of the joint")
     home = node.number("home", min(max(0.0, low), high))
     if not low <= home <= high:
         node.fail("home", f"{home:g} is outside of {low:g} .. {high:g}", "Choose a home between minPos and maxPos")
     index = node.number("idx", float(count))
-    return MotorDraft(node, node.attributes.get("name", f"{part}_{count}"), part, int(index), low, high, home)
+    if not index.is_integer() or index < 0:
+        node.fail("idx", f"{index:g} is not a whole number from 0 on", "Count the motors of a part from 0")
+    return MotorDraft(node, node.optional("name") or f"{part}_{count}", part, int(index), low, high, home)
 
 
 def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:
@@ -76,11 +84,11 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
     motor = Motor(draft.name, draft.part, limits, float(np.clip(np.deg2rad(draft.home), *limits)), joints)
     node = draft.node
     if "velocity" in node.attributes:
-        motor = replace(motor, max_velocity=float(np.deg2rad(node.positive("velocity"))))
+        motor = replace(motor, max_velocity=float(np.deg2rad(node.positive("velocity", unit="degrees per second"))))
     if "acceleration" in node.attributes:
-        motor = replace(motor, max_acceleration=float(np.deg2rad(node.positive("acceleration"))))
+        motor = replace(motor, max_acceleration=float(np.deg2rad(node.positive("acceleration", unit="degrees per second squared"))))
     if "torque" in node.attributes:
-        motor = replace(motor, max_torque=node.positive("torque"))
+        motor = replace(motor, max_torque=node.positive("torque", unit="newton metres"))
     return motor
 
 
@@ -93,7 +101,7 @@ def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
     for child in node:
         if child.tag != "constraint":
             child.fail("position in the file", "only <constraint> stands in <constraintList>", "Move it out")
-        child.check_attributes({"a", "q", "b", "negate"})
+        child.check_attributes(CONSTRAINT_ATTRIBUTES)
         factors, words = child.numbers("a"), child.words("q")
         if len(factors) != len(words) or not words:
             child.fail("q", f"names {len(words)} motors for {len(factors)} factors", "Give a and q the same number of entries")
@@ -111,7 +119,7 @@ def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
 
 
 def _motor_name(node: Node, word: str, part: Part) -> str:
-    if word.lstrip("-").isdigit():
+    if re.fullmatch("-?[0-9]{1,9}", word):
         number = int(word)
         if not 0 <= number < len(part):
             node.fail("q", f"part {part.name!r} has no motor {number}", f"Its motors are 0 to {len(part) - 1}: {', '.join(part.motors)}")

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mobee.robot.pairs import LinkPair, joined_links, tested_pairs
-from mobee.robot.pairs_2014 import published_pairs
-from mobee.robot.robot import Clause, Ints, Joint, Motor, Part, Robot
+from mobee.robot.robot import Joint, Robot
 from mobee.robot.xml_body import read_marker, read_shape, read_skeleton
 from mobee.robot.xml_convex import CONVEX_ATTRIBUTES
 from mobee.robot.xml_draft import Draft, Place, enter
-from mobee.robot.xml_motors import finish_joints, order_motors, read_clauses, read_motor
+from mobee.robot.xml_finish import MOST, finish_robot
+from mobee.robot.xml_include import INCLUDE_ATTRIBUTES, Trail, read_include
+from mobee.robot.xml_motors import CONSTRAINT_ATTRIBUTES, read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
 
+ROOT = "zeropositionkinematictree"
 AXES = ("x", "y", "z")
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
 KNOWN = {
-    "zeropositionkinematictree": frozenset({"version", "robotName", "adjacency"}),
+    ROOT: frozenset({"version", "robotName", "adjacency"}),
     "bodypart": frozenset({"name"}),
     "link": frozenset({"name", *AXES, "length", "radius", "field", "base"}),
     "joint": frozenset(
@@ -29,9 +31,12 @@ KNOWN = {
     "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque"}),
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
     "constraintlist": frozenset[str](),
-    "constraint": frozenset({"a", "q", "b", "negate"}),
+    "constraint": CONSTRAINT_ATTRIBUTES,
+    "robot": INCLUDE_ATTRIBUTES,
     "ignore": frozenset({"first", "second", "role"}),
 } | {tag: known | {"name", "field", "base"} for tag, known in BODY_TAGS.items()}
+
+LEAVES = {*BODY_TAGS, "marker", "ignore", "robot", "constraint"}
 
 
 def read_robot(path: Path) -> Robot:
@@ -40,15 +45,34 @@ def read_robot(path: Path) -> Robot:
     Lengths in the file are in [m], angles in [deg]; everything in the Robot is in SI units, root frame, zero pose.
     Raises RobotFileError with file, line, field and remedy; warns of tags and attributes that it ignores.
     """
+    return _read(path, Trail())
+
+
+def _read(path: Path, trail: Trail) -> Robot:
     root = read_xml(path)
-    if root.tag != "zeropositionkinematictree":
+    if root.tag != ROOT:
         root.fail("root element", "this is not a robot", "The root of a robot file is <ZeroPositionKinematicTree robotName=...>")
-    root.check_attributes(KNOWN[root.tag])
-    draft = Draft()
+    root.check_attributes(KNOWN[ROOT])
+    _check_counts(root)
+    draft, inside = Draft(), trail.into(path)
+    for node in root:
+        if node.tag == "robot":
+            node.check_attributes(KNOWN[node.tag])
+            draft.others.append((node, read_include(node, inside, _read)))
     _read_children(root, draft, Place(np.zeros(3)))
-    if not draft.parts:
-        root.fail("bodypart", "the robot has no body part", 'Put its motors and links inside <bodypart name="...">')
-    return _finish(root, draft, root.attributes.get("robotName", path.stem))
+    return finish_robot(root, draft, root.optional("robotName") or path.stem)
+
+
+def _check_counts(root: Node) -> None:
+    """Refuse what no robot has and what would keep the reader busy for minutes."""
+    counts: Counter[str] = Counter()
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        counts[node.tag] += 1
+        if counts[node.tag] > MOST and node.tag in KNOWN:
+            node.fail("size of the file", f"more than {MOST} of this tag", "Divide the robot, or leave out what does not matter")
+        waiting += reversed(node.children)
 
 
 def _read_children(parent: Node, draft: Draft, place: Place) -> None:
@@ -56,20 +80,23 @@ def _read_children(parent: Node, draft: Draft, place: Place) -> None:
         if node.tag not in KNOWN:
             node.warn(f"unknown tag is ignored with all inside. {nearest(node.tag, KNOWN)}Valid: {', '.join(sorted(KNOWN))}")
             continue
+        if node.tag == "robot" and parent.tag == ROOT:
+            continue  # read before everything else
         node.check_attributes(KNOWN[node.tag])
-        if node.tag in BODY_TAGS:
-            read_shape(node, draft, place)
-        else:
-            READERS.get(node.tag, _misplaced)(node, draft, place)
+        READERS.get(node.tag, _misplaced)(node, draft, place)
+        if node.tag in LEAVES and node.children:
+            node.children[0].fail("position in the file", f"nothing stands inside <{node.tag}>", f"Move it behind the <{node.tag}>")
 
 
 def _misplaced(node: Node, draft: Draft, place: Place) -> None:
-    node.fail("position in the file", "this tag cannot stand here", "<constraint> stands in <constraintList>, the root only once")
+    remedy = f"<constraint> stands in <constraintList>, <robot> directly in the root, <{ROOT}> only once"
+    node.fail("position in the file", "this tag cannot stand here", remedy)
 
 
 def _read_part(node: Node, draft: Draft, place: Place) -> None:
     name = node.text("name")
     draft.parts.setdefault(name, []).append(node)
+    draft.note("part", name, node)
     _read_children(node, draft, replace(place, part=name))
 
 
@@ -80,6 +107,7 @@ def _read_motor(node: Node, draft: Draft, place: Place) -> None:
     if motor.name in draft.motors:
         node.fail("name", f"a second motor {motor.name!r}", f"The first is in line {draft.motors[motor.name].node.line}: rename one")
     draft.motors[motor.name] = motor
+    draft.note("motor", motor.name, node)
     _read_children(node, draft, replace(place, motor=motor.name))
 
 
@@ -91,23 +119,33 @@ def _read_link(node: Node, draft: Draft, place: Place) -> None:
         step = direction(node, AXES) * node.positive("length")
         length = node.positive("length")
     if place.link == 0 and "name" in node.attributes:
-        draft.links[0] = node.text("name")
+        _name_base(node, draft)
     read_skeleton(node, draft, here, place.point + step / 2, step, length)
     _read_children(node, draft, replace(here, point=place.point + step))
+
+
+def _name_base(node: Node, draft: Draft) -> None:
+    name = node.text("name")
+    if name in draft.links[1:]:
+        node.fail("name", f"a second link {name!r}", "Give the base a name of its own")
+    draft.links[0] = name
+    draft.note("link", name, node)
 
 
 def _read_joint(node: Node, draft: Draft, place: Place) -> None:
     index = len(draft.joints)
     axis = direction(node, AXES)
-    motor = node.attributes.get("motor", place.motor) or node.missing("motor")
-    name = node.attributes.get("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
+    motor = node.optional("motor") or place.motor or node.missing("motor")
+    name = node.optional("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
     kind = node.choice("type", node.attributes.get("type", "revolute"), ("revolute", "prismatic"), "type of joint")
-    link = node.attributes.get("moves", name)
+    link = node.optional("moves") or name
     if link in draft.links or any(name == joint.name for joint in draft.joints):
         node.fail("name", f"a second joint {name!r} or link {link!r}", "Give every joint its own name and every link it moves another")
     draft.joints.append(Joint(name, place.link, "revolute" if kind == "revolute" else "prismatic", axis, place.point, np.zeros(2)))
     draft.drives.append((node, motor))
     draft.links.append(link)
+    draft.note("joint", name, node)
+    draft.note("link", link, node)
     subtree = index + 1 if node.flag("noSelfCollision") and place.subtree < 0 else place.subtree
     draft.subtree.append(subtree)
     here = enter(node, draft, replace(place, link=index + 1, motor=motor, subtree=subtree, base=node.flag("base")))
@@ -119,6 +157,7 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> None:
 def _read_constraints(node: Node, draft: Draft, place: Place) -> None:
     if not place.part:
         node.fail("position in the file", "constraints outside of every part", "Move them into the <bodypart> whose motors they name")
+    draft.note("clause", str(len(draft.constraints)), node)
     draft.constraints.append((place.part, node))
 
 
@@ -134,50 +173,4 @@ READERS = {
     "marker": read_marker,
     "constraintlist": _read_constraints,
     "ignore": _read_ignore,
-}
-
-
-def _finish(root: Node, draft: Draft, name: str) -> Robot:
-    motors = order_motors(draft.motors, draft.parts)
-    parts = {part: Part(part, (), 0) for part in draft.parts}
-    for part in draft.parts:
-        names = tuple(motor.name for motor in motors if motor.part == part)
-        if not names:
-            draft.parts[part][0].fail("motor", f"part {part!r} has no motor", "Add a <motor> or move its links into another part")
-        parts[part] = Part(part, names, next(k for k, motor in enumerate(motors) if motor.part == part))
-    joints, table = finish_joints(draft.joints, draft.drives, motors)
-    rule = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "published_2014"), "rule")
-    return Robot(
-        name=name,
-        links=tuple(draft.links),
-        joints=joints,
-        motor_table=table,
-        parts=parts,
-        markers=draft.markers,
-        shapes=tuple(draft.shapes),
-        clauses=_clauses(draft, table, parts),
-        field_pairs=_pairs(draft, joints, rule, "field"),
-        solid_pairs=_pairs(draft, joints, rule, "solid"),
-        base_shapes=frozenset(draft.base_shapes),
-    )
-
-
-def _pairs(draft: Draft, joints: tuple[Joint, ...], rule: str, role: str) -> Ints:
-    if rule == "published_2014":
-        return published_pairs(draft.elements, draft.hosts, draft.shapes, role, _ignored(draft, role))
-    return tested_pairs(draft.shapes, role, joined_links(joints), draft.subtree, _ignored(draft, role))
-
-
-def _clauses(draft: Draft, table: tuple[Motor, ...], parts: dict[str, Part]) -> tuple[Clause, ...]:
-    names = tuple(motor.name for motor in table)
-    return tuple(read_clauses(node, parts[part], names) for part, node in draft.constraints)
-
-
-def _ignored(draft: Draft, role: str) -> set[LinkPair]:
-    pairs = set()
-    for node in draft.ignores:
-        if node.choice("role", node.attributes.get("role", "both"), ("solid", "field", "both"), "role") not in (role, "both"):
-            continue
-        ends = [node.choice(end, node.text(end), draft.links, "link") for end in ("first", "second")]
-        pairs.add(frozenset(draft.links.index(end) for end in ends))
-    return pairs
+} | dict.fromkeys(BODY_TAGS, read_shape)

@@ -1,0 +1,156 @@
+"""Several robots in one model: one tree on one base, for instance a Katana beside the iCub (thesis figure 2.1)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.robot.joined_pairs import joined_pairs, joined_untested
+from mobee.robot.robot import Array, Clause, Joint, Marker, Motor, Part, Robot, Shape
+
+SEPARATOR = "_"  # part names are chunks of keys on the bus: a-z, 0-9 and _ only
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A robot, what its names begin with ("" leaves them as they are), and its root frame in the common one."""
+
+    prefix: str
+    robot: Robot
+    position: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m
+    rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3)
+
+    def name(self, own: str) -> str:
+        """What a part, motor, joint, link, marker or shape of this robot is called in the joined one."""
+        return f"{self.prefix}{SEPARATOR}{own}" if self.prefix else own
+
+
+def join_robots(
+    robots: Mapping[str, Robot], places: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None, name: str | None = None
+) -> Robot:
+    """One robot of several, each standing at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
+
+    Names of parts, motors, joints, links, markers and shapes begin with the key and "_"; the key "" leaves them as they are.
+    Parts and motors follow each other in the order given.  The bases become one link, named after the first robot's.  Every solid
+    is tested against all solids of the other robots, every field against all fields; within a robot its own pairs stay.
+    Raises InvalidValue when two names are the same, when there is no robot or a place is no pose, UnknownName for a place of no robot.
+    """
+    for key in places or {}:
+        if key not in robots:
+            raise UnknownName("robot", key, robots)
+    stand = {key: (np.zeros(3), np.eye(3)) for key in robots} | {key: _pose(key, *place) for key, place in (places or {}).items()}
+    placed = [Placed(key, robot, *stand[key]) for key, robot in robots.items()]
+    return join_placed(placed, name or SEPARATOR.join(key or robot.name for key, robot in robots.items()))
+
+
+def join_placed(placed: Sequence[Placed], name: str) -> Robot:
+    """One robot of several; see join_robots."""
+    if not placed:
+        raise InvalidValue("there is no robot to join. Give at least one.")
+    joints = np.cumsum([0, *(len(one.robot.joints) for one in placed)]).tolist()
+    motors = np.cumsum([0, *(len(one.robot.motor_table) for one in placed)]).tolist()
+    bodies = [_shifted(one, joints[k], motors[k], motors[-1]) for k, one in enumerate(placed)]
+    _check_names(bodies)
+    shapes = tuple(shape for body in bodies for shape in body.shapes)
+    starts = np.cumsum([0, *(len(body.shapes) for body in bodies)]).tolist()
+    solid_pairs, field_pairs = (joined_pairs(bodies, starts, role) for role in ("solid", "field"))
+    where: dict[tuple[str, str], str] = {}
+    clauses = 0
+    for body in bodies:
+        for (kind, own), line in body.where.items():
+            where.setdefault((kind, str(int(own) + clauses) if kind == "clause" else own), line)
+        clauses += len(body.clauses)
+    return Robot(
+        name=name,
+        links=(bodies[0].links[0], *(link for body in bodies for link in body.links[1:])),
+        joints=tuple(joint for body in bodies for joint in body.joints),
+        motor_table=tuple(motor for body in bodies for motor in body.motor_table),
+        parts={key: part for body in bodies for key, part in body.parts.items()},
+        markers={key: marker for body in bodies for key, marker in body.markers.items()},
+        shapes=shapes,
+        clauses=tuple(clause for body in bodies for clause in body.clauses),
+        field_pairs=field_pairs,
+        solid_pairs=solid_pairs,
+        base_shapes=frozenset(index + start for body, start in zip(bodies, starts, strict=False) for index in body.base_shapes),
+        untested=joined_untested(bodies, shapes, (solid_pairs, field_pairs)),
+        where=where,
+    )
+
+
+def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
+    """A robot with its new names and place, its links counted behind `joints` others, its motors behind `motors` of `all_motors`."""
+    robot, turn = one.robot, one.rotation
+
+    def link(index: int) -> int:
+        return index + joints if index else 0
+
+    def point(position: Array) -> Array:
+        moved: Array = turn @ position + one.position
+        return moved
+
+    def joint(old: Joint) -> Joint:
+        return replace(old, name=one.name(old.name), parent=link(old.parent), axis=turn @ old.axis, point=point(old.point))
+
+    def motor(old: Motor) -> Motor:
+        driven = tuple((index + joints, scale, shift) for index, scale, shift in old.joints)
+        return replace(old, name=one.name(old.name), part=one.name(old.part), joints=driven)
+
+    def part(old: Part) -> Part:
+        return Part(one.name(old.name), tuple(map(one.name, old.motors)), old.start + motors)
+
+    def marker(old: Marker) -> Marker:
+        moved = replace(old, position=point(old.position), rotation=turn @ old.rotation, normal=turn @ old.normal)
+        return replace(moved, name=one.name(old.name), link=link(old.link))
+
+    def shape(old: Shape) -> Shape:
+        moved = replace(old, position=point(old.position), rotation=turn @ old.rotation)
+        return replace(moved, name=one.name(old.name), part=one.name(old.part), link=link(old.link))
+
+    def clause(old: Clause) -> Clause:
+        a = np.zeros((len(old.b), all_motors))
+        a[:, motors : motors + old.a.shape[1]] = old.a
+        return Clause(one.name(old.part), a, old.b)
+
+    return replace(
+        robot,
+        name=one.name(robot.name),
+        links=tuple(map(one.name, robot.links)),
+        joints=tuple(map(joint, robot.joints)),
+        motor_table=tuple(map(motor, robot.motor_table)),
+        parts={one.name(key): part(old) for key, old in robot.parts.items()},
+        markers={one.name(key): marker(old) for key, old in robot.markers.items()},
+        shapes=tuple(map(shape, robot.shapes)),
+        clauses=tuple(map(clause, robot.clauses)),
+        untested={frozenset(map(link, pair)): reason for pair, reason in robot.untested.items()},
+        where={(kind, own if kind == "clause" else one.name(own)): line for (kind, own), line in robot.where.items()},
+    )
+
+
+def _check_names(bodies: Sequence[Robot]) -> None:
+    """Raise InvalidValue when two robots give two things of one kind the same name."""
+    kinds = {
+        "parts": [key for body in bodies for key in body.parts],
+        "motors": [motor for body in bodies for motor in body.motors],
+        "joints": [joint.name for body in bodies for joint in body.joints],
+        "links": [bodies[0].links[0], *(link for body in bodies for link in body.links[1:])],
+        "markers": [key for body in bodies for key in body.markers],
+        "shapes": [shape.name for body in bodies for shape in body.shapes],
+    }
+    for kind, names in kinds.items():
+        twice = [name for name, count in Counter(names).items() if count > 1]
+        if twice:
+            raise InvalidValue(f"two {kind} of the joined robots are called {twice[0]!r}. Give each robot a name of its own")
+
+
+def _pose(key: str, position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:
+    at, turn = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
+    if at.shape != (3,) or not np.isfinite(at).all():
+        raise InvalidValue(f"place of robot {key!r}: position has shape {at.shape}; give 3 finite numbers in metres.")
+    if turn.shape != (3, 3) or not np.abs(turn @ turn.T - np.eye(3)).max() < 1e-6 or np.linalg.det(turn) < 0:
+        raise InvalidValue(f"place of robot {key!r}: rotation is not a right-handed rotation matrix (3, 3).")
+    return at, turn
