@@ -21,6 +21,7 @@ VERBS = {
     "topic": "what is said on the bus: list, echo, hz",
     "router": "only the router, when each service runs by itself",
     "robots": "robots and worlds that come with mobee",
+    "experiment": "claims of the papers, measured: list, run, figure",
     "check": "what is wrong with a robot or world of your own",
 }
 
@@ -67,7 +68,7 @@ def _run(verb: str, arguments: list[str]) -> int:
 
 
 def _usage() -> str:
-    verbs = "\n".join(f"  {verb:<9}{text}" for verb, text in VERBS.items())
+    verbs = "\n".join(f"  {verb:<11}{text}" for verb, text in VERBS.items())
     notes = "`mobee <verb> --help` tells more.  Exit codes: 0 ok, 1 failed, 2 bad input, 3 environment."
     return f"usage: mobee <verb> [options]\n\n{verbs}\n\n{notes}"
 

@@ -1,0 +1,44 @@
+"""Figure 2.4: our curves beside what the thesis says in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.flood.rates import binned
+from experiments.flood.records import Record
+from experiments.matplotlib_figure import new_figure
+from mobee.errors import InvalidValue
+
+COLORS = {"katana": "tab:orange", "icub": "tab:blue"}
+LABELS = {"katana": "Katana", "icub": "iCub"}
+BIN = 0.2  # s of flood a point of a curve
+HUNDREDS = (100.0, 1000.0)
+STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
+
+
+def draw(records: Sequence[Record], path: Path) -> Path:
+    """Evaluations a second against the number of objects; raises InvalidValue if there is nothing to draw."""
+    if not records:
+        raise InvalidValue(f"no records of a flood in {path.parent}: it was stopped before the first, or was an endurance run.")
+    drawing = new_figure(8.0, 5.0)
+    axes = drawing.add_subplot()
+    claim = 'thesis: iCub, "hundreds of poses per second\n… with hundreds of obstacles"'
+    axes.fill_between(HUNDREDS, *HUNDREDS, color="0.85", zorder=0, label=claim)
+    axes.axhline(STATE_RATE, color="0.5", linestyle=":", label="thesis: the iCub reports its state at 100 Hz")
+    for robot, color in COLORS.items():
+        mine = [record for record in records if record["robot"] == robot]
+        flooded = list(binned([record for record in mine if record["edits"]], BIN))
+        still = list(binned([record for record in mine if not record["edits"]], 0.0))
+        axes.plot(*_columns(flooded), color=color, label=f"{LABELS[robot]}, flooded")
+        axes.plot(*_columns(still), "--o", color=color, markersize=3.0, linewidth=0.8, label=f"{LABELS[robot]}, no edits")
+    axes.set(xlabel="objects in the workspace", ylabel="evaluations per second", yscale="log", xlim=(0.0, None))
+    axes.set_title("Thesis figure 2.4: model evaluations while the world is flooded with edits")
+    axes.grid(which="both", alpha=0.2)
+    axes.legend(fontsize=8)
+    drawing.savefig(path, dpi=150)
+    return path
+
+
+def _columns(points: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
+    return [x for x, _ in points], [y for _, y in points]

@@ -1,0 +1,42 @@
+"""The experiments that `mobee experiment` knows: one line each."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from mobee.errors import UnknownName
+
+EXPERIMENTS = {
+    "flood": "experiments.flood",
+}
+
+
+class Experiment(Protocol):
+    """What the module of an experiment holds.
+
+    `run` works in the folder of a run and may be interrupted at any time: it appends what is finished to files there, and goes
+    on behind them when it is called again.  A result `passed` of False fails the command.
+    """
+
+    NAME: str
+    CLAIM: str  # one line
+    SOURCE: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Options of the experiment; `--seed`, `--runs`, `--resume` and `--json` are there already."""
+
+    def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+        """Do it; returns what came out, of the types that JSON has."""
+
+    def figure(self, folder: Path) -> Path:
+        """Draw what a run left in its folder; returns the picture's path."""
+
+
+def load_experiment(name: str) -> Experiment:
+    """The experiment of that name; raises UnknownName with the nearest."""
+    if name not in EXPERIMENTS:
+        raise UnknownName("experiment", name, EXPERIMENTS)
+    return cast(Experiment, importlib.import_module(EXPERIMENTS[name]))

@@ -1,0 +1,88 @@
+"""The folder of an experiment's run: what was asked for, with what, and what came of it."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+import time
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from mobee.errors import InvalidValue
+
+PACKAGES = ("mobee", "numpy", "numba", "python-fcl", "mujoco", "matplotlib")
+CONFIG, VERSIONS, RESULTS = "config.json", "versions.json", "results.json"
+
+
+def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
+    """Make `runs/<time>-<name>/` with config.json and versions.json; raises OSError."""
+    runs.mkdir(parents=True, exist_ok=True)
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    number = 1
+    while True:
+        folder = runs / (f"{stamp}-{name}" if number == 1 else f"{stamp}-{name}-{number}")
+        try:
+            folder.mkdir()
+            break
+        except FileExistsError:  # two runs in one second get two folders
+            number += 1
+    write(folder / CONFIG, {"experiment": name, "options": dict(options)})
+    write(folder / VERSIONS, _versions())
+    return folder
+
+
+def options_of(folder: Path, name: str) -> dict[str, Any]:
+    """With what options a run was begun; raises InvalidValue if it is no run of that experiment."""
+    try:
+        config = json.loads((folder / CONFIG).read_text())
+        begun, options = config["experiment"], dict(config["options"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InvalidValue(f"{folder} is not the folder of a run: it has no readable {CONFIG}.") from None
+    if begun != name:
+        raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
+    return options
+
+
+def newest_run(runs: Path, name: str) -> Path:
+    """The folder of the latest run of an experiment; raises InvalidValue if there is none."""
+    found = sorted(path.parent for path in runs.glob(f"*-{name}*/{CONFIG}"))
+    if not found:
+        raise InvalidValue(f"no run of {name!r} in {runs}: start one with `mobee experiment run {name}`, or name its folder.")
+    return found[-1]
+
+
+def write(path: Path, content: Mapping[str, Any]) -> None:
+    """Write JSON for people and programs."""
+    path.write_text(json.dumps(content, indent=2, default=str) + "\n")
+
+
+def _versions() -> dict[str, Any]:
+    packages = {}
+    for package in PACKAGES:
+        try:
+            packages[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    machine = {"python": platform.python_version(), "platform": platform.platform(), "processor": _processor()}
+    return {**machine, "commit": _commit(), "packages": packages, "begun": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:  # not Linux
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def _commit() -> str | None:
+    """The commit of the sources, with a + if they were edited since; None outside a git checkout."""
+    try:
+        command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10.0)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() or None

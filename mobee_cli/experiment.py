@@ -1,0 +1,114 @@
+"""`mobee experiment`: the experiments that come with mobee."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.matplotlib_figure import MatplotlibMissing
+from experiments.registry import EXPERIMENTS, Experiment, load_experiment
+from experiments.run_folder import RESULTS, new_run, newest_run, options_of, write
+from mobee.errors import MobeeError
+from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
+
+RUNS = Path("runs")
+_NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it goes on
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """One parser an action."""
+    parser.set_defaults(make_parser=type(parser))
+    actions = parser.add_subparsers(dest="action", required=True, metavar="list|run|figure")
+    listing = actions.add_parser("list", help="what there is", description="What there is: names, claims and their sources.")
+    listing.add_argument("--json", action="store_true", help="print as JSON")
+    text = "Run an experiment; `mobee experiment run NAME --help` tells its options."
+    running = actions.add_parser("run", help="run one", description=text)
+    running.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
+    running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="of the experiment")
+    drawing = actions.add_parser("figure", help="draw a run", description="Draw the figure of a run.")
+    drawing.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
+    drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run (default: the newest)")
+    drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest is looked for (default: runs)")
+    drawing.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do the action."""
+    try:
+        if arguments.action == "list":
+            return _list(arguments)
+        experiment = load_experiment(arguments.name)
+        if arguments.action == "figure":
+            return _figure(experiment, arguments)
+        return _run(experiment, _options(experiment, arguments.make_parser, arguments.options))
+    except MatplotlibMissing as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    found = [load_experiment(name) for name in EXPERIMENTS]
+    if arguments.json:
+        print(json.dumps([{"name": e.NAME, "claim": e.CLAIM, "source": e.SOURCE} for e in found], indent=2))
+        return 0
+    for experiment in found:
+        print(f"{experiment.NAME:<12} {experiment.CLAIM} ({experiment.SOURCE})")
+    return 0
+
+
+def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser], given: Sequence[str]) -> argparse.Namespace:
+    """Options of the run; those of a run that is resumed are its own unless they are given again."""
+    notes = (experiment.__doc__ or "").strip()
+    parser = make_parser(
+        prog=f"mobee experiment run {experiment.NAME}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    experiment.add_arguments(parser)
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
+    parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the run's folder is made (default: runs)")
+    parser.add_argument("--resume", type=Path, metavar="RUN", help="go on with a run that was interrupted")
+    parser.add_argument("--json", action="store_true", help="print the results as JSON")
+    options = parser.parse_args(given)
+    if options.resume is None:
+        return options
+    parser.set_defaults(**options_of(options.resume, experiment.NAME))
+    return parser.parse_args(given)
+
+
+def _run(experiment: Experiment, options: argparse.Namespace) -> int:
+    try:
+        own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
+        folder = options.resume or new_run(options.runs, experiment.NAME, own)
+        results = experiment.run(options, folder)
+        write(folder / RESULTS, results)
+    except OSError as error:
+        raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
+    except KeyboardInterrupt:
+        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
+    if options.json:
+        print(json.dumps({"run": str(folder), **results}, indent=2))
+    else:
+        print(f"run: {folder}")
+        _print(results, "")
+    return FAILED if results.get("passed") is False else 0
+
+
+def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:
+    path = experiment.figure(arguments.folder or newest_run(arguments.runs, experiment.NAME))
+    print(json.dumps({"figure": str(path)}) if arguments.json else path)
+    return 0
+
+
+def _print(results: dict[str, Any], indent: str) -> None:
+    for key, value in results.items():
+        label = f"{indent}{str(key).replace('_', ' ')}:"
+        if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
+            print(label)
+            _print(value, f"{indent}  ")
+        elif isinstance(value, dict):
+            print(label, ", ".join(f"{inner} -> {what}" for inner, what in value.items()) or "none")
+        else:
+            print(label, f"{value:.4g}" if isinstance(value, float) else value)
