@@ -8,10 +8,12 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.box_box import box_box
-from mobee.engine.narrow.features import BOX, CAPSULE, SPHERE
+from mobee.engine.narrow.difference import FRAME, relative, rounding
+from mobee.engine.narrow.features import BOX, CAPSULE, CONVEX, SPHERE
 from mobee.engine.narrow.general import general
+from mobee.engine.narrow.gjk import closest
 from mobee.engine.narrow.rounded import capsule_capsule, sphere_capsule, sphere_sphere
-from mobee.engine.narrow.rounded_box import capsule_box, sphere_box
+from mobee.engine.narrow.rounded_box import capsule_box, capsule_box_distance, sphere_box
 from mobee.engine.narrow.slots import KIND, turn_round
 from mobee.robot.robot import Array
 
@@ -48,3 +50,19 @@ def _ordered(P: Array, a: int, b: int, V: Array, out: Array) -> float:
         if first == BOX:
             return box_box(P, a, b, V, out)
     return general(P, a, b, V, out)
+
+
+@inner
+def distance(P: Array, a: int, b: int, V: Array) -> float:
+    """How far two volumes are apart [m]: 0 if they overlap; P, a, b and V as for `overlap`."""
+    if P[np.uint64(a) + KIND] > P[np.uint64(b) + KIND]:
+        a, b = b, a
+    i, j = np.uint64(a), np.uint64(b)
+    first, second = P[i + KIND], P[j + KIND]
+    if first == CAPSULE and second == BOX:
+        return capsule_box_distance(P, a, b)
+    if second <= CAPSULE or first == SPHERE and second != CONVEX:
+        return max(-_ordered(P, a, b, V, np.empty(6)), 0.0)
+    frame = np.empty(FRAME)
+    relative(P, i, j, frame)
+    return max(closest(P, i, j, V, frame, math.inf)[0] - rounding(P, i) - rounding(P, j), 0.0)

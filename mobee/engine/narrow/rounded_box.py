@@ -68,6 +68,20 @@ def capsule_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
 
 
 @inner
+def capsule_box_distance(P: Array, a: int, b: int) -> float:
+    """How far the two are apart [m], exactly; 0 if they overlap."""
+    i, j = np.uint64(a), np.uint64(b)
+    x, y, z = centers_apart(P, i, j)
+    x, y, z = into(P, j, x, y, z)
+    hx, hy, hz = vector(P, i + CORE)
+    hx, hy, hz = into(P, j, hx, hy, hz)
+    kx, ky, kz = vector(P, j + HALF)
+    s = closest_to_box(x, y, z, hx, hy, hz, kx, ky, kz)
+    dx, dy, dz = _beyond(x + s * hx, kx), _beyond(y + s * hy, ky), _beyond(z + s * hz, kz)
+    return max(math.sqrt(dx * dx + dy * dy + dz * dz) - P[i + RADIUS], 0.0)
+
+
+@inner
 def closest_to_box(x: float, y: float, z: float, hx: float, hy: float, hz: float, kx: float, ky: float, kz: float) -> float:
     """The s in [-1, 1] that brings c + s h closest to the box of half edges k, c = (x, y, z): the middle of all such s."""
     least = FLAT * FLAT * (hx * hx + hy * hy + hz * hz)
