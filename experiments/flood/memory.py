@@ -26,4 +26,5 @@ def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) ->
     settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > SETTLING * seconds[-1]]
     if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < SHORTEST:
         return None
-    return float(np.polyfit(*np.transpose(settled), 1)[0])
+    minutes, resident = np.transpose(settled)
+    return float(np.polyfit(minutes, resident, 1)[0])
