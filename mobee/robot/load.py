@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from mobee.collision.world import World
-from mobee.errors import RobotFileError, UnknownName
+from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
+from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml_world import read_world
 from mobee.robot.zero_position import read_robot
 
@@ -14,12 +16,23 @@ ROBOTS = Path(__file__).parent / "robots"
 WORLDS = Path(__file__).parent / "worlds"
 
 
-def load_robot(name_or_path: str | Path) -> Robot:
-    """A shipped robot by name (see shipped_robots), or the robot of a zero-position .xml file.
+def load_robot(
+    name_or_path: str | Path, *, field: float | None = None, meshes: Meshes | None = None, srdf: str | Path | None = None
+) -> Robot:
+    """A shipped robot by name (see shipped_robots), or the robot of a zero-position .xml or a .urdf file.
 
-    Raises UnknownName with the nearest shipped name, or RobotFileError with file, line, field and remedy.
+    For URDF files only: `field` gives every solid a field that reaches so much farther, in [m] (none when left out);
+    `meshes` is "hull" (when left out) or "bounding", see UrdfOptions; `srdf` is the SRDF file (the one beside when left out).
+    Raises UnknownName with the nearest shipped name, InvalidValue for an option that the file cannot have, or RobotFileError
+    with file, line, field and remedy.
     """
-    return read_robot(find_file(name_or_path, ROBOTS, "robot"))
+    path = find_file(name_or_path, ROBOTS, "robot")
+    if path.suffix.lower() == ".urdf":
+        return read_urdf(path, UrdfOptions(field, meshes or "hull", srdf))
+    given = [name for name, value in (("field", field), ("meshes", meshes), ("srdf", srdf)) if value is not None]
+    if given:
+        raise InvalidValue(f"{given[0]}= is for .urdf files, and {path} is none: zero-position XML has tags for all of it. Leave it out.")
+    return read_robot(path)
 
 
 def shipped_robots() -> tuple[str, ...]:
@@ -38,13 +51,15 @@ def shipped_worlds() -> tuple[str, ...]:
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
-    """The .xml file that a shipped name or a path stands for."""
+    """The file that a shipped name or a path stands for."""
     path, given = Path(name_or_path), str(name_or_path)
-    if path.suffix == ".urdf":
-        raise RobotFileError(f"{path}: URDF files cannot be read yet. Describe the {kind} in zero-position XML (robots/README.md).")
+    suffixes = ".xml or .urdf" if kind == "robot" else ".xml"
+    if path.suffix.lower() == ".xacro":
+        urdf = f"{path.stem.removesuffix('.urdf')}.urdf"
+        raise RobotFileError(f"{path}: xacro files are made into URDF first. Run: xacro {path.name} > {urdf}")
     if path.suffix or path.name != given:
         if not path.is_file():
-            raise RobotFileError(f"{path}: no such file. Give a path to an .xml file, or a name: {', '.join(shipped(folder))}.")
+            raise RobotFileError(f"{path}: no such file. Give a path to a file ({suffixes}), or a name: {', '.join(shipped(folder))}.")
         return path
     if given not in shipped(folder):
         raise UnknownName(kind, given, shipped(folder))

@@ -1,0 +1,84 @@
+"""Frames as URDF writes them: `<origin xyz="..." rpy="...">`, a turn about the fixed axes x, y, z, in that order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, sin
+
+import numpy as np
+
+from mobee.robot.robot import Array
+from mobee.robot.xml_node import Node
+
+FARTHEST = 1e6  # m: beyond it a number is a slip, and the arithmetic would lose millimetres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """Where a frame stands in another."""
+
+    position: Array  # (3,) m
+    rotation: Array  # (3, 3)
+
+    def __matmul__(self, inner: Frame) -> Frame:
+        """The frame `inner`, given in this one, as seen from where this one is given."""
+        return Frame(self.rotation @ inner.position + self.position, self.rotation @ inner.rotation)
+
+
+IDENTITY = Frame(np.zeros(3), np.eye(3))
+
+
+def read_origin(parent: Node) -> Frame:
+    """The <origin> of a joint or shape; none means the parent's own frame. Raises RobotFileError."""
+    node = child(parent, "origin")
+    if node is None:
+        return IDENTITY
+    node.check_attributes({"xyz", "rpy"})
+    position = triple(node, "xyz") if "xyz" in node.attributes else np.zeros(3)
+    return Frame(position, rotation_of(triple(node, "rpy")) if "rpy" in node.attributes else np.eye(3))
+
+
+def child(parent: Node, tag: str) -> Node | None:
+    """The only child of that tag, or None; raises RobotFileError when there are two."""
+    found = [node for node in parent if node.tag == tag]
+    if len(found) > 1:
+        found[1].fail("position in the file", f"a second <{tag}>", f"The first is in line {found[0].line}: remove one")
+    return found[0] if found else None
+
+
+def triple(node: Node, name: str) -> Array:
+    """Three numbers that a robot can have."""
+    values = np.array(node.numbers(name, 3))
+    if float(np.abs(values).max()) > FARTHEST:
+        node.fail(name, f"{float(np.abs(values).max()):g} is too large", "URDF counts in metres and radians")
+    return values
+
+
+def bounded(node: Node, name: str, default: float | None = None) -> float:
+    """A number that a robot can have."""
+    value = node.number(name, default)
+    if abs(value) > FARTHEST:
+        node.fail(name, f"{value:g} is too large", "URDF counts in metres and radians")
+    return value
+
+
+def rotation_of(rpy: Array) -> Array:
+    """The rotation (3, 3) of roll, pitch, yaw in [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_of(rotation: Array) -> Array:
+    """Roll, pitch, yaw (3,) in [rad] of a rotation (3, 3); exact at a pitch of 90 deg too, where roll is arbitrary."""
+    r = rotation
+    roll = atan2(r[2, 1], r[2, 2])
+    sine, cosine = sin(roll), cos(roll)
+    # With the roll taken back, what remains turns about y and z only, so a roll that is off is made up for by the yaw.
+    yaw = atan2(sine * r[0, 2] - cosine * r[0, 1], cosine * r[1, 1] - sine * r[1, 2])
+    return np.array([roll, atan2(-r[2, 0], hypot(r[0, 0], r[1, 0])), yaw])

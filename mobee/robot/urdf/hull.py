@@ -1,0 +1,83 @@
+"""Convex hulls of meshes, with few vertices and never smaller than the mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.robot.robot import Array
+
+MOST_VERTICES = 64
+THINNEST = 1e-4  # m, half the thickness that a flat mesh is given
+MARGIN = 1e-9  # of the mesh's size, so that rounding leaves no vertex outside
+
+
+def convex_hull(points: Array) -> Array:
+    """Vertices (v, 3) of a convex body with at most 64 vertices that holds all `points`, v >= 4.
+
+    It is the exact hull where that has no more vertices; else planes of the hull's facets are intersected, most
+    protruding corner first, until 64 vertices are reached. Flat meshes are given a thickness of 0.2 mm.
+    """
+    from scipy.spatial import ConvexHull  # 0.3 s, and only robots with meshes need it
+
+    points = _thickened(points)
+    hull = ConvexHull(points)
+    if len(hull.vertices) <= MOST_VERTICES:
+        exact: Array = points[hull.vertices]
+        return exact
+    return _enclosing(points[hull.vertices], hull.equations)
+
+
+def facets(vertices: Array) -> Array:
+    """The triangles (f, 3, 3) of the hull of `vertices`, corners anticlockwise as seen from outside."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(vertices)
+    corners: Array = vertices[hull.simplices]
+    inwards = (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * hull.equations[:, :3]).sum(axis=1) < 0
+    corners[inwards] = corners[inwards][:, ::-1]
+    return corners
+
+
+def _thickened(points: Array) -> Array:
+    """The points; where they lie in a plane or on a line, copies of them on both sides."""
+    for _ in range(3):
+        spread = points - points.mean(axis=0)
+        axes = np.linalg.svd(spread.T @ spread)[0]  # (3, 3), columns by falling extent
+        thin = axes[:, 2]
+        along = spread @ thin
+        extent = float(np.abs(spread).max())
+        if along.max() - along.min() > max(2.0 * THINNEST * 1e-3, 1e-5 * extent):
+            return points
+        points = np.vstack([points + THINNEST * thin, points - THINNEST * thin])
+    return points
+
+
+def _enclosing(vertices: Array, planes: Array) -> Array:
+    """Vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
+    from scipy.spatial import HalfspaceIntersection
+
+    inside = vertices.mean(axis=0)
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    planes = planes - np.array([0.0, 0.0, 0.0, MARGIN * size])
+    box = np.vstack([np.eye(3), -np.eye(3)])
+    chosen = np.hstack([box, -(box @ vertices.T).max(axis=1, keepdims=True) - MARGIN * size])
+    best = None
+    while True:
+        corners = _merged(HalfspaceIntersection(chosen, inside).intersections, 1e-7 * size)
+        if best is not None and len(corners) > MOST_VERTICES:
+            return best
+        best = corners
+        protruding = corners @ planes[:, :3].T + planes[:, 3]  # (corners, planes) m
+        worst = np.unravel_index(int(protruding.argmax()), protruding.shape)
+        if protruding[worst] < 1e-7 * size:
+            return best
+        chosen = np.vstack([chosen, planes[worst[1]]])
+
+
+def _merged(points: Array, near: float) -> Array:
+    """The points without those that repeat another up to rounding."""
+    kept: list[Array] = []
+    for point in points:
+        if not kept or float(np.abs(np.array(kept) - point).max(axis=1).min()) > near:
+            kept.append(point)
+    return np.array(kept)

@@ -1,0 +1,87 @@
+"""The points of a mesh file: STL (binary and text), OBJ and COLLADA, without anything that only decorates it."""
+
+from __future__ import annotations
+
+import re
+import stat
+from pathlib import Path
+
+import numpy as np
+
+from mobee.errors import RobotFileError
+from mobee.robot.robot import Array
+from mobee.robot.urdf.mesh_dae import read_dae
+
+LARGEST = 50_000_000  # bytes
+FARTHEST = 1e6  # m
+STL_HEADER, STL_FACET = 84, 50  # bytes of a binary STL: header and count, then each facet
+FACETS = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+OBJ_VERTICES = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+
+
+def read_mesh(path: Path) -> Array:
+    """All points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
+
+    Raises RobotFileError with the remedy for what cannot be read, is no mesh, or holds no points.
+    """
+    kind = path.suffix.lower()
+    if kind not in READERS:
+        raise RobotFileError(f"{path}: meshes of type {kind or 'unknown'!r} cannot be read. Convert it to .stl, .obj or .dae.")
+    points = READERS[kind](path)
+    if not len(points):
+        raise RobotFileError(f"{path}: holds no points. Export the mesh again, or remove it from the robot.")
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > FARTHEST:
+        raise RobotFileError(f"{path}: has points that are not finite or farther than {FARTHEST:g} m away. Export the mesh again.")
+    return np.unique(points, axis=0)
+
+
+def _stl(path: Path) -> Array:
+    content = _content(path)
+    facets = int.from_bytes(content[80:STL_HEADER], "little")
+    body = len(content) - STL_HEADER
+    if body == STL_FACET * facets:
+        return _stl_facets(content, facets)
+    if content.lstrip()[:5].lower() == b"solid":
+        return _numbers(path, FACETS.findall(content), content.lower().count(b"vertex"))
+    if 0 < STL_FACET * facets < body:  # some programs add what they like behind the facets
+        return _stl_facets(content, facets)
+    what = f"announces {facets} facets and has room for {max(body, 0) // STL_FACET}" if body >= 0 else "is too short"
+    raise RobotFileError(f"{path}: not a complete STL file: it {what}. Export the mesh again.")
+
+
+def _stl_facets(content: bytes, facets: int) -> Array:
+    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    table = np.frombuffer(content, layout, count=facets, offset=STL_HEADER)
+    points: Array = table["corners"].reshape(-1, 3).astype(np.float64)
+    return points
+
+
+def _obj(path: Path) -> Array:
+    content = _content(path)
+    return _numbers(path, OBJ_VERTICES.findall(content), len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE)))
+
+
+def _numbers(path: Path, words: list[tuple[bytes, bytes, bytes]], vertices: int) -> Array:
+    if len(words) != vertices:
+        raise RobotFileError(f"{path}: {vertices - len(words)} of {vertices} vertices lack a coordinate. Export the mesh again.")
+    try:
+        points: Array = np.array(words, dtype=np.bytes_).reshape(-1, 3).astype(np.float64)
+    except ValueError as error:
+        raise RobotFileError(f"{path}: a coordinate is no number ({error}). Export the mesh again.") from error
+    return points
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise RobotFileError(f"{path}: is not a regular file. Give the path of a mesh.")
+        with path.open("rb") as file:
+            content = file.read(LARGEST + 1)
+    except OSError as error:
+        raise RobotFileError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    if len(content) > LARGEST:
+        raise RobotFileError(f"{path}: the mesh is larger than {LARGEST // 1_000_000} MB. Simplify it: only its hull is used.")
+    return content
+
+
+READERS = {".stl": _stl, ".obj": _obj, ".dae": read_dae}

@@ -1,0 +1,157 @@
+"""The points of a COLLADA file: geometries where the scene places them, nothing else.
+
+Lengths are turned into metres by the file's <unit>. Its <up_axis> is left alone, as ROS tools do: the URDF says which way is up.
+"""
+
+from __future__ import annotations
+
+import xml.sax.xmlreader
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from mobee.errors import RobotFileError
+from mobee.robot.robot import Array
+from mobee.robot.xml_file import LineHandler, parse_xml
+from mobee.robot.xml_volume import turn_about
+
+DEEPEST = 100
+MOST_ELEMENTS = 50_000
+MOST_POINTS = 2_000_000  # a scene may place one geometry many times
+TRANSFORMS = ("matrix", "translate", "rotate", "scale")
+TEXTS = ("float_array", *TRANSFORMS)  # elements whose text is needed
+
+
+@dataclass(slots=True, eq=False)
+class _Element:
+    tag: str
+    line: int
+    attributes: dict[str, str]
+    children: list[_Element] = field(default_factory=list)
+    text: str = ""
+
+    def all(self, tag: str) -> list[_Element]:
+        """Every element of that tag below this one."""
+        found, stack = [], list(reversed(self.children))
+        while stack:
+            element = stack.pop()
+            if element.tag == tag:
+                found.append(element)
+            stack += reversed(element.children)
+        return found
+
+
+class _Builder(LineHandler):
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self.root = _Element("", 0, {})
+        self.open = [self.root]
+        self.count = 0
+        self.words: list[str] = []
+
+    def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:  # noqa: N802, the name is sax's
+        element = _Element(name.lower(), self.line, dict(attrs.items()))
+        self.count += 1
+        if len(self.open) > DEEPEST or self.count > MOST_ELEMENTS:
+            _fail(self.path, element, f"more than {DEEPEST} elements deep or {MOST_ELEMENTS} in all", "Simplify the mesh")
+        self.open[-1].children.append(element)
+        self.open.append(element)
+        self.words = []
+
+    def characters(self, content: str) -> None:
+        if self.open[-1].tag in TEXTS:
+            self.words.append(content)
+
+    def endElement(self, name: str) -> None:  # noqa: N802
+        self.open.pop().text = "".join(self.words)
+        self.words = []
+
+
+def read_dae(path: Path) -> Array:
+    """All points (v, 3) in [m] of the geometries that the scene of a COLLADA file shows; raises RobotFileError."""
+    builder = _Builder(path)
+    parse_xml(path, builder)
+    root = builder.root
+    units = root.all("unit")
+    meter = float(_numbers(path, units[0], units[0].attributes.get("meter", "1"), 1)[0]) if units else 1.0
+    geometries = {geometry.attributes.get("id", ""): _points(path, geometry) for geometry in root.all("geometry")}
+    return meter * np.vstack([np.empty((0, 3)), *(_placed(path, root, geometries) or geometries.values())])
+
+
+def _points(path: Path, geometry: _Element) -> Array:
+    sources = {source.attributes.get("id", ""): source for source in geometry.all("source")}
+    names = [
+        given.attributes.get("source", "").removeprefix("#")
+        for vertices in geometry.all("vertices")
+        for given in vertices.all("input")
+        if given.attributes.get("semantic") == "POSITION"
+    ]
+    arrays = []
+    for name in names:
+        if name not in sources or not sources[name].all("float_array"):
+            _fail(path, geometry, f"its positions {name!r} are missing", "Export the mesh again")
+        array = sources[name].all("float_array")[0]
+        arrays.append(_numbers(path, array, array.text, 3).reshape(-1, 3))
+    return np.vstack([np.empty((0, 3)), *arrays])
+
+
+def _placed(path: Path, root: _Element, shapes: dict[str, Array]) -> list[Array]:
+    """The points of every geometry that the scene shows, each where it stands."""
+    nodes = {node.attributes.get("id", ""): node for node in root.all("node")}
+    stack = [(scene, np.eye(4)) for scene in root.all("visual_scene")]
+    placed: list[Array] = []
+    visits = points = 0
+    while stack:
+        node, frame = stack.pop()
+        for child in node.children:
+            name = child.attributes.get("url", "").removeprefix("#")
+            if child.tag in TRANSFORMS:
+                frame = frame @ _transform(path, child)
+            elif child.tag == "node":
+                stack.append((child, frame))
+            elif child.tag == "instance_node" and name in nodes:
+                stack.append((nodes[name], frame))
+            elif child.tag == "instance_geometry" and name in shapes:
+                placed.append(shapes[name] @ frame[:3, :3].T + frame[:3, 3])
+                points += len(shapes[name])
+            visits += 1
+            if visits > MOST_ELEMENTS or points > MOST_POINTS:  # nodes may place each other, even without end
+                _fail(path, child, f"the scene holds more than {MOST_ELEMENTS} nodes or {MOST_POINTS} points", "Simplify the mesh")
+    return placed
+
+
+def _transform(path: Path, element: _Element) -> Array:
+    if element.tag == "matrix":
+        return _numbers(path, element, element.text, 16)[:16].reshape(4, 4)
+    frame = np.eye(4)
+    if element.tag == "rotate":
+        x, y, z, degrees = _numbers(path, element, element.text, 4)[:4]
+        length = float(np.linalg.norm([x, y, z]))
+        if length < 1e-9:
+            _fail(path, element, "the axis has no length", "Export the mesh again")
+        frame[:3, :3] = turn_about(np.array([x, y, z]) / length, float(np.deg2rad(degrees)))
+        return frame
+    values = _numbers(path, element, element.text, 3)[:3]
+    if element.tag == "translate":
+        frame[:3, 3] = values
+    else:
+        frame[:3, :3] = np.diag(values)
+    return frame
+
+
+def _numbers(path: Path, element: _Element, text: str, group: int) -> Array:
+    """A multiple of `group` finite numbers."""
+    try:
+        values = np.array(text.split(), dtype=np.float64)
+    except ValueError as error:
+        _fail(path, element, f"holds no number ({error})", "Export the mesh again")
+    if not len(values) or len(values) % group or not np.isfinite(values).all() or float(np.abs(values).max()) > 1e9:
+        _fail(path, element, f"holds {len(values)} numbers, not a multiple of {group} finite ones", "Export the mesh again")
+    return values
+
+
+def _fail(path: Path, element: _Element, problem: str, remedy: str) -> NoReturn:
+    raise RobotFileError(f"{path}:{element.line}: <{element.tag}>: {problem}. {remedy}.")

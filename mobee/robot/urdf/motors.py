@@ -1,0 +1,130 @@
+"""Motors, limits and couplings (<mimic>) out of the joints of a URDF file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mobee.robot.robot import Array, Motor
+from mobee.robot.urdf.frames import FARTHEST, bounded, child
+from mobee.robot.urdf.tree import UrdfJoint
+from mobee.robot.xml_node import Node, listed, nearest
+
+LEAST = 1e-6  # of a factor between a joint and its motor
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Joint = scale * motor + offset, where the motor is named after the joint that mimics none."""
+
+    master: str
+    scale: float
+    offset: float  # rad or m
+
+
+def read_drives(joints: Mapping[str, UrdfJoint], moving: Sequence[UrdfJoint]) -> dict[str, Drive]:
+    """What drives each moving joint, chains of <mimic> followed; raises RobotFileError for cycles and unknown joints."""
+    names = {joint.name for joint in moving}
+    drives: dict[str, Drive] = {}
+    for joint in moving:
+        chain: list[tuple[UrdfJoint, Node]] = []
+        now = joint
+        while now.name not in drives and (mimic := child(now.node, "mimic")) is not None:
+            if now.name in {link.name for link, _ in chain}:
+                mimic.fail("joint", f"{now.name!r} mimics itself in the end", "Remove one <mimic> of the cycle")
+            chain.append((now, mimic))
+            now = _master(mimic, joints, names)
+        found = drives.setdefault(now.name, Drive(now.name, 1.0, 0.0))
+        for link, mimic in reversed(chain):
+            factor, shift = _multiplier(mimic), bounded(mimic, "offset", 0.0)
+            found = Drive(found.master, factor * found.scale, factor * found.offset + shift)
+            if not LEAST <= abs(found.scale) <= FARTHEST or abs(found.offset) > FARTHEST:
+                mimic.fail("multiplier", f"{link.name!r} moves {found.scale:g} times as far as {found.master!r}", "Correct the multipliers")
+            drives[link.name] = found
+    return drives
+
+
+def _master(mimic: Node, joints: Mapping[str, UrdfJoint], moving: set[str]) -> UrdfJoint:
+    name = mimic.text("joint")
+    if name not in joints:
+        mimic.fail("joint", f"there is no joint {name!r}", f"{nearest(name, joints)}Valid: {listed(moving)}")
+    if name not in moving:
+        mimic.fail("joint", f"joint {name!r} does not move", "Name a joint that moves, or remove <mimic>")
+    return joints[name]
+
+
+def _multiplier(mimic: Node) -> float:
+    factor = bounded(mimic, "multiplier", 1.0)
+    if abs(factor) < LEAST:
+        mimic.fail("multiplier", "is 0, so the joint cannot move", 'Write type="fixed", or another multiplier')
+    return factor
+
+
+def joint_limits(joint: UrdfJoint) -> Array:
+    """The interval (2,) of a joint in [rad] or [m]; a continuous joint gets one turn, for a motor has limits here."""
+    limit = child(joint.node, "limit")
+    if joint.kind == "continuous":
+        return np.array([-np.pi, np.pi])
+    if limit is None or not {"lower", "upper"} & set(limit.attributes):
+        if joint.kind == "prismatic":
+            joint.node.fail("limit", "a prismatic joint without limits", 'Add <limit lower="0" upper="0.1" .../> in metres')
+        joint.node.warn(f'joint {joint.name!r} has no limits; -pi to pi is taken. Write <limit lower= upper=>, or type="continuous"')
+        return np.array([-np.pi, np.pi])
+    low, high = bounded(limit, "lower", 0.0), bounded(limit, "upper", 0.0)
+    if low > high:
+        limit.fail("lower", f"{low:g} is above upper {high:g}", 'Swap the two, or write type="continuous" for a joint without limits')
+    return np.array([low, high])
+
+
+def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
+    """The motor of a joint and of all that mimic it: its limits are those that keep every one of them within its own.
+
+    In units of the joint: [rad], or [m] if it is prismatic. Home is 0, or the limit nearest to it.
+    """
+    limits = joint_limits(master)
+    for _, joint, drive in driven:
+        if joint is master or joint.kind == "continuous" or child(joint.node, "limit") is None:
+            continue
+        ends = np.sort((joint_limits(joint) - drive.offset) / drive.scale)
+        narrowed = np.array([max(limits[0], ends[0]), min(limits[1], ends[1])])
+        if narrowed[1] - narrowed[0] < 1e-6:
+            joint.node.warn(f"the limits of {joint.name!r} leave {master.name!r}, which it mimics, no room, so they are ignored")
+        elif np.abs(narrowed - limits).max() > 1e-9:  # not by the last digit of a file
+            limits = narrowed
+    joints = tuple((index, drive.scale, drive.offset) for index, _, drive in driven)
+    motor = Motor(master.name, part, limits, float(np.clip(0.0, *limits)), joints)
+    return _extended(master, _limited(master, motor))
+
+
+def _limited(master: UrdfJoint, motor: Motor) -> Motor:
+    limit = child(master.node, "limit")
+    if limit is None:
+        return motor
+    velocity, effort = bounded(limit, "velocity", 0.0), limit.number("effort", 0.0)
+    if velocity > 0:  # exporters write 0 for what they do not know
+        motor = replace(motor, max_velocity=velocity)
+    return replace(motor, max_torque=effort) if effort > 0 else motor
+
+
+def _extended(master: UrdfJoint, motor: Motor) -> Motor:
+    """What `write_urdf` notes of a motor that URDF has no word for: its name, its own unit, its acceleration."""
+    note = child(master.node, "mobee")
+    if note is None:
+        return motor
+    note.check_attributes({"motor", "scale", "offset", "acceleration"})
+    scale, offset = bounded(note, "scale", 1.0), bounded(note, "offset", 0.0)
+    if abs(scale) < LEAST:
+        note.fail("scale", "is 0", "Write joint = scale * motor + offset")
+    limits = np.sort((motor.limits - offset) / scale)
+    return replace(
+        motor,
+        name=note.optional("motor") or motor.name,
+        limits=limits,
+        home=float(np.clip((motor.home - offset) / scale, *limits)),
+        joints=tuple((index, factor * scale, factor * offset + shift) for index, factor, shift in motor.joints),
+        max_velocity=motor.max_velocity / abs(scale),
+        max_torque=motor.max_torque * abs(scale),
+        max_acceleration=note.positive("acceleration", motor.max_acceleration, unit="rad/s^2"),
+    )

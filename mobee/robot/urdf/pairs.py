@@ -1,0 +1,83 @@
+"""Which shapes of a robot from a URDF are tested against each other.
+
+Every two shapes on different links are, save
+- those of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
+  links between them that have no solid, as in a wrist that is written as three joints;
+- those whose links (of the URDF, before fixed joints are merged) the SRDF disables;
+- fields of one part, as in a zero-position file.
+
+So without an SRDF nothing else is left out: what overlaps in every pose is for `mobee check` to report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.robot.pairs import CLUSTER
+from mobee.robot.robot import Ints, Joint, LinkPair, Shape
+from mobee.robot.urdf.srdf import NamePair, Srdf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairRules:
+    """What is left out, by links and by links of the URDF."""
+
+    links: dict[str, int]  # URDF link -> link of the robot
+    adjacent: dict[LinkPair, str]
+    srdf: Srdf
+
+
+def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
+    """Pairs of links with a joint between them, or joints at one place and nothing solid between, and why."""
+    solid = {shape.link for shape in shapes if shape.role == "solid"}
+    found: dict[LinkPair, str] = {}
+    for index, joint in enumerate(joints):
+        found[frozenset((joint.parent, index + 1))] = f"adjacent: joint {joint.name}"
+        between, link = [joint.name], joint.parent
+        while link > 0 and link not in solid and float(np.linalg.norm(joints[link - 1].point - joint.point)) < CLUSTER:
+            between.append(joints[link - 1].name)
+            link = joints[link - 1].parent
+            found[frozenset((link, index + 1))] = f"adjacent: joints {', '.join(reversed(between))} at one place"
+    return found
+
+
+def shape_pairs(shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
+    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `owners`: the URDF link of each."""
+    chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
+    names = {name: k for k, name in enumerate(rules.links)}
+    owner = np.array([names[owners[index]] for index in chosen], dtype=np.intp)
+    link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
+    disabled = _matrix(rules.srdf.disabled, names)
+    near = np.zeros((max(rules.links.values()) + 1,) * 2, dtype=bool)
+    for a, b in map(tuple, rules.adjacent):
+        near[a, b] = near[b, a] = True
+    tested = (link[:, None] != link) & ~disabled[owner[:, None], owner]
+    tested &= ~near[link[:, None], link] | _matrix(rules.srdf.enabled, names)[owner[:, None], owner]
+    if role == "field":
+        parts = {shape.part: k for k, shape in enumerate(shapes)}
+        part = np.array([parts[shapes[index].part] for index in chosen], dtype=np.intp)
+        tested &= part[:, None] != part
+    return chosen[np.argwhere(np.triu(tested, 1))]
+
+
+def _matrix(pairs: dict[NamePair, str] | set[NamePair], names: dict[str, int]) -> NDArray[np.bool_]:
+    table = np.zeros((len(names), len(names)), dtype=bool)
+    for a, b in map(tuple, pairs):
+        table[names[a], names[b]] = table[names[b], names[a]] = True
+    return table
+
+
+def untested_links(shapes: Sequence[Shape], solid_pairs: Ints, rules: PairRules) -> dict[LinkPair, str]:
+    """Of every two links that are never tested against each other the reason."""
+    enabled = {frozenset(rules.links[name] for name in pair) for pair in rules.srdf.enabled}
+    tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in solid_pairs.tolist()}
+    untested = {pair: reason for pair, reason in rules.adjacent.items() if pair not in enabled}
+    for names, reason in rules.srdf.disabled.items():
+        pair = frozenset(rules.links[name] for name in names)
+        if len(pair) == 2 and pair not in tested:
+            untested.setdefault(pair, reason)
+    return untested

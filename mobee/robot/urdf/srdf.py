@@ -1,0 +1,117 @@
+"""What an SRDF file says of a robot: pairs of links that need no test, groups of joints, and where home is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mobee.robot.urdf.frames import bounded
+from mobee.robot.urdf.motors import Drive
+from mobee.robot.urdf.tree import Tree
+from mobee.robot.xml_node import Node, nearest, read_xml
+
+NamePair = frozenset[str]
+
+
+@dataclass(slots=True, eq=False)
+class Srdf:
+    """Everything by the names that the URDF uses."""
+
+    disabled: dict[NamePair, str] = field(default_factory=dict)  # two links -> reason, file and line
+    enabled: set[NamePair] = field(default_factory=set)
+    groups: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)  # joints, in the order of the file
+    home: dict[str, tuple[Node, float]] = field(default_factory=dict)  # joint -> rad or m
+
+
+def read_srdf(path: Path, tree: Tree) -> Srdf:
+    """The SRDF of the robot of that tree; warns of links, joints and groups that the robot does not have; raises RobotFileError."""
+    root = read_xml(path)
+    if root.tag != "robot":
+        root.fail("root element", "this is not an SRDF file", "Its root is <robot name=...>")
+    srdf = Srdf()
+    groups = {node.text("name"): node for node in root if node.tag == "group"}
+    for name, node in groups.items():
+        joints = dict.fromkeys(_joints_of(node, groups, tree))
+        srdf.groups[name] = (node, tuple(joints))
+    silent = [name for node in root if node.tag == "disable_default_collisions" for name in _known(node, "link", tree.links)]
+    for name in silent:
+        reason = f"disabled in the SRDF by default ({path.name})"
+        srdf.disabled |= {frozenset((name, other)): reason for other in tree.links if other != name}
+    for node in root:
+        if node.tag not in ("disable_collisions", "enable_collisions"):
+            continue
+        pair = frozenset(name for end in ("link1", "link2") for name in _known(node, end, tree.links))
+        if len(pair) != 2:
+            continue
+        if node.tag == "disable_collisions":
+            reason = node.optional("reason")
+            srdf.disabled[pair] = f"disabled in the SRDF{': ' if reason else ''}{reason} ({path.name}, line {node.line})"
+        else:
+            srdf.disabled.pop(pair, None)
+            srdf.enabled.add(pair)
+    for node in root:
+        if node.tag == "group_state" and node.text("name").lower() == "home":
+            srdf.home |= {name: (inner, bounded(inner, "value")) for inner in node for name in _known(inner, "name", tree.joints)}
+    return srdf
+
+
+def _known(node: Node, attribute: str, valid: Mapping[str, object]) -> Iterable[str]:
+    """The name if the robot has it; an SRDF is often shared by robots that differ in a gripper."""
+    name = node.text(attribute)
+    if name in valid:
+        return (name,)
+    node.warn(f"the robot has no {name!r}, so this is ignored. {nearest(name, valid)}")
+    return ()
+
+
+def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree) -> Iterable[str]:
+    """The joints of a group, those of its subgroups included; a group that holds itself is gone through once."""
+    above = {joint.child: joint for joint in tree.joints.values()}
+    seen = {group.text("name")}
+    stack = list(reversed(group.children))
+    while stack:
+        node = stack.pop()
+        if node.tag == "joint":
+            yield from _known(node, "name", tree.joints)
+        elif node.tag == "link":
+            yield from (above[name].name for name in _known(node, "name", tree.links) if name in above)
+        elif node.tag == "group":
+            for name in _known(node, "name", groups):
+                if name not in seen:
+                    seen.add(name)
+                    stack += reversed(groups[name].children)
+        elif node.tag == "chain":
+            yield from _chain(node, tree)
+
+
+def _chain(node: Node, tree: Tree) -> list[str]:
+    above = {joint.child: joint for joint in tree.joints.values()}
+    base, tip = (node.choice(end, node.text(end), tree.links, "link") for end in ("base_link", "tip_link"))
+    joints = []
+    now = tip
+    while now != base:
+        if now not in above:
+            node.fail("base_link", f"{base!r} does not carry {tip!r}", "Name a link between the root and tip_link")
+        joints.append(above[now].name)
+        now = above[now].parent
+    return joints[::-1]
+
+
+def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:
+    """Parts with their motors' joints, where the groups that hold no other group divide the motors among them; else one part `all`."""
+    everything = tuple(masters)
+    motors: dict[str, tuple[str, ...]] = {}
+    for name, (_, joints) in srdf.groups.items():
+        mine = tuple(dict.fromkeys(drives[joint].master for joint in joints if joint in drives))
+        if mine and set(mine) not in map(set, motors.values()):
+            motors[name] = mine
+    parts = {name: mine for name, mine in motors.items() if not any(set(other) < set(mine) for other in motors.values())}
+    dealt = [master for mine in parts.values() for master in mine]
+    if parts and sorted(dealt) == sorted(everything):
+        return parts
+    if parts:
+        odd = sorted(master for master in everything if dealt.count(master) != 1)
+        node = srdf.groups[next(iter(parts))][0]
+        node.warn(f"the groups do not give every motor one part ({', '.join(odd[:4])}), so the robot has one part, all")
+    return {"all": everything}

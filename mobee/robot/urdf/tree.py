@@ -1,0 +1,132 @@
+"""The links and joints of a URDF file as a checked tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mobee.robot.robot import Array
+from mobee.robot.urdf.frames import Frame, child, read_origin, triple
+from mobee.robot.xml_node import Node, listed, nearest
+
+MOVING = ("revolute", "continuous", "prismatic")
+MOST_LINKS = 1000
+JOINT_TAGS = ("origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller", "mobee")
+FREE = {
+    "floating": "moves freely in space, which this library has no joint for",
+    "planar": "moves freely in a plane, which this library has no joint for",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UrdfJoint:
+    """A joint as its element says; `axis` is a unit vector in the joint's own frame."""
+
+    node: Node
+    name: str
+    kind: str  # of MOVING, or fixed
+    parent: str
+    child: str
+    origin: Frame  # in the parent link's frame
+    axis: Array  # (3,)
+
+
+@dataclass(slots=True, eq=False)
+class Tree:
+    """Links and joints by name; `root` is the link that no joint moves."""
+
+    root: str
+    links: dict[str, Node]
+    joints: dict[str, UrdfJoint]
+    below: dict[str, list[UrdfJoint]] = field(default_factory=dict)  # parent link -> its joints in the order of the file
+
+    def walk(self) -> Iterator[UrdfJoint]:
+        """Every joint, parents first, depth first, siblings in the order of the file."""
+        stack = list(reversed(self.below.get(self.root, ())))
+        while stack:
+            joint = stack.pop()
+            yield joint
+            stack += reversed(self.below.get(joint.child, ()))
+
+
+def read_tree(robot: Node) -> Tree:
+    """The checked tree of a <robot>; raises RobotFileError for double names, missing links, loops and second roots."""
+    links: dict[str, Node] = {}
+    joints: dict[str, UrdfJoint] = {}
+    for node in robot:
+        if node.tag == "link":
+            _unique(node, links)
+            links[node.text("name")] = node
+        elif node.tag == "joint":
+            _unique(node, {name: joint.node for name, joint in joints.items()})
+            joints[node.text("name")] = _read_joint(node)
+    if not links:
+        robot.fail("link", "the robot has no link", 'Add <link name="base"/>, or check that this is the file that xacro wrote')
+    if len(links) > MOST_LINKS:
+        robot.fail("link", f"has {len(links)} links", f"Remove what does not move: at most {MOST_LINKS} can be read")
+    return _connect(robot, links, joints)
+
+
+def _unique(node: Node, taken: dict[str, Node]) -> None:
+    name = node.text("name")
+    if name in taken:
+        node.fail("name", f"a second {node.tag} {name!r}", f"The first is in line {taken[name].line}: rename one")
+
+
+def _read_joint(node: Node) -> UrdfJoint:
+    for inner in node:
+        if inner.tag not in JOINT_TAGS and nearest(inner.tag, JOINT_TAGS):
+            inner.warn(f"unknown tag is ignored. {nearest(inner.tag, JOINT_TAGS)}")
+    kind = node.text("type").lower()
+    if kind in FREE:
+        remedy = 'Write type="fixed" where the robot stands; for a moving base write prismatic and revolute joints, one after the other'
+        node.fail("type", f"a {kind} joint {FREE[kind]}", remedy)
+    node.choice("type", kind, (*MOVING, "fixed"), "type of joint")
+    return UrdfJoint(node, node.text("name"), kind, _end(node, "parent"), _end(node, "child"), read_origin(node), _axis(node, kind))
+
+
+def _end(node: Node, tag: str) -> str:
+    end = child(node, tag)
+    if end is None:
+        node.fail(tag, "is required and missing", f'Add <{tag} link="..."/>')
+    return end.text("link")
+
+
+def _axis(node: Node, kind: str) -> Array:
+    axis = child(node, "axis")
+    if kind == "fixed" or axis is None or "xyz" not in axis.attributes:
+        return np.array([1.0, 0.0, 0.0])  # the default that URDF gives it
+    vector = triple(axis, "xyz")
+    length = float(np.linalg.norm(vector))
+    if length < 1e-9:
+        axis.fail("xyz", "the axis has no length", "Write the direction of the axis in the joint's frame, such as 0 0 1")
+    return vector / length
+
+
+def _connect(robot: Node, links: dict[str, Node], joints: dict[str, UrdfJoint]) -> Tree:
+    moved: dict[str, UrdfJoint] = {}
+    below: dict[str, list[UrdfJoint]] = {}
+    for joint in joints.values():
+        for end, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in links:
+                joint.node.fail(end, f"there is no link {name!r}", f"{nearest(name, links)}Valid: {listed(links)}")
+        if joint.child in moved:
+            first = moved[joint.child]
+            problem = f"link {joint.child!r} is moved by joint {first.name!r} (line {first.node.line}) too, which closes a loop"
+            joint.node.fail("child", problem, "A URDF is a tree: remove one of the two joints")
+        moved[joint.child] = joint
+        below.setdefault(joint.parent, []).append(joint)
+    roots = [name for name in links if name not in moved]
+    if len(roots) > 1:
+        problem = f"is moved by no joint, and neither is {roots[0]!r} (line {links[roots[0]].line})"
+        links[roots[1]].fail("name", f"link {roots[1]!r} {problem}", 'A robot has one base: join them by <joint type="fixed">')
+    if not roots:
+        robot.fail("joint", "every link is moved by a joint, so the joints form a loop", "Remove the joint that moves the base")
+    tree = Tree(roots[0], links, joints, below)
+    reached = {joint.name for joint in tree.walk()}
+    for joint in joints.values():
+        if joint.name not in reached:
+            joint.node.fail("child", f"joint {joint.name!r} is part of a loop that hangs on nothing", "Remove one joint of the loop")
+    return tree
