@@ -11,7 +11,6 @@ import numpy as np
 from mobee.robot.robot import Clause, Joint, Motor, Part
 from mobee.robot.xml_node import Node
 
-CONSTRAINT_ATTRIBUTES = frozenset({"a", "q", "b", "negate"})
 NARROWEST = 1e-6  # deg between the limits of a motor
 
 
@@ -98,10 +97,7 @@ def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
     `q` of a row names motors of the part, or gives their numbers within it.
     """
     rows, offsets = [], []
-    for child in node:
-        if child.tag != "constraint":
-            child.fail("position in the file", "only <constraint> stands in <constraintList>", "Move it out")
-        child.check_attributes(CONSTRAINT_ATTRIBUTES)
+    for child in (child for child in node if child.tag == "constraint"):
         factors, words = child.numbers("a"), child.words("q")
         if len(factors) != len(words) or not words:
             child.fail("q", f"names {len(words)} motors for {len(factors)} factors", "Give a and q the same number of entries")

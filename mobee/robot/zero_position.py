@@ -13,8 +13,9 @@ from mobee.robot.xml_body import read_marker, read_shape, read_skeleton
 from mobee.robot.xml_convex import CONVEX_ATTRIBUTES
 from mobee.robot.xml_draft import Draft, Place, enter
 from mobee.robot.xml_finish import MOST, finish_robot
+from mobee.robot.xml_ignore import IGNORE_ATTRIBUTES
 from mobee.robot.xml_include import INCLUDE_ATTRIBUTES, Trail, read_include
-from mobee.robot.xml_motors import CONSTRAINT_ATTRIBUTES, read_motor
+from mobee.robot.xml_motors import read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
 
@@ -31,12 +32,12 @@ KNOWN = {
     "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque"}),
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
     "constraintlist": frozenset[str](),
-    "constraint": CONSTRAINT_ATTRIBUTES,
+    "constraint": frozenset({"a", "q", "b", "negate"}),
     "robot": INCLUDE_ATTRIBUTES,
-    "ignore": frozenset({"first", "second", "role"}),
+    "ignore": IGNORE_ATTRIBUTES,
 } | {tag: known | {"name", "field", "base"} for tag, known in BODY_TAGS.items()}
 
-LEAVES = {*BODY_TAGS, "marker", "ignore", "robot", "constraint"}
+BRANCHES = {"bodypart", "motor", "link", "joint", "constraintlist"}
 
 
 def read_robot(path: Path) -> Robot:
@@ -58,6 +59,7 @@ def _read(path: Path, trail: Trail) -> Robot:
     for node in root:
         if node.tag == "robot":
             node.check_attributes(KNOWN[node.tag])
+            _check_children(node)
             draft.others.append((node, read_include(node, inside, _read)))
     _read_children(root, draft, Place(np.zeros(3)))
     return finish_robot(root, draft, root.optional("robotName") or path.stem)
@@ -70,22 +72,40 @@ def _check_counts(root: Node) -> None:
     while waiting:
         node = waiting.pop()
         counts[node.tag] += 1
-        if counts[node.tag] > MOST and node.tag in KNOWN:
-            node.fail("size of the file", f"more than {MOST} of this tag", "Divide the robot, or leave out what does not matter")
+        most = MOST_IGNORES if node.tag == "ignore" else MOST
+        if counts[node.tag] > most and node.tag in KNOWN:
+            node.fail("size of the file", f"more than {most} of this tag", "Divide the robot, or leave out what does not matter")
         waiting += reversed(node.children)
 
 
 def _read_children(parent: Node, draft: Draft, place: Place) -> None:
     for node in parent:
         if node.tag not in KNOWN:
-            node.warn(f"unknown tag is ignored with all inside. {nearest(node.tag, KNOWN)}Valid: {', '.join(sorted(KNOWN))}")
+            _warn_unknown(node)
             continue
         if node.tag == "robot" and parent.tag == ROOT:
             continue  # read before everything else
         node.check_attributes(KNOWN[node.tag])
         READERS.get(node.tag, _misplaced)(node, draft, place)
-        if node.tag in LEAVES and node.children:
-            node.children[0].fail("position in the file", f"nothing stands inside <{node.tag}>", f"Move it behind the <{node.tag}>")
+        if node.tag not in BRANCHES:
+            _check_children(node)
+
+
+def _check_children(node: Node, *valid: str) -> None:
+    """Refuse known tags in an element that holds only `valid` ones, and warn of unknown ones."""
+    for child in node:
+        if child.tag not in KNOWN:
+            _warn_unknown(child)
+        elif child.tag not in valid:
+            holds = f"only <{valid[0]}> stands" if valid else "nothing stands"
+            child.fail("position in the file", f"{holds} inside <{node.tag}>", f"Move it behind the <{node.tag}>")
+        else:
+            child.check_attributes(KNOWN[child.tag])
+            _check_children(child)
+
+
+def _warn_unknown(node: Node) -> None:
+    node.warn(f"unknown tag is ignored with all inside. {nearest(node.tag, KNOWN)}Valid: {', '.join(sorted(KNOWN))}")
 
 
 def _misplaced(node: Node, draft: Draft, place: Place) -> None:
@@ -157,6 +177,7 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> None:
 def _read_constraints(node: Node, draft: Draft, place: Place) -> None:
     if not place.part:
         node.fail("position in the file", "constraints outside of every part", "Move them into the <bodypart> whose motors they name")
+    _check_children(node, "constraint")
     draft.note("clause", str(len(draft.constraints)), node)
     draft.constraints.append((place.part, node))
 

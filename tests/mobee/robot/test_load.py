@@ -10,9 +10,9 @@ from mobee.robot.load import ROBOTS, load_robot, load_world, shipped_robots, shi
 
 
 def test_every_shipped_robot_and_world_is_read_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
-    assert shipped_robots() == ("icub", "icub_2014", "katana")
+    assert shipped_robots() == ("icub", "icub_2014", "icub_katana", "katana")
     assert shipped_worlds() == ("table", "table_2014")
-    assert [load_robot(name).name for name in shipped_robots()] == ["icub", "icub_2014", "katana400"]
+    assert [load_robot(name).name for name in shipped_robots()] == ["icub", "icub_2014", "icub_katana", "katana400"]
     assert all(load_world(name).objects for name in shipped_worlds())
     assert len(recwarn) == 0
 
@@ -22,7 +22,7 @@ def test_a_path_is_as_good_as_a_name() -> None:
 
 
 def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
-    with pytest.raises(UnknownName, match="unknown robot 'icbu'. Did you mean 'icub'. Valid: icub, icub_2014, katana"):
+    with pytest.raises(UnknownName, match="unknown robot 'icbu'. Did you mean 'icub'. Valid: icub, icub_2014, icub_katana, katana"):
         load_robot("icbu")
     with pytest.raises(UnknownName, match="unknown world 'tabel'. Did you mean 'table'"):
         load_world("tabel")
