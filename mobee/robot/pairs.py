@@ -11,6 +11,7 @@ pro-supination, wrist, neck, torso), for a shape there fills the whole cluster. 
 its joints move are joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with
 wrist and hand.
 So hands and forearms are tested against torso, head and the other arm, and only what overlaps in every pose is left out.
+With adjacency="listed" only what <ignore> tags name is left out, so that `write_xml` can keep the pairs of any robot.
 """
 
 from __future__ import annotations
@@ -71,8 +72,11 @@ def hand_links(subtree: Sequence[int], joints: Sequence[Joint]) -> dict[LinkPair
     }
 
 
-def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair]) -> Ints:
-    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `untested`: link pairs left out."""
+def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair], own: bool = False) -> Ints:
+    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`.
+
+    `untested`: link pairs left out; `own`: fields of one part are tested against each other too.
+    """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
     tested = ~np.eye(link.max(initial=0) + 1, dtype=bool)
@@ -81,7 +85,7 @@ def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPa
         if max(a, b) < len(tested):
             tested[a, b] = tested[b, a] = False
     allowed = tested[link[:, None], link]
-    if role == "field":
+    if role == "field" and not own:
         parts = list({shapes[index].part: None for index in chosen})
         part = np.array([parts.index(shapes[index].part) for index in chosen], dtype=np.intp)
         allowed &= part[:, None] != part

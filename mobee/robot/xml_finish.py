@@ -60,7 +60,9 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
 
 def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, Ints, dict[LinkPair, str]]:
     """Tested pairs of fields and of solids, and the reasons for the pairs of links that are never tested."""
-    rule = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "published_2014"), "rule")
+    rule = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "listed", "published_2014"), "rule")
+    if rule == "listed":
+        return tested_pairs(draft.shapes, "field", {}, own=True), tested_pairs(draft.shapes, "solid", {}), {}
     if rule == "joined":
         untested = merged(joined_links(joints), hand_links(draft.subtree, joints))
         return tested_pairs(draft.shapes, "field", untested), tested_pairs(draft.shapes, "solid", untested), untested
