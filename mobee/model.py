@@ -3,32 +3,52 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.contact import Contact
-from mobee.collision.scene import Scene, body, scene
-from mobee.collision.world import Snapshot, World, WorldObject, placed, seen_from
+from mobee.collision.contact import Contact, ContactTable
+from mobee.collision.snapshot import Snapshot
+from mobee.collision.world import World
+from mobee.collision.world_object import WorldObject, placed, seen_from
+from mobee.engine import engine_of
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.jacobian import point_jacobian
 from mobee.robot.robot import Array, Ints, Robot
+
+
+class Engine(Protocol):
+    """What evaluates poses: the compiled engine, or python-fcl as its exact reference."""
+
+    def transforms(self, q: Array) -> Array:
+        """Every link in the poses q (B, n), (B, L, 4, 4)."""
+
+    def jacobians(self, q: Array, link: int, point: Array) -> Array:
+        """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
+        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
 
 
 class Pose:
     """The robot at one q or at a batch of them, in the world as it was when `Model.evaluate` was called.
 
-    `q`: (..., n) rad.  `transforms`: (..., L, 4, 4), from the root frame at zero pose to now.  Contacts are computed when
-    first asked for.
+    `q`: (..., n) rad.  What is asked for is computed when it is first asked for.
     """
 
-    def __init__(self, q: Array, transforms: Array, scene: Scene, snapshot: Snapshot) -> None:
-        self.robot = scene.robot
+    def __init__(self, robot: Robot, engine: Engine, q: Array, snapshot: Snapshot, reaching: int) -> None:
+        self.robot = robot
         self.q = q
-        self.transforms = transforms
-        self._scene = scene
+        self._engine = engine
         self._snapshot = snapshot
+        self._reaching = reaching
+
+    @cached_property
+    def transforms(self) -> Array:
+        """Where every link has gone: (..., L, 4, 4), from the root frame at zero pose to now."""
+        found = self._engine.transforms(self._flat)
+        return found.reshape(*self.q.shape[:-1], *found.shape[1:])
 
     def position(self, marker: str) -> Array:
         """Where a marker is, (..., 3) m in the root frame; raises UnknownName."""
@@ -50,20 +70,37 @@ class Pose:
         """How a point (..., 3) m, root frame now, fixed to a link moves per motor: (..., 6, n), linear rows then angular."""
         return point_jacobian(self.robot, self.transforms, link, point)
 
+    @property
+    def table(self) -> ContactTable:
+        """Every overlap of the tested pairs in every pose, as columns."""
+        return self._felt[0]
+
+    @property
+    def projection(self) -> Array:
+        """The contacts of fields as the motors see them: sum of J^T (depth * normal), (..., n) in [m^2/rad] (thesis eq. 5.11).
+
+        Both sides of a self contact get opposite vectors, and all motors down to the base feel it.
+        """
+        return self._felt[1].reshape(self.q.shape)
+
+    @cached_property
+    def projection_of_part(self) -> Array:
+        """The projection, cut where a part ends, as in the original program: an arm's contact does not reach the torso."""
+        return self._engine.contacts(self._flat, self._snapshot, self._reaching, cut=True)[1].reshape(self.q.shape)
+
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:
         """Every overlap of the tested pairs, solids before fields; one pose only (InvalidValue for a batch)."""
         if self.q.ndim != 1:
-            raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use count, or evaluate one q.")
-        return self._scene.contacts(self.transforms)
+            raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use table, or evaluate one q.")
+        return self.table.contacts()
 
     @cached_property
     def count(self) -> int | Ints:
         """How many solid contacts: an int for one pose, (...,) integers for a batch."""
-        if self.q.ndim == 1:
-            return sum(contact.kind == "solid" for contact in self.contacts)
-        flat = self.transforms.reshape(-1, *self.transforms.shape[-3:])
-        return np.array([self._scene.solid_count(one) for one in flat], dtype=np.intp).reshape(self.q.shape[:-1])
+        table = self.table
+        counted = np.bincount(table.pose[table.kind == 0], minlength=len(self._flat))
+        return int(counted[0]) if self.q.ndim == 1 else counted.reshape(self.q.shape[:-1])
 
     @property
     def objects(self) -> dict[str, WorldObject]:
@@ -74,19 +111,29 @@ class Pose:
             for name, thing in self._snapshot.objects.items()
         }
 
+    @property
+    def _flat(self) -> Array:
+        return self.q.reshape(-1, self.q.shape[-1])
+
+    @cached_property
+    def _felt(self) -> tuple[ContactTable, Array]:
+        return self._engine.contacts(self._flat, self._snapshot, self._reaching)
+
 
 class Model:
-    """A robot in a world; evaluates poses while other threads edit the world.
+    """A robot in a world; evaluates poses, in any number of threads, while other threads edit the world.
 
-    Each evaluation sees one consistent state of the world and never waits for an edit.
+    Each evaluation sees one consistent state of the world and never waits for an edit.  `engine`: "compiled", or "fcl", the
+    slow reference.
     """
 
-    def __init__(self, robot: Robot, world: World | None = None) -> None:
+    def __init__(self, robot: Robot, world: World | None = None, engine: Literal["compiled", "fcl"] = "compiled") -> None:
         self.robot = robot
         self.world = World() if world is None else world
-        self._body = body(robot)
+        self._engine = _engine(robot, engine)
+        self._motors = len(robot.motor_table)
         self._reaching: str | None = None
-        self._scene: tuple[Snapshot, str | None, Scene] | None = None
+        self._reaching_link = -1
 
     @property
     def reaching(self) -> str | None:
@@ -95,26 +142,23 @@ class Model:
 
     @reaching.setter
     def reaching(self, marker: str | None) -> None:
-        if marker is not None:
-            self.robot.marker(marker)
+        self._reaching_link = -1 if marker is None else self.robot.marker(marker).link
         self._reaching = marker
 
     def evaluate(self, q: ArrayLike) -> Pose:
         """The pose at q, (n,) or (..., n) rad in the order of robot.motors; raises InvalidValue for any other shape or NaN."""
         value = self._checked(q)
-        transforms = link_transforms(self.robot, value)
-        seen, snapshot = self._current_scene()
+        pose = Pose(self.robot, self._engine, value, self.world.snapshot, self._reaching_link)
         if value.ndim == 1:
-            self.world.follow(dict(zip(self.robot.links, transforms, strict=True)))
-        return Pose(value, transforms, seen, snapshot)
+            self.world.follow(pose)
+        return pose
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
         """The marker's Jacobian, (..., 6, n): linear rows [m/rad] then angular, root frame, per motor (thesis eq. 5.1)."""
         value = self._checked(q)
-        transforms = link_transforms(self.robot, value)
         m = self.robot.marker(marker)
-        link = transforms[..., m.link, :3, :]
-        return point_jacobian(self.robot, transforms, m.link, link[..., :3] @ m.position + link[..., 3])
+        found = self._engine.jacobians(value.reshape(-1, self._motors), m.link, m.position)
+        return found.reshape(*value.shape[:-1], 6, self._motors)
 
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
         """Let a world object move with a link from where both are in the pose q (n,) rad."""
@@ -127,8 +171,8 @@ class Model:
         self.world.attach(name, link, seen_from(link_pose, pose.objects[name]))
 
     def _checked(self, q: ArrayLike) -> Array:
-        value = np.array(q, dtype=np.float64)
-        n = len(self.robot.motor_table)
+        value = np.array(q, dtype=np.float64, order="C")
+        n = self._motors
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")
         if not np.isfinite(value).all():
@@ -136,11 +180,12 @@ class Model:
             raise InvalidValue(f"q of motor {self.robot.motors[where[-1]]!r} is {value[tuple(where)]}; it must be a finite angle in rad.")
         return value
 
-    def _current_scene(self) -> tuple[Scene, Snapshot]:
-        snapshot, reaching, cached = self.world.snapshot, self._reaching, self._scene
-        if cached is not None and cached[0] is snapshot and cached[1] == reaching:
-            return cached[2], snapshot
-        link = None if reaching is None else self.robot.marker(reaching).link
-        built = scene(self.robot, self._body, snapshot, link)
-        self._scene = (snapshot, reaching, built)
-        return built, snapshot
+
+def _engine(robot: Robot, name: str) -> Engine:
+    if name == "compiled":
+        return engine_of(robot)
+    if name == "fcl":
+        from mobee.collision.fcl_engine import FclEngine
+
+        return FclEngine(robot)
+    raise UnknownName("engine", name, ("compiled", "fcl"))

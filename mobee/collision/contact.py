@@ -1,13 +1,18 @@
-"""What touches what: one contact, and the contacts of many poses as columns."""
+"""What touches what: one contact, and the contacts of many poses as a table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-from mobee.robot.robot import Array, Ints
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.robot.robot import Array
 
 KINDS: tuple[Literal["solid", "field"], ...] = ("solid", "field")
+
+Column = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,26 +35,74 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactTable:
-    """c contacts of a batch of poses, one row each, sorted by pose, kind, first and second; fields as in Contact."""
+    """c contacts of a batch of poses, one row each, sorted by pose, kind, first and second; fields as in Contact.
 
-    names: tuple[str, ...]  # the robot's shapes, then the world's objects
-    pose: Ints  # (c,) index into the flattened batch
-    kind: Ints  # (c,) index into KINDS
-    first: Ints  # (c,) index into names
-    second: Ints  # (c,)
-    first_link: Ints  # (c,)
-    second_link: Ints  # (c,)
-    depth: Array  # (c,) m
-    normal: Array  # (c, 3)
-    point: Array  # (c, 3) m
+    Names are given by index: the robot's shapes, then the world's objects.
+    """
+
+    shapes: tuple[str, ...]
+    objects: tuple[str, ...]
+    numbers: Column  # (c, 6): pose, kind, first, second, first link, second link
+    reals: Array  # (c, 7): depth [m], normal (3), point (3) [m]
 
     def __len__(self) -> int:
-        return len(self.depth)
+        return len(self.reals)
+
+    def name(self, index: int) -> str:
+        """The shape or object that `first` or `second` stands for."""
+        count = len(self.shapes)
+        return self.shapes[index] if index < count else self.objects[index - count]
+
+    @property
+    def pose(self) -> Column:
+        """Index into the flattened batch, (c,)."""
+        return self.numbers[:, 0]
+
+    @property
+    def kind(self) -> Column:
+        """Index into KINDS, (c,)."""
+        return self.numbers[:, 1]
+
+    @property
+    def first(self) -> Column:
+        """Index of a name, (c,)."""
+        return self.numbers[:, 2]
+
+    @property
+    def second(self) -> Column:
+        """Index of a name, (c,)."""
+        return self.numbers[:, 3]
+
+    @property
+    def first_link(self) -> Column:
+        """The link that carries the first, (c,)."""
+        return self.numbers[:, 4]
+
+    @property
+    def second_link(self) -> Column:
+        """The link that carries the second, -1 for a free world object, (c,)."""
+        return self.numbers[:, 5]
+
+    @property
+    def depth(self) -> Array:
+        """(c,) m."""
+        return self.reals[:, 0]
+
+    @property
+    def normal(self) -> Array:
+        """(c, 3) unit vectors."""
+        return self.reals[:, 1:4]
+
+    @property
+    def point(self) -> Array:
+        """(c, 3) m."""
+        return self.reals[:, 4:7]
 
     def contacts(self) -> tuple[Contact, ...]:
         """The rows as Contact objects."""
-        rows = zip(self.kind, self.first, self.second, self.depth, self.normal, self.point, self.first_link, self.second_link, strict=True)
         return tuple(
-            Contact(self.names[a], self.names[b], KINDS[kind], float(depth), normal, point, int(link_a), int(link_b))
-            for kind, a, b, depth, normal, point, link_a, link_b in rows
+            Contact(self.name(a), self.name(b), KINDS[kind], depth, real[1:4], real[4:7], link_a, link_b)
+            for (_, kind, a, b, link_a, link_b), depth, real in zip(
+                self.numbers.tolist(), self.reals[:, 0].tolist(), self.reals, strict=True
+            )
         )

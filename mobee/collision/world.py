@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,9 +25,21 @@ from mobee.collision.world_object import (
     valid_shape,
 )
 from mobee.errors import InvalidValue, UnknownName
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Robot
 
 __all__ = ["Color", "Role", "Snapshot", "World", "WorldObject", "placed", "seen_from"]
+
+
+class Followed(Protocol):
+    """A pose of a robot, as a Model gives it."""
+
+    @property
+    def robot(self) -> Robot:
+        """Whose links."""
+
+    @property
+    def transforms(self) -> Array:
+        """Where its links are, (L, 4, 4)."""
 
 
 class World:
@@ -38,7 +51,7 @@ class World:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._snapshot = EMPTY
-        self._followed: tuple[tuple[str, ...], Array] | None = None
+        self._followed: Followed | None = None
 
     @property
     def snapshot(self) -> Snapshot:
@@ -123,13 +136,9 @@ class World:
                 raise InvalidValue(f"world object {name!r} is not attached to any link.")
             self._snapshot = changed(self._snapshot, placed(old, _link_pose(self._followed, old.link)))
 
-    def follow(self, links: tuple[str, ...] | dict[str, Array], transforms: Array | None = None) -> None:
-        """Told by a Model at every single-pose evaluation: the robot's links, and their poses (L, 4, 4), which nobody changes."""
-        if isinstance(links, tuple):
-            if transforms is not None:
-                self._followed = links, transforms
-        else:
-            self._followed = tuple(links), np.array(list(links.values()))
+    def follow(self, pose: Followed) -> None:
+        """Told by a Model at every single-pose evaluation, for `attach` and `detach`."""
+        self._followed = pose
 
     def _get(self, name: str) -> WorldObject:
         if name not in self._snapshot.objects:
@@ -137,11 +146,11 @@ class World:
         return self._snapshot.objects[name]
 
 
-def _link_pose(seen: tuple[tuple[str, ...], Array] | None, link: str) -> Array:
+def _link_pose(seen: Followed | None, link: str) -> Array:
     if seen is None:
         raise InvalidValue(f"where link {link!r} is, no model has said yet: evaluate a pose first, or give `relative`.")
-    links, transforms = seen
+    links = seen.robot.links
     if link not in links:
         raise UnknownName("link", link, links)
-    pose: Array = transforms[links.index(link)]
+    pose: Array = seen.transforms[links.index(link)]
     return pose

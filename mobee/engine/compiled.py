@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -36,6 +36,17 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
+def is_ready() -> bool:
+    """Whether this version of the engine has been compiled on this machine."""
+    return (_FOLDER / "ready").exists()
+
+
+def mark_ready() -> None:
+    """Remember that all of it is compiled."""
+    _FOLDER.mkdir(parents=True, exist_ok=True)
+    (_FOLDER / "ready").touch()
+
+
 def entry(*signatures: str) -> Callable[[F], F]:
     """Compile a function that Python calls, for these signatures only, when its module is imported; it releases the GIL."""
 
@@ -51,9 +62,10 @@ def inner(function: F) -> F:
 
 
 def _njit(function: Callable[..., object], signatures: list[str] | None) -> object:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_FOLDER)
+    config: Any = numba.config  # made at run time from the environment
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_FOLDER)
     try:
         return numba.njit(signatures, cache=True, nogil=True, error_model="numpy", fastmath=_FAST)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before

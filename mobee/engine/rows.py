@@ -1,0 +1,116 @@
+"""The contacts of one pose: found among the pairs that may touch, and put in order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.engine.compiled import inner
+from mobee.engine.forces import push
+from mobee.engine.layout import SLOT
+from mobee.engine.narrow.dispatch import overlap
+from mobee.engine.pack import I_LINK, I_NAME, I_ROLE, SHAPES, UInts
+from mobee.engine.scene import CELLS, COUNT, W_START
+from mobee.robot.robot import Array, Ints
+
+NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
+
+_0, _1, _SLOT, _NUMBERS, _REALS = np.uint64(0), np.uint64(1), np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
+
+
+@inner
+def _swap(numbers: Ints, n: np.uint64, out: Array) -> None:
+    """Let the second be the first."""
+    for k in (np.uint64(2), np.uint64(4)):
+        numbers[n + k], numbers[n + k + _1] = numbers[n + k + _1], numbers[n + k]
+    out[0], out[1], out[2] = -out[0], -out[1], -out[2]
+
+
+@inner
+def _name(integers: UInts, name: np.uint64, i: np.uint64, own_shapes: int, carried: Ints) -> int:
+    """Index into the names: the robot's shapes, then the objects of the snapshot."""
+    given = np.int64(integers[name + i])
+    return given if given < own_shapes else own_shapes + carried[given - own_shapes]
+
+
+@inner
+def find_contacts(
+    integers: UInts,
+    vertices: Array,
+    world: UInts,
+    carried: Ints,
+    own_shapes: int,
+    reaching: int,
+    slots: Array,
+    first: UInts,
+    second: UInts,
+    pairs: np.uint64,
+    out: Array,
+    numbers: Ints,
+    reals: Array,
+) -> np.uint64:
+    """Write a contact for every pair that overlaps to the rows of `numbers` and `reals`; returns how many."""
+    shapes, link, name, role = integers[SHAPES], integers[I_LINK], integers[I_NAME], integers[I_ROLE]
+    cells = world[CELLS] * world[CELLS + 1] * world[CELLS + 2]
+    order = np.uint64(W_START) + cells + _1
+    target = order + world[COUNT]
+    found = _0
+    for p in range(pairs):
+        a, b = first[p], second[p]
+        depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
+        if not depth > 0.0:
+            continue
+        i, j = a // _SLOT, b // _SLOT
+        n, r = found * _NUMBERS, found * _REALS
+        numbers[n + _1] = integers[role + i] | (integers[role + j] if j < shapes else _0)  # a carried object meets fields too
+        numbers[n + np.uint64(2)] = _name(integers, name, i, own_shapes, carried)
+        numbers[n + np.uint64(4)] = integers[link + i]
+        if j < shapes:
+            numbers[n + np.uint64(3)] = _name(integers, name, j, own_shapes, carried)
+            numbers[n + np.uint64(5)] = integers[link + j]
+            if numbers[n + np.uint64(3)] < numbers[n + np.uint64(2)]:
+                _swap(numbers, n, out)
+        else:
+            if world[target + (j - shapes)] == _1 and np.int64(integers[link + i]) == reaching:
+                continue
+            numbers[n + np.uint64(3)] = own_shapes + np.int64(world[order + (j - shapes)])
+            numbers[n + np.uint64(5)] = -1
+        reals[r] = depth
+        for k in range(np.uint64(6)):
+            reals[r + _1 + k] = out[k]
+        found += _1
+    return found
+
+
+@inner
+def sort_rows(numbers: Ints, count: int, keys: Ints, order: Ints) -> None:
+    """Fill `order` with the rows by kind, first and second (shell sort: mostly a handful, at times hundreds)."""
+    for i in range(count):
+        n = i * NUMBERS
+        keys[i] = (numbers[n + 1] << 60) | (numbers[n + 2] << 30) | numbers[n + 3]
+        order[i] = i
+    gap = 1
+    while gap < count // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, count):
+            key, row, j = keys[i], order[i], i
+            while j >= gap and keys[j - gap] > key:
+                keys[j], order[j] = keys[j - gap], order[j - gap]
+                j -= gap
+            keys[j], order[j] = key, row
+        gap //= 3
+
+
+@inner
+def push_links(numbers: Ints, reals: Array, count: np.uint64, wrench: Array) -> None:
+    """Add depth * normal of every field contact to its first link, and the opposite to its second."""
+    for c in range(count):
+        n, r = c * _NUMBERS, c * _REALS
+        if numbers[n + _1] != 1:
+            continue
+        depth = reals[r]
+        fx, fy, fz = depth * reals[r + _1], depth * reals[r + np.uint64(2)], depth * reals[r + np.uint64(3)]
+        x, y, z = reals[r + np.uint64(4)], reals[r + np.uint64(5)], reals[r + np.uint64(6)]
+        push(wrench, np.uint64(numbers[n + np.uint64(4)]), fx, fy, fz, x, y, z)
+        if numbers[n + np.uint64(5)] >= 0:
+            push(wrench, np.uint64(numbers[n + np.uint64(5)]), -fx, -fy, -fz, x, y, z)
