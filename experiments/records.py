@@ -6,17 +6,18 @@ import csv
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
+from typing import TextIO
 
 
 class Records:
-    """A CSV file with a head line; each record is on disk when `append` returns."""
+    """A CSV file with a head line; each record is in it when `append` returns.  What a kill has cut is taken off."""
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path, self.columns = path, columns
-        is_new = not path.exists()
-        self._file = path.open("a", newline="")
+        self._file = path.open("a+", newline="")
+        self._file.truncate(_whole(self._file))
         self._writer = csv.DictWriter(self._file, columns)
-        if is_new:
+        if self._file.tell() == 0:
             self._writer.writeheader()
 
     def append(self, record: Mapping[str, object]) -> None:
@@ -36,6 +37,15 @@ def read_records(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
     if not path.exists():
         return []
     with path.open(newline="") as file:
-        text = file.read()
-    whole = text[: text.rfind("\n") + 1]
-    return [row for row in csv.DictReader(whole.splitlines()) if all(row.get(column) not in (None, "") for column in columns)]
+        length = _whole(file)
+        file.seek(0)
+        rows = list(csv.DictReader(file.read(length).splitlines()))
+    return [{column: row[column] for column in columns} for row in rows]
+
+
+def _whole(file: TextIO) -> int:
+    """Length of the whole lines of an ASCII file, which is left at their end."""
+    file.seek(0)
+    length = file.read().rfind("\n") + 1
+    file.seek(length)
+    return length

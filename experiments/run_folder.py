@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import re
 import subprocess
 import time
 from collections.abc import Mapping
@@ -48,10 +49,11 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 
 def newest_run(runs: Path, name: str) -> Path:
     """The folder of the latest run of an experiment; raises InvalidValue if there is none."""
-    found = sorted(path.parent for path in runs.glob(f"*-{name}*/{CONFIG}"))
+    runs_of_it = re.compile(rf"(\d{{8}}-\d{{6}})-{re.escape(name)}(?:-(\d+))?")
+    found = {path.parent: match.groups() for path in runs.glob(f"*/{CONFIG}") if (match := runs_of_it.fullmatch(path.parent.name))}
     if not found:
         raise InvalidValue(f"no run of {name!r} in {runs}: start one with `mobee experiment run {name}`, or name its folder.")
-    return found[-1]
+    return max(found, key=lambda folder: (found[folder][0], int(found[folder][1] or 1)))
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 import mobee
 from mobee.collision.world import World
-from mobee.robot.robot import Array, Ints, Joint, Motor, Part, Robot, Shape
+from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
 
 SEED = 2014
 _FILE = Path(__file__).with_name("data") / "bench_model.json"
@@ -60,14 +60,6 @@ def poses(count: int, seed: int = SEED) -> Array:
     """Random q (count, 41) rad, uniform between the limits."""
     low, high = robot().limits.T
     return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
-
-
-def tested_pairs(model_robot: Robot, boxes: int) -> Ints:
-    """Every tested pair (p, 2) of volumes: the robot's shapes, and from len(shapes) on the boxes."""
-    own = np.concatenate([model_robot.solid_pairs, model_robot.field_pairs])
-    moving = [index for index in range(len(model_robot.shapes)) if index not in model_robot.base_shapes]
-    things = range(len(model_robot.shapes), len(model_robot.shapes) + boxes)
-    return np.concatenate([own, np.array(list(itertools.product(moving, things)), dtype=np.intp).reshape(-1, 2)])
 
 
 @cache

@@ -79,7 +79,7 @@ class MovingModel:
     def _evaluate(self) -> None:
         while not self._end.is_set():
             pose = self._model.evaluate(self._q)
-            _ = pose.contacts
+            _ = pose.table
             self.evaluations += 1
             self._watch(pose)
 

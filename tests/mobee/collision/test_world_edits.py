@@ -13,6 +13,11 @@ from mobee.engine.layout import ROW, volume_row
 from mobee.kinematics.quaternion import to_matrix
 from tests.mobee.planar import planar_arm
 
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
 ROLES = st.sampled_from(["obstacle", "target", "ghost"])
 LENGTHS = st.floats(0.01, 0.5)
 SHAPES = st.one_of(
@@ -23,9 +28,7 @@ SHAPES = st.one_of(
 )
 COORDINATE = st.floats(-2.0, 2.0)
 POSITIONS = st.tuples(COORDINATE, COORDINATE, COORDINATE)
-ROTATIONS = (
-    st.integers(0, 2**32 - 1).map(lambda seed: np.random.default_rng(seed).normal(size=4)).map(lambda q: to_matrix(q / np.linalg.norm(q)))
-)
+ROTATIONS = st.integers(0, 2**32 - 1).map(lambda seed: to_matrix(unit(np.random.default_rng(seed).normal(size=4))))
 CODES = {
     ("obstacle", False): OBSTACLE,
     ("target", False): TARGET,

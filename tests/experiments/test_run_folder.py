@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import mobee
+from experiments.run_folder import new_run, newest_run, options_of
+
+
+def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
+    folder = new_run(tmp_path / "runs", "flood", {"objects": 3, "seed": 7})
+    assert options_of(folder, "flood") == {"objects": 3, "seed": 7}
+    versions = json.loads((folder / "versions.json").read_text())
+    assert {"mobee", "numpy"} <= set(versions["packages"])
+    assert {"python", "platform", "commit", "begun"} <= set(versions)
+
+
+def test_two_runs_in_one_second_get_two_folders_and_the_newest_is_found(tmp_path):
+    folders = [new_run(tmp_path, "flood", {}) for _ in range(12)]
+    assert len(set(folders)) == 12
+    new_run(tmp_path, "floods", {})
+    assert newest_run(tmp_path, "flood") == folders[-1]
+
+
+def test_what_is_no_run_is_refused(tmp_path):
+    with pytest.raises(mobee.InvalidValue, match="no run of 'flood'.*mobee experiment run flood"):
+        newest_run(tmp_path, "flood")
+    with pytest.raises(mobee.InvalidValue, match="not the folder of a run"):
+        options_of(tmp_path, "flood")
+    with pytest.raises(mobee.InvalidValue, match="run of 'flood', not of 'press'"):
+        options_of(new_run(tmp_path, "flood", {}), "press")

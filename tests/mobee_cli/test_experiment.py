@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.registry import EXPERIMENTS
+from mobee_cli.__main__ import main
+
+ROOT = Path(__file__).parents[2]
+QUICK = ("--robots", "katana", "--objects", "2", "--edits", "3")
+
+
+def test_list_names_every_experiment_with_its_claim(capsys):
+    assert main(["experiment", "list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert [entry["name"] for entry in listed] == list(EXPERIMENTS)
+    assert all(entry["claim"] and entry["source"] for entry in listed)
+    assert main(["experiment", "list"]) == 0
+    assert all(f"{entry['name']:<12} {entry['claim']}" in capsys.readouterr().out for entry in listed[:1])
+
+
+def test_a_run_leaves_its_options_versions_records_and_results(tmp_path, capsys):
+    assert main(["experiment", "run", "flood", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"]) == 0
+    said = capsys.readouterr()
+    results = json.loads(said.out)
+    folder = Path(results.pop("run"))
+    assert folder.parent == tmp_path
+    assert said.err == ""
+    assert json.loads((folder / "results.json").read_text()) == json.loads(json.dumps(results))
+    options = json.loads((folder / "config.json").read_text())["options"]
+    assert (options["objects"], options["edits"], options["seed"]) == (2, 3, 3)
+    assert {path.name for path in folder.iterdir()} == {"config.json", "versions.json", "results.json", "flood.csv"}
+
+
+def test_a_figure_is_drawn_of_the_newest_run(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    for _ in range(2):
+        assert main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path)]) == 0
+        folder = Path(capsys.readouterr().out.splitlines()[0].partition(": ")[2])
+    assert main(["experiment", "figure", "flood", "--runs", str(tmp_path), "--json"]) == 0
+    assert Path(json.loads(capsys.readouterr().out)["figure"]).parent == folder
+
+
+def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
+    main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+    folder = json.loads(capsys.readouterr().out)["run"]
+    assert main(["experiment", "run", "flood", "--resume", folder, "--objects", "3", "--json"]) == 0
+    results = json.loads(capsys.readouterr().out)
+    assert results["run"] == folder
+    assert set(results) == {"run", "complete", "katana"}
+    assert results["katana"]["objects_reached"] == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["run", "flod"], "Did you mean 'flood'"),
+        (["figure", "flood", "--runs", "nowhere"], "no run of 'flood'"),
+        (["run", "flood", "--resume", "nowhere"], "not the folder of a run"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(arguments, says, capsys):
+    assert main(["experiment", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize("option", [["--objects", "0"], ["--edits", "many"], ["--duration", "nan"], ["--robots", "nao"], ["--objcts", "3"]])
+def test_a_wrong_option_of_an_experiment_is_said_in_one_line(option, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", "run", "flood", *option])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert said.startswith("mobee experiment run flood")
+
+
+def test_a_failed_verdict_fails_the_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("experiments.flood.run", lambda arguments, folder: {"passed": False, "torn": {"rows": 3}})
+    assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 1
+    assert "torn: rows -> 3" in capsys.readouterr().out
+
+
+def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
+    argv = [sys.executable, "-m", "mobee_cli", "experiment", "run", "flood", "--robots", "katana", "--runs", str(tmp_path)]
+    with subprocess.Popen(argv, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        give_up = time.monotonic() + 120.0
+        while not any(len(path.read_text().splitlines()) > 4 for path in tmp_path.glob("*/flood.csv")):
+            assert process.poll() is None
+            assert time.monotonic() < give_up
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30.0)
+    assert process.returncode == 1
+    (folder,) = tmp_path.iterdir()
+    assert f"--resume {folder}" in err
+    assert len(err.splitlines()) == 1
+    assert "Traceback" not in out + err
