@@ -64,8 +64,12 @@ def direction(node: Node, names: tuple[str, str, str], default: tuple[float, flo
 def align(source: Array, target: Array) -> Array:
     """The smallest rotation (3, 3) that takes one unit vector to another; half a turn about x (or z) when they are opposite."""
     cosine = float(source @ target)
-    if cosine < -1 + 1e-12:
-        return turn_about(np.array([1.0, 0.0, 0.0]) if abs(source[0]) < 0.5 else Z, np.pi)
+    if cosine < -0.9:  # the division below would lose all but the first digits
+        axis = np.cross(source, target)
+        sine = float(np.linalg.norm(axis))
+        if sine < 1e-12:
+            return turn_about(np.array([1.0, 0.0, 0.0]) if abs(source[0]) < 0.5 else Z, np.pi)
+        return turn_about(axis / sine, np.arctan2(sine, cosine))
     cross = skew(np.cross(source, target))
     return np.eye(3) + cross + cross @ cross / (1 + cosine)
 

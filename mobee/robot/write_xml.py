@@ -1,0 +1,155 @@
+"""Writes a robot as a zero-position XML file that reads back as the same robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from mobee.errors import InvalidValue
+from mobee.robot.drives import Drive, drives_of
+from mobee.robot.robot import Array, Clause, Joint, Motor, Robot, Shape
+from mobee.robot.write_pairs import ignore_elements
+from mobee.robot.xml_node import DEEPEST
+from mobee.robot.xml_volume import Y, align
+
+HALFWAY = -0.5  # cosine; beyond it a box is drawn with its axis the other way, for the shortest turn is ill-defined at half a turn
+DIGITS = 1e-14  # m; less is the rounding of a sum
+
+
+def write_xml(robot: Robot, path: str | Path) -> Path:
+    """Write a robot to a zero-position XML file (robots/README.md) and return its path.
+
+    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers and clauses. Shapes may come in another order, and a
+    convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
+    """
+    drives = drives_of(robot)
+    root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName=robot.name, adjacency="listed")
+    for part in robot.parts.values():
+        element = ET.SubElement(root, "bodypart", name=part.name)
+        for motor in robot.motor_table[part.slice]:
+            element.append(_motor(motor))
+        for clause in robot.clauses:
+            if clause.part == part.name:
+                element.append(_clause(robot, clause))
+    base = ET.SubElement(root, "link", name=robot.links[0])
+    _write_link(robot, drives, base, 0, np.zeros(3))
+    root.extend(ignore_elements(robot))
+    ET.indent(root, " ")
+    path = Path(path)
+    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    return path
+
+
+def _motor(motor: Motor) -> ET.Element:
+    low, high = motor.limits
+    values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
+    values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
+    angles = {name: _degrees(value) for name, value in values.items()}
+    return ET.Element("motor", {"name": motor.name} | angles | {"torque": _text(motor.max_torque)})
+
+
+def _clause(robot: Robot, clause: Clause) -> ET.Element:
+    element = ET.Element("constraintList")
+    for row, offset in zip(clause.a, clause.b, strict=True):
+        used = np.flatnonzero(row)
+        names = " ".join(robot.motors[k] for k in used)
+        ET.SubElement(element, "constraint", a=_texts(row[used]), q=names, b=_degrees(offset))
+    return element
+
+
+def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array) -> None:
+    """Everything on a link and beyond it; the elements stand in the order of the tree, whatever order they are made in."""
+    waiting = [(into, link, point, 2)]
+    while waiting:
+        element, here, origin, depth = waiting.pop()
+        if depth > DEEPEST - 4:
+            raise InvalidValue(f"link {robot.links[here]!r} is too deep in the tree: a file holds {DEEPEST} elements inside each other.")
+        _write_body(robot, element, here, origin)
+        for index, joint in enumerate(robot.joints):
+            if joint.parent != here:
+                continue
+            step = joint.point - origin
+            if np.abs(step).max() <= DIGITS:
+                waiting.append((_joint(robot, drives[index], element, index), index + 1, origin, depth + 1))
+            else:
+                place = ET.SubElement(element, "link", _vector("xyz", step))
+                waiting.append((_joint(robot, drives[index], place, index), index + 1, joint.point, depth + 2))
+
+
+def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Element:
+    joint: Joint = robot.joints[index]
+    motor = robot.motor_table[drive.motor]
+    ends = drive.scale * motor.limits + drive.offset
+    text = _degrees if joint.kind == "revolute" else _text
+    names = {"name": joint.name, "moves": robot.links[index + 1], "motor": motor.name}
+    kind = {"type": "prismatic"} if joint.kind == "prismatic" else {}
+    return ET.SubElement(into, "joint", names | kind | _vector("xyz", joint.axis) | {"minPos": text(ends[0]), "maxPos": text(ends[1])})
+
+
+def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> None:
+    """The shapes and markers of a link, each part's in a <bodypart> of that name."""
+    parts: dict[str, ET.Element] = {}
+    for index, shape in enumerate(robot.shapes):
+        if shape.link != link:
+            continue
+        if shape.part not in robot.parts:
+            raise InvalidValue(f"shape {shape.name!r} is of part {shape.part!r}, which the robot does not have.")
+        if shape.part not in parts:
+            parts[shape.part] = ET.SubElement(element, "bodypart", name=shape.part)
+        written = ET.SubElement(parts[shape.part], shape.kind, {"name": shape.name} | _volume(shape, origin))
+        if shape.role == "field":
+            written.set("field", "true")
+        if (index in robot.base_shapes) != (link == 0):
+            written.set("base", "true" if link else "false")
+    for marker in robot.markers.values():
+        if marker.link == link:
+            place = _vector(("px", "py", "pz"), marker.position - origin) | _vector(("nx", "ny", "nz"), marker.normal)
+            ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": _texts(marker.rotation.reshape(9))})
+
+
+def _volume(shape: Shape, origin: Array) -> dict[str, str]:
+    place = _vector(("px", "py", "pz"), shape.position - origin)
+    match shape.kind:
+        case "sphere":
+            return {"radius": _text(shape.size[0])} | place
+        case "capsule" | "cylinder":
+            size = {"radius": _text(shape.size[0]), "height": _text(shape.size[1])}
+            return size | place | _vector(("hx", "hy", "hz"), shape.rotation[:, 2])
+        case "box":
+            width, height, depth = map(_text, shape.size)
+            return {"width": width, "height": height, "depth": depth} | place | _turn(shape.rotation)
+    if shape.vertices is None:
+        raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
+    return {"points": _texts((shape.vertices @ shape.rotation.T).reshape(-1))} | place
+
+
+def _turn(rotation: Array) -> dict[str, str]:
+    """A box's orientation as the file says it: y the shortest way to an axis, then an angle about that."""
+    axis = rotation[:, 1]
+    if axis[1] < HALFWAY:
+        rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
+        axis = rotation[:, 1]
+    rest = align(Y, axis).T @ rotation
+    return _vector(("hx", "hy", "hz"), axis) | {"angle": _degrees(np.arctan2(rest[0, 2], rest[0, 0]))}
+
+
+def _vector(names: tuple[str, str, str] | str, vector: Array) -> dict[str, str]:
+    return {name: _text(value) for name, value in zip(names, vector, strict=True)}
+
+
+def _texts(values: Array) -> str:
+    return " ".join(map(_text, values))
+
+
+def _degrees(value: float) -> str:
+    """The angle in degrees, rounded where that reads back as exactly the same radians."""
+    degrees = float(np.rad2deg(value))
+    rounded = round(degrees, 9)
+    return _text(rounded if np.deg2rad(rounded) == value else degrees)
+
+
+def _text(value: float) -> str:
+    """The shortest text that reads back as exactly this number."""
+    return repr(float(value)) if value % 1 or abs(value) > 1e15 else str(int(value))
