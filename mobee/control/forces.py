@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mobee.control.collision import Propagate, collision_forces, contact_projection
+from mobee.control.collision import Propagate, collision_forces
 from mobee.control.constraints import ClauseRows, clause_forces, clause_forces_2014, stack_clauses
 from mobee.control.gains import Gains
 from mobee.control.limits import limit_forces
@@ -35,14 +35,14 @@ class Forces:
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:
     """The constraint forces at one pose (thesis eqs. 5.11-5.17).
 
-    `propagate`: how far down the body a contact is felt, see `contact_projection`.  `contact_forces` False leaves f_coll
+    `propagate`: how far down the body a contact is felt.  `contact_forces` False leaves f_coll
     at zero, for the control experiment in which touching has no effect.
     """
     robot = pose.robot
     clauses = clause_forces_2014 if gains.law == "published_2014" else clause_forces
     collision = np.zeros(len(pose.q))
-    if contact_forces and pose.contacts:
-        collision = collision_forces(robot, contact_projection(pose, propagate), gains)
+    if contact_forces:
+        collision = collision_forces(robot, pose.projection if propagate == "tree" else pose.projection_of_part, gains)
     return Forces(
         limit_forces(pose.q, robot.limits, gains.limit_width, gains.max_limit),
         clauses(_rows(robot), pose.q, gains.constraint_width, gains.max_constraint),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.control.collision import collision_forces, contact_projection, part_of_link
+from mobee.control.collision import collision_forces
 from mobee.control.gains import Gains
 from mobee.model import Model, Pose
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
@@ -15,12 +15,12 @@ LEVERS = np.array([0.9, 0.6, 0.3])  # m, from the joints of the stretched arm to
 
 
 def test_the_projection_is_lever_times_penetration() -> None:
-    projection = contact_projection(touching(-0.02).evaluate(STRETCHED), "tree")
+    projection = touching(-0.02).evaluate(STRETCHED).projection
     assert projection == pytest.approx(0.02 * LEVERS, abs=1e-6)
 
 
 def test_within_the_part_the_projection_leaves_the_joints_below_alone() -> None:
-    projection = contact_projection(touching(-0.02).evaluate(STRETCHED), "part")
+    projection = touching(-0.02).evaluate(STRETCHED).projection_of_part
     assert projection == pytest.approx(0.02 * LEVERS * [0, 1, 1], abs=1e-6)
 
 
@@ -32,7 +32,7 @@ def test_solid_contacts_make_no_force() -> None:
     world.move("ball", position=(0.9, -0.05, 0.0))
     pose = Model(solids, world).evaluate(STRETCHED)
     assert [c.kind for c in pose.contacts] == ["solid"]
-    assert not contact_projection(pose, "tree").any()
+    assert not pose.projection.any()
 
 
 def folded() -> Pose:
@@ -43,7 +43,7 @@ def folded() -> Pose:
 def test_both_sides_of_a_self_contact_are_driven_apart() -> None:
     pose = folded()
     (contact,) = [c for c in pose.contacts if c.kind == "field"]
-    projection = contact_projection(pose, "tree")
+    projection = pose.projection
     after = Model(planar_arm()).evaluate(pose.q + 0.01 * projection / np.linalg.norm(projection))
     (less,) = [c for c in after.contacts if c.kind == "field"]
     assert less.depth < contact.depth
@@ -51,7 +51,7 @@ def test_both_sides_of_a_self_contact_are_driven_apart() -> None:
 
 def test_a_self_contact_does_not_push_the_joints_below_both_of_its_links() -> None:
     """The whole arm turning about its first joint changes nothing between links 1 and 3."""
-    projection = contact_projection(folded(), "tree")
+    projection = folded().projection
     assert projection[0] == pytest.approx(0.0, abs=1e-12)
     assert projection[2] < -1e-3
 
@@ -75,7 +75,3 @@ def test_the_default_force_is_linear_for_small_penetrations() -> None:
     gains = Gains.default()
     force = collision_forces(two_part_arm(), np.array([1e-6, 0.0, 0.0]), gains)
     assert force[0] == pytest.approx(gains.contact_gain * 1e-6, rel=1e-3)
-
-
-def test_links_belong_to_the_part_that_moves_them() -> None:
-    assert [part_of_link(two_part_arm(), link) for link in (-1, 0, 1, 2, 3)] == [None, None, "trunk", "arm", "arm"]
