@@ -9,6 +9,7 @@ from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.urdf.shapes import Meshes
+from mobee.robot.xml_file import is_file
 from mobee.robot.xml_world import read_world
 from mobee.robot.zero_position import read_robot
 
@@ -58,7 +59,7 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
         urdf = f"{path.stem.removesuffix('.urdf')}.urdf"
         raise RobotFileError(f"{path}: xacro files are made into URDF first. Run: xacro {path.name} > {urdf}")
     if path.suffix or path.name != given:
-        if not path.is_file():
+        if not is_file(path):
             raise RobotFileError(f"{path}: no such file. Give a path to a file ({suffixes}), or a name: {', '.join(shipped(folder))}.")
         return path
     if given not in shipped(folder):

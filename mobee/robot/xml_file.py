@@ -42,6 +42,14 @@ class LineHandler(xml.sax.handler.ContentHandler):
         self._locator = locator
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def parse_xml(path: Path, handler: LineHandler) -> None:
     """Send the elements of an XML file to `handler`.
 

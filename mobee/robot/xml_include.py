@@ -11,6 +11,7 @@ import numpy as np
 
 from mobee.robot.join import Placed
 from mobee.robot.robot import Robot
+from mobee.robot.xml_file import is_file
 from mobee.robot.xml_node import Node, listed, shown
 from mobee.robot.xml_volume import AXIS, PLACE, Z, align, direction, turn_about
 
@@ -57,10 +58,6 @@ def _find(node: Node) -> Path:
     given = node.text("file")
     shipped = [path.stem for path in ROBOTS.glob("*.xml")]
     path = ROBOTS / f"{given}.xml" if given in shipped else node.file.parent / given
-    try:
-        found = path.is_file()
-    except (OSError, ValueError):  # a name that is too long, or no name at all
-        found = False
-    if not found:
+    if not is_file(path):
         node.fail("file", f"{shown(given)!r} is no file", f"Give a path relative to this file, or a shipped robot: {listed(shipped)}")
     return path

@@ -24,11 +24,19 @@ def read_world(path: Path) -> World:
     world = World()
     for node in root:
         if node.tag not in VOLUME_TAGS:
-            node.warn(f"unknown tag is ignored. {nearest(node.tag, VOLUME_TAGS)}Valid: {', '.join(sorted(VOLUME_TAGS))}")
+            _warn_unknown(node)
             continue
         node.check_attributes(VOLUME_TAGS[node.tag] | {"name", "role", "color"})
         _add(world, node)
+        for child in node:
+            if child.tag in VOLUME_TAGS:
+                child.fail("position in the file", f"nothing stands inside <{node.tag}>", f"Move it behind the <{node.tag}>")
+            _warn_unknown(child)
     return world
+
+
+def _warn_unknown(node: Node) -> None:
+    node.warn(f"unknown tag is ignored. {nearest(node.tag, VOLUME_TAGS)}Valid: {', '.join(sorted(VOLUME_TAGS))}")
 
 
 def _add(world: World, node: Node) -> None:

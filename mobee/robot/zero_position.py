@@ -19,6 +19,7 @@ from mobee.robot.xml_motors import read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
 
+MOST_IGNORES = 20_000  # a file that `write_xml` wrote names every pair
 ROOT = "zeropositionkinematictree"
 AXES = ("x", "y", "z")
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
@@ -109,7 +110,7 @@ def _warn_unknown(node: Node) -> None:
 
 
 def _misplaced(node: Node, draft: Draft, place: Place) -> None:
-    remedy = f"<constraint> stands in <constraintList>, <robot> directly in the root, <{ROOT}> only once"
+    remedy = f"Move it: <constraint> stands in <constraintList>, <robot> directly in the root, <{ROOT}> only once"
     node.fail("position in the file", "this tag cannot stand here", remedy)
 
 
