@@ -23,6 +23,7 @@ VERBS = {
     "robots": "robots and worlds that come with mobee",
     "experiment": "claims of the papers, measured: list, run, figure",
     "check": "what is wrong with a robot or world of your own",
+    "view": "a robot's file as a picture that moves",
 }
 
 

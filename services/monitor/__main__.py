@@ -8,9 +8,10 @@ from mobee import load_robot
 from services.common.config import load_config
 from services.common.entry import explained
 from services.common.service import Service
+from services.monitor.blueprint import blueprint
 from services.monitor.config import Config
 from services.monitor.node import MonitorNode
-from services.monitor.output import open_output
+from services.monitor.output import open_output, recording_of
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -18,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
         robot = load_robot(config.robot)
-        with open_output(config) as output, Service("monitor", config, robot) as service:
+        with open_output(config, blueprint(), recording_of(config)) as output, Service("monitor", config, robot) as service:
             MonitorNode(service, config, robot, output)
             service.ready()
             service.run()

@@ -8,6 +8,7 @@ from services.monitor.palette import PARTS
 
 TIMELINE = "robot_time"
 ROOT = "root_link"  # frame of everything in the scene
+BACKGROUND = (24, 27, 33)
 WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
 
@@ -39,7 +40,7 @@ def _scene() -> rrb.Spatial3DView:
         origin="/",
         contents=["/scene/**", "/robot/**"],
         name="iCub",
-        background=rrb.Background(color=(24, 27, 33)),
+        background=rrb.Background(color=BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         spatial_information=rrb.SpatialInformation(target_frame=ROOT),
         eye_controls=rrb.EyeControls3D(position=(-0.98, -0.60, 0.42), look_target=(-0.14, 0.0, 0.06), eye_up=(0.0, 0.0, 1.0)),
@@ -47,7 +48,7 @@ def _scene() -> rrb.Spatial3DView:
 
 
 def _eye(eye: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=f"/eyes/{eye}", name=f"{eye} eye", background=rrb.Background(color=(24, 27, 33)))
+    return rrb.Spatial2DView(origin=f"/eyes/{eye}", name=f"{eye} eye", background=rrb.Background(color=BACKGROUND))
 
 
 def _log() -> rrb.TextLogView:

@@ -15,8 +15,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 import rerun as rr
+import rerun.blueprint as rrb
 
-from services.monitor.blueprint import blueprint
 from services.monitor.config import Config
 from services.monitor.page import HOST, program
 
@@ -33,16 +33,13 @@ class Output:
 
 
 @contextmanager
-def open_output(config: Config) -> Iterator[Output]:
-    """Serve and record as configured; exits with 2 and one line when a port or the folder cannot be used."""
-    folder = Path(config.run_dir) if config.run_dir else None
-    if folder is not None and not folder.is_dir():
-        _refuse(f"run_dir {folder} is not a folder: make it, or leave run_dir empty for no recording")
+def open_output(config: Config, layout: rrb.Blueprint, recording: Path | None) -> Iterator[Output]:
+    """Serve as configured, and record to a file if one is named; exits with 2 and one line when a port cannot be used."""
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
         page = _start_page(config, private) if config.serve else None
         stream = rr.RecordingStream("mobee")
         try:
-            _connect(stream, config, folder)
+            _connect(stream, config, layout, recording)
             yield Output(stream, page, page_url(config) if page else "")
         finally:
             if page is not None:
@@ -51,14 +48,22 @@ def open_output(config: Config) -> Iterator[Output]:
             stream.disconnect()
 
 
-def _connect(stream: rr.RecordingStream, config: Config, folder: Path | None) -> None:
+def recording_of(config: Config) -> Path | None:
+    """The file that is recorded to; exits with 2 and one line when its folder is missing."""
+    folder = Path(config.run_dir) if config.run_dir else None
+    if folder is not None and not folder.is_dir():
+        _refuse(f"run_dir {folder} is not a folder: make it, or leave run_dir empty for no recording")
+    return folder / "recording.rrd" if folder else None
+
+
+def _connect(stream: rr.RecordingStream, config: Config, layout: rrb.Blueprint, recording: Path | None) -> None:
     sinks: list[rr.GrpcSink | rr.FileSink] = []
     if config.serve:
         sinks.append(rr.GrpcSink(f"rerun+http://{HOST}:{config.grpc_port}/proxy"))
-    if folder is not None:
-        sinks.append(rr.FileSink(folder / "recording.rrd"))
+    if recording is not None:
+        sinks.append(rr.FileSink(recording))
     if sinks:
-        stream.set_sinks(*sinks, default_blueprint=blueprint())
+        stream.set_sinks(*sinks, default_blueprint=layout)
 
 
 def page_url(config: Config) -> str:

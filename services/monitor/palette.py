@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 Color = tuple[int, int, int]
+Rgba = tuple[int, int, int, int]
 
 JOINTS: tuple[Color, ...] = ((76, 154, 255), (255, 171, 64), (102, 205, 130), (214, 122, 232))
 PARTS: dict[str, Color] = {"torso": (255, 202, 97), "left_arm": (86, 180, 233), "right_arm": (232, 120, 170)}
@@ -12,12 +15,30 @@ TOUCHED = (255, 50, 40, 130)
 TABLE = (150, 138, 120, 255)
 BALL = (225, 40, 40, 255)
 OTHER = (170, 170, 180, 255)
+COLLIDING = (255, 50, 40, 255)
+MARKER = (255, 214, 64)
+SOLIDS: tuple[Color, ...] = (
+    (150, 160, 176),
+    (176, 162, 140),
+    (118, 152, 190),
+    (186, 132, 156),
+    (130, 172, 142),
+    (172, 150, 196),
+)  # by part
 
 
 def faded(color: Color, share: float) -> Color:
     """The colour, dimmed towards the dark background."""
     red, green, blue = (round(share * channel) for channel in color)
     return red, green, blue
+
+
+def of_object(kind: str, role: str, given: Sequence[float] | None = None) -> Rgba:
+    """An object's colour: the given one, channels in 0..1, else by what it is."""
+    if given is not None:
+        red, green, blue, opacity = (round(255 * channel) for channel in given)
+        return red, green, blue, opacity
+    return BALL if role == "target" else TABLE if kind == "box" else OTHER
 
 
 COVERS = "0.30 0.34 0.40 1"  # of the URDF's red parts

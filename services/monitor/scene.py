@@ -15,11 +15,12 @@ from bus_schema.messages import ContactItem, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.errors import MobeeError
 from mobee.kinematics import link_transforms
-from mobee.kinematics.quaternion import from_matrix
+from mobee.kinematics.quaternion import from_matrix, to_matrix
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Array, Robot, Shape
 from services.monitor import palette
 from services.monitor.blueprint import ROOT
+from services.monitor.volumes import drawn
 
 TRAIL = 60  # points a hand
 TRAIL_STEP = 4  # looks a point
@@ -71,18 +72,10 @@ class Scene:
     def log_object(self, thing: ObjectState | WorldObject) -> None:
         """An object where it is believed to be."""
         self._objects[thing.name] = thing
-        path = f"scene/objects/{thing.name}"
-        size, kind = thing.geometry.size, thing.geometry.kind
-        w, x, y, z = thing.quaternion
-        color = palette.BALL if thing.role == "target" else palette.TABLE if kind == "box" else palette.OTHER
-        common = {"quaternions": [rr.Quaternion(xyzw=[x, y, z, w])], "colors": [color], "fill_mode": "solid"}
-        if kind == "box":
-            shape: rr.AsComponents = rr.Boxes3D(sizes=[size], centers=[thing.position], **common)
-        elif kind == "sphere":
-            shape = rr.Ellipsoids3D(radii=[size[0]], centers=[thing.position], **common)
-        else:
-            shape = rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[thing.position], **common)
-        self._stream.log(path, rr.CoordinateFrame(ROOT), shape)
+        color = palette.of_object(thing.geometry.kind, thing.role)
+        turn = to_matrix(np.array(thing.quaternion))
+        body = drawn(thing.geometry.kind, tuple(thing.geometry.size), np.array(thing.position), turn, color)
+        self._stream.log(f"scene/objects/{thing.name}", rr.CoordinateFrame(ROOT), body)
 
     def _log_fields(self, transforms: Array, touched: set[str]) -> None:
         capsules = [shape for shape in self._fields if shape.kind == "capsule"]

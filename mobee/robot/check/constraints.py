@@ -26,7 +26,7 @@ def constraints(subject: Subject) -> Iterator[Finding]:
             yield _impossible(subject, index, most)
         else:
             yield from _idle_rows(subject, index, least, most)
-        if most.max() > 0 and (clause.a @ robot.home + clause.b).max() < -ROUNDING:
+        if most.max() > 0 and (clause.a @ subject.home + clause.b).max() < -ROUNDING:
             yield _violated_at_home(subject, index)
     if not dead:
         yield from _contradiction(subject, robot.clauses)
@@ -50,7 +50,7 @@ def _impossible(subject: Subject, index: int, most: Array) -> Finding:
 
 
 def _violated_at_home(subject: Subject, index: int) -> Finding:
-    clause, home = subject.robot.clauses[index], subject.robot.home
+    clause, home = subject.robot.clauses[index], subject.home
     return Finding(
         "warning",
         "constraint",
@@ -86,7 +86,7 @@ def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Itera
 
 
 def _contradiction(subject: Subject, clauses: Sequence[Clause]) -> Iterator[Finding]:
-    starts = np.concatenate([np.nan_to_num(subject.robot.home)[None], subject.samples])
+    starts = np.concatenate([subject.home[None], subject.samples])
     fighting = conflict(clauses, subject.range, starts)
     if fighting:
         others = ", ".join(subject.where("clause", str(index)) for index in fighting[1:])

@@ -19,9 +19,9 @@ Link = tuple[list[Shape], list[Shape]]  # solids, fields
 
 def fields(subject: Subject) -> Iterator[Finding]:
     """Fields inside of solids, solids that stick out of all fields of their link, links with solids and no field."""
-    links: dict[int, Link] = defaultdict(lambda: ([], []))
+    links: dict[tuple[int, str], Link] = defaultdict(lambda: ([], []))  # two robots may stand on one base
     for shape in subject.robot.shapes:
-        links[shape.link][shape.role == "field"].append(shape)
+        links[shape.link, shape.part][shape.role == "field"].append(shape)
     if not any(fields for _, fields in links.values()):
         yield Finding(
             "note",
@@ -29,10 +29,11 @@ def fields(subject: Subject) -> Iterator[Finding]:
             subject.where("robot", subject.robot.name),
             "the robot has no field",
             "it feels no force before its solids touch: the controller cannot keep it away from itself or from the world",
-            'give what shall keep away a field: field=".06" at a link, or a shape with field="true"',
+            ("write it as XML with `mobee convert`, then " if subject.is_urdf else "")
+            + 'give what shall keep away a field: field=".06" at a link, or a shape with field="true"',
         )
         return
-    bare = [subject.robot.links[link] for link, (solids, around) in sorted(links.items()) if solids and not around]
+    bare = [subject.robot.links[link] for (link, _), (solids, around) in sorted(links.items()) if solids and not around]
     if bare:
         yield Finding(
             "note",

@@ -8,7 +8,7 @@ import numpy as np
 
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
-from mobee.robot.check.words import interval
+from mobee.robot.check.words import motor_interval
 
 LEAST = np.deg2rad(1.0)  # rad, or about 2 cm of a slide: less is no range
 
@@ -17,11 +17,12 @@ def home_limits(subject: Subject) -> Iterator[Finding]:
     """Motors whose home lies outside of their limits."""
     for motor in subject.robot.motor_table:
         if not motor.limits[0] <= motor.home <= motor.limits[1]:
+            home = f"{np.rad2deg(motor.home):.4g} deg ({motor.home:.4g} rad)"
             yield Finding(
                 "error",
                 "home-limits",
                 subject.where("motor", motor.name),
-                f"motor {motor.name!r} has its home at {np.rad2deg(motor.home):.4g} deg, outside of {interval(motor.limits, 'revolute')}",
+                f"motor {motor.name!r} has its home at {home}, outside of {motor_interval(subject.robot, motor)}",
                 "the robot would start against its limits and push itself back",
                 "choose a home between them",
             )

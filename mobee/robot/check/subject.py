@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -12,7 +11,7 @@ import numpy as np
 from mobee.collision.contact import Contact
 from mobee.collision.world import World
 from mobee.model import Model
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array, Robot, Shape
 
 POSES = 256  # a pair that touches in all of them cannot be kept apart
 SEED = 20141030  # any: the same file is answered the same way every time
@@ -31,14 +30,15 @@ class Subject:
         """File and line of a thing; the robot's own where the reader kept none."""
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
+    @property
+    def is_urdf(self) -> bool:
+        """Whether the robot was read from a URDF, in which some remedies are written otherwise."""
+        return any(".urdf:" in line for line in self.robot.where.values())
+
     @cached_property
     def range(self) -> Array:
-        """Motor limits (n, 2) rad, half a turn where a motor has none."""
-        return np.clip(np.nan_to_num(self.robot.limits, nan=0.0), -np.pi, np.pi) if self._unbounded else self.robot.limits
-
-    @property
-    def _unbounded(self) -> bool:
-        return not np.isfinite(self.robot.limits).all()
+        """Motor limits (n, 2) rad, half a turn to a side where a motor has none."""
+        return np.nan_to_num(self.robot.limits, nan=0.0, neginf=-np.pi, posinf=np.pi)
 
     @cached_property
     def samples(self) -> Array:
@@ -47,38 +47,53 @@ class Subject:
         return np.random.default_rng(SEED).uniform(low, np.maximum(high, low), (POSES, len(low)))
 
     @cached_property
+    def home(self) -> Array:
+        """Where the robot starts, (n,) rad."""
+        return np.nan_to_num(self.robot.home)
+
+    @cached_property
+    def limited(self) -> Robot:
+        """The same robot with limits everywhere, for a model needs some."""
+        motors = zip(self.robot.motor_table, self.range, strict=True)
+        return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
+
+    @cached_property
     def at_home(self) -> tuple[Contact, ...]:
         """Contacts at home, with the world if there is one."""
-        return Model(self.robot, self.world).evaluate(np.nan_to_num(self.robot.home)).contacts
+        return Model(self.limited, self.world).evaluate(self.home).contacts
 
     @cached_property
     def always(self) -> frozenset[Touch]:
         """Pairs of the robot's shapes that overlap at home and in every sampled pose."""
-        model = Model(self.robot)
-        left = Counter(touches(model.evaluate(np.nan_to_num(self.robot.home)).contacts))
+        model = Model(self.limited)
+        left = touches(model.evaluate(self.home).contacts)
         for q in self.samples:
             if not left:
                 break
-            left &= Counter(touches(model.evaluate(q).contacts))
+            left &= touches(model.evaluate(q).contacts)
         return frozenset(left)
 
     @cached_property
-    def foreign(self) -> tuple[Contact, ...]:
-        """Fields (`first`) that reach, at home, into solids of other parts (`second`) without meeting a field of the solid's link."""
-        robot, shapes = self.robot, self.robot.shapes
+    def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
+        """Fields that reach, at home, into solids of other parts without meeting a field of the solid's link, and how deep [m]."""
+        robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
         near = [
-            (i, j)
+            sorted((i, j))
             for (i, one), (j, other) in product(enumerate(shapes), repeat=2)
             if (one.role, other.role) == ("field", "solid") and one.part != other.part and frozenset((one.link, other.link)) in tested
         ]
         bodies = tuple(replace(shape, role="solid") for shape in shapes)
         pairs = np.array(near, dtype=np.intp).reshape(-1, 2)
         probe = replace(robot, shapes=bodies, field_pairs=pairs[:0], solid_pairs=pairs)
-        places = {shape.name: shape.link for shape in shapes}
+        named = {shape.name: shape for shape in shapes}
         felt = {end for c in self.at_home if c.kind == "field" for end in ((c.first, c.second_link), (c.second, c.first_link))}
-        met = Model(probe).evaluate(np.nan_to_num(robot.home)).contacts
-        return tuple(contact for contact in met if (contact.first, places[contact.second]) not in felt)
+        found = []
+        for contact in Model(probe).evaluate(self.home).contacts:
+            field, solid = sorted((named[contact.first], named[contact.second]), key=lambda shape: shape.role)
+            if (field.name, solid.link) not in felt:
+                found.append((field, solid, contact.depth))
+        return tuple(found)
 
     @cached_property
     def moved(self) -> frozenset[int]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator
 
-from mobee.collision.contact import Contact
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
 from mobee.robot.check.words import length
+from mobee.robot.robot import Shape
 
 
 def always_touching(subject: Subject) -> Iterator[Finding]:
@@ -23,8 +22,14 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
             "their contact says nothing, and hides others behind a force that never ends"
             if kind == "field"
             else "every pose counts as a collision, so no plan is ever valid",
-            f"make one smaller, or leave the pair out: <ignore first={links[first]!r} second={links[second]!r}/>".replace("'", '"'),
+            f"make one smaller, or leave the pair out: {_ignoring(subject, links[first], links[second])}",
         )
+
+
+def _ignoring(subject: Subject, first: str, second: str) -> str:
+    if subject.is_urdf:
+        return f'<disable_collisions link1="{first}" link2="{second}" reason="Default"/> in the SRDF beside it'
+    return f'<ignore first="{first}" second="{second}"/>'
 
 
 def home_contacts(subject: Subject) -> Iterator[Finding]:
@@ -57,18 +62,18 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Parts whose fields reach, at home, into solids of another part whose own fields are not felt there."""
-    reached: dict[tuple[str, str], list[Contact]] = defaultdict(list)
-    parts = {shape.name: shape.part for shape in subject.robot.shapes}
-    for contact in subject.foreign:
-        reached[parts[contact.first], parts[contact.second]].append(contact)
-    for (part, other), contacts in sorted(reached.items()):
-        deepest = max(contacts, key=lambda contact: contact.depth)
+    """Parts whose fields reach, at home, into solids of another part whose own fields are not felt there: the deepest of each two parts."""
+    deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
+    for field, solid, depth in subject.foreign:
+        parts = field.part, solid.part
+        if parts not in deepest or depth > deepest[parts][2]:
+            deepest[parts] = field, solid, depth
+    for (part, other), (field, solid, depth) in sorted(deepest.items()):
         yield Finding(
             "note",
             "foreign-solid",
-            subject.where("shape", deepest.first),
-            f"at home field {deepest.first!r} of part {part!r} reaches {length(deepest.depth)} into solid {deepest.second!r} of {other!r}",
+            subject.where("shape", field.name),
+            f"at home field {field.name!r} of part {part!r} reaches {length(depth)} into solid {solid.name!r} of {other!r}",
             f"fields feel fields only: {part} comes this near without a force",
-            f"give the link of {deepest.second!r} a field that encloses it, or make {deepest.first!r} smaller",
+            f"give the link of {solid.name!r} a field that encloses it, or make {field.name!r} smaller",
         )

@@ -47,7 +47,9 @@ def size(subject: Subject) -> Iterator[Finding]:
 
 
 def radians(subject: Subject) -> Iterator[Finding]:
-    """Ranges of motors that look like radians read as degrees."""
+    """Ranges of motors that look like radians read as degrees, which a URDF is not."""
+    if subject.is_urdf:
+        return
     turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor)]
     suspects = [motor for motor in turning if _is_quarter(motor)]
     if turning and all(np.abs(motor.limits).max() <= TURN_AS_DEGREES for motor in turning):

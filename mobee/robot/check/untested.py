@@ -10,6 +10,7 @@ from mobee.robot.robot import Robot
 
 SAME_LINK = "on the same link, which is rigid"
 SAME_PART = "fields of the same part"
+SINGLE = "left out singly: other shapes of these links are tested"
 UNKNOWN = "left out by who made the robot, who gave no reason"
 
 
@@ -32,10 +33,11 @@ def untested_groups(robot: Robot) -> list[UntestedGroup]:
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
     for column, (role, tested) in enumerate((("solid", robot.solid_pairs), ("field", robot.field_pairs))):
         done = {frozenset(pair) for pair in tested.tolist()}
+        met = {frozenset((robot.shapes[i].link, robot.shapes[j].link)) for i, j in tested}
         chosen = [index for index, shape in enumerate(robot.shapes) if shape.role == role]
         for i, j in combinations(chosen, 2):
             if frozenset((i, j)) not in done:
-                reason = _reason(robot, i, j)
+                reason = _reason(robot, i, j, met)
                 low, high = sorted((robot.shapes[i].link, robot.shapes[j].link))
                 links[reason].add((low, high))
                 counts[reason][column] += 1
@@ -46,11 +48,14 @@ def untested_groups(robot: Robot) -> list[UntestedGroup]:
     return sorted(groups, key=lambda group: (-group.solids - group.fields, group.reason))
 
 
-def _reason(robot: Robot, i: int, j: int) -> str:
+def _reason(robot: Robot, i: int, j: int, met: set[frozenset[int]]) -> str:
+    """Why two shapes of one role are not tested; `met`: pairs of links of which some shapes of this role are."""
     one, other = robot.shapes[i], robot.shapes[j]
+    links = frozenset((one.link, other.link))
     if one.link == other.link:
         return SAME_LINK
-    reason = robot.untested.get(frozenset((one.link, other.link)))
-    if reason:
-        return reason
+    if links in robot.untested:
+        return robot.untested[links]
+    if links in met:
+        return SINGLE
     return SAME_PART if one.role == "field" and one.part == other.part else UNKNOWN

@@ -6,13 +6,19 @@ from collections.abc import Iterable, Sized
 
 import numpy as np
 
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Motor, Robot
 
 
 def interval(limits: Array, kind: str) -> str:
     """An interval given in rad or m, as a person says it."""
     low, high = np.rad2deg(limits) if kind == "revolute" else np.asarray(limits)
     return f"{low:.4g} to {high:.4g} {'deg' if kind == 'revolute' else 'm'}"
+
+
+def motor_interval(robot: Robot, motor: Motor) -> str:
+    """The interval of a motor in its own unit: m where it is a slide that is not geared."""
+    slides = motor.joints and all(robot.joints[joint].kind == "prismatic" and scale == 1.0 for joint, scale, _ in motor.joints)
+    return interval(motor.limits, "prismatic" if slides else "revolute")
 
 
 def length(metres: float) -> str:

@@ -44,9 +44,9 @@ def test_a_row_that_never_is_satisfied_is_noted(tmp_path: Path) -> None:
 
 def test_constraints_that_contradict_each_other_are_named_alone(tmp_path: Path) -> None:
     said = clauses(tmp_path, row("1", 45), row("1 -1", -20, "pan bend"), row("-1 1", 10, "pan bend"))
-    assert [one for one in said if one.startswith("error")] == [
-        "error: the constraint on pan, bend contradicts toy: no pose within the limits was found that satisfies them together"
-    ]
+    (error,) = [one for one in said if one.startswith("error")]
+    assert error.startswith("error: the constraint on pan, bend contradicts ")
+    assert error.endswith("toy.xml:18: no pose within the limits was found that satisfies them together")
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1.0])

@@ -12,7 +12,7 @@ from tests.mobee.robot.check.arm import arm, named, with_joint, with_motor
 
 def test_a_home_outside_of_the_limits_is_an_error(tmp_path: Path) -> None:
     (finding,) = named(with_motor(arm(tmp_path), "bend", home=np.deg2rad(120.0)), "home-limits")
-    assert finding.what == "motor 'bend' has its home at 120 deg, outside of 10 to 100 deg"
+    assert finding.what == "motor 'bend' has its home at 120 deg (2.094 rad), outside of 10 to 100 deg"
 
 
 def test_a_home_at_a_limit_is_none(tmp_path: Path) -> None:

@@ -1,0 +1,44 @@
+"""`mobee view`: a robot's file as a picture that moves."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from mobee.errors import MobeeError
+from mobee.robot.load import load_robot, load_world
+from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
+
+_NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.
+Prints the address of a page and shows it until Ctrl-C; with --save it writes a file instead, for `rerun FILE`."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """File and options."""
+    parser.epilog = _NOTES
+    parser.add_argument("file", help="shipped robot, or path of a .xml or .urdf file")
+    parser.add_argument("--world", metavar="FILE", help="shipped world, or path of a .xml file, to show around it")
+    parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a recording and end")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Load, move, show."""
+    try:
+        from services.monitor.view import view  # needs the viewer, which is an extra
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "rerun":
+            raise
+        raise UserError("a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder", ENVIRONMENT) from None
+    save: Path | None = arguments.save
+    if save is not None and not save.resolve().parent.is_dir():
+        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
+    try:
+        robot = load_robot(arguments.file)
+        world = load_world(arguments.world) if arguments.world else None
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True))
+    if save is None:
+        raise UserError("the page's server ended by itself; --save FILE.rrd writes a recording instead")
+    print(f"{save}: open it with `rerun {save}`")
+    return 0

@@ -1,0 +1,117 @@
+"""A robot drawn from its file, without meshes: what moves is one transform a link, all else is logged once."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mobee.collision.contact import Contact
+from mobee.collision.world import World
+from mobee.kinematics import link_transforms
+from mobee.kinematics.quaternion import from_matrix
+from mobee.model import Model
+from mobee.robot.robot import Array, Robot, Shape
+from services.monitor import palette
+from services.monitor.palette import Rgba
+from services.monitor.volumes import drawn, recolored
+
+TIMELINE = "time"
+NORMAL = 0.05  # m, the arrow of a marker
+PUSH = 5.0  # length of a contact's arrow, in depths
+
+
+class Figure:
+    """Logs a robot and its world to a stream, then poses as time goes on."""
+
+    def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None) -> None:
+        self._stream, self._robot = stream, robot
+        self._model = Model(robot, world)
+        self._shapes = {shape.name: shape for shape in robot.shapes}
+        self._parts = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
+        self._touched: frozenset[str] = frozenset()
+        self._pairs: frozenset[tuple[str, str]] = frozenset()
+        for shape in robot.shapes:
+            self._log(self._path(shape), self._drawn(shape))
+        for name, thing in (world.objects if world else {}).items():
+            color = palette.of_object(thing.kind, thing.role, thing.color)
+            self._log(["world", name], drawn(thing.kind, thing.size, thing.position, thing.rotation, color))
+        for link in {marker.link for marker in robot.markers.values()}:
+            self._log_markers(link)
+
+    def move(self, begin: float, rate: float, poses: Array) -> None:
+        """The robot in poses (k, n) rad, the first at `begin` [s] and then `rate` a second, with what touches in each."""
+        times = begin + np.arange(len(poses)) / rate
+        transforms = link_transforms(self._robot, poses)
+        turns = from_matrix(transforms[..., :3, :3])[..., [1, 2, 3, 0]]
+        for index, link in enumerate(self._robot.links):
+            columns = rr.Transform3D.columns(translation=transforms[:, index, :3, 3], quaternion=turns[:, index])
+            self._columns(["robot", link], times, columns)
+        counts = np.zeros((len(poses), 2))
+        for now, q in enumerate(poses):
+            self._stream.set_time(TIMELINE, duration=times[now])
+            contacts = self._model.evaluate(q).contacts
+            counts[now] = [sum(contact.kind == kind for contact in contacts) for kind in ("solid", "field")]
+            self._log_contacts(contacts)
+        self._columns(["plots", "contacts"], times, rr.Scalars.columns(scalars=counts.ravel()).partition([2] * len(poses)))
+        low, high = self._robot.limits.T
+        shares = 100.0 * (poses - low) / np.maximum(high - low, 1e-9)
+        self._columns(["plots", "motors"], times, rr.Scalars.columns(scalars=shares.ravel()).partition([len(low)] * len(poses)))
+
+    def say(self, begin: float, text: str) -> None:
+        """What happens from `begin` [s] on."""
+        self._stream.set_time(TIMELINE, duration=begin)
+        self._stream.log("events", rr.TextLog(text, level="INFO"))
+
+    def _log_contacts(self, contacts: tuple[Contact, ...]) -> None:
+        touched = frozenset(name for contact in contacts for name in (contact.first, contact.second)) & self._shapes.keys()
+        for name in sorted(touched ^ self._touched):
+            shape = self._shapes[name]
+            self._stream.log(self._path(shape), recolored(shape.kind, self._color(shape, name in touched)))
+        pairs = frozenset((contact.first, contact.second) for contact in contacts)
+        for contact in contacts:
+            if (contact.first, contact.second) not in self._pairs:
+                text = f"{contact.kind}: {contact.first} meets {contact.second}"
+                self._stream.log("events", rr.TextLog(text, level="WARN" if contact.kind == "solid" else "INFO"))
+        if contacts or self._pairs:
+            self._stream.log(
+                "contacts",
+                rr.Arrows3D(
+                    origins=[contact.point for contact in contacts],
+                    vectors=[PUSH * contact.depth * contact.normal for contact in contacts],
+                    colors=[palette.FORCES["collision"]] * len(contacts),
+                    radii=0.002,
+                ),
+            )
+        self._touched, self._pairs = touched, pairs
+
+    def _log_markers(self, link: int) -> None:
+        markers = [marker for marker in self._robot.markers.values() if marker.link == link]
+        self._log(
+            ["robot", self._robot.links[link], "markers"],
+            rr.Arrows3D(
+                origins=[marker.position for marker in markers],
+                vectors=[NORMAL * marker.normal for marker in markers],
+                colors=[palette.MARKER] * len(markers),
+                labels=[marker.name for marker in markers],
+                radii=0.002,
+            ),
+        )
+
+    def _drawn(self, shape: Shape) -> rr.AsComponents:
+        return drawn(shape.kind, shape.size, shape.position, shape.rotation, self._color(shape, False), shape.vertices)
+
+    def _color(self, shape: Shape, touched: bool) -> Rgba:
+        if shape.role == "field":
+            return palette.TOUCHED if touched else palette.FIELD
+        return palette.COLLIDING if touched else (*self._parts.get(shape.part, palette.SOLIDS[0]), 255)
+
+    def _path(self, shape: Shape) -> list[object]:
+        return ["robot", self._robot.links[shape.link], f"{shape.role}s", shape.name]
+
+    def _log(self, path: list[object], what: rr.AsComponents) -> None:
+        """Once and for ever, but for colours: those are said again, at the beginning."""
+        self._stream.set_time(TIMELINE, duration=0.0)
+        self._stream.log(path, what)
+
+    def _columns(self, path: list[object], times: Array, columns: rr.ComponentColumnList) -> None:
+        self._stream.send_columns(rr.new_entity_path(path), [rr.TimeColumn(TIMELINE, duration=times)], columns)
