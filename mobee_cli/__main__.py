@@ -22,6 +22,7 @@ VERBS = {
     "router": "only the router, when each service runs by itself",
     "robots": "robots and worlds that come with mobee",
     "experiment": "claims of the papers, measured: list, run, figure",
+    "bench": "how fast mobee is on this machine, beside its peers",
     "check": "what is wrong with a robot or world of your own",
     "view": "a robot's file as a picture that moves",
 }

@@ -1,0 +1,64 @@
+"""`mobee bench`: measure mobee on this machine, beside its peers."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from experiments.bench.mujoco_peer import MujocoMissing
+from experiments.options import positive_whole
+from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+
+_NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """One parser a benchmark."""
+    benches = parser.add_subparsers(dest="bench", required=True, metavar="model")
+    text = "The egocentric model beside MuJoCo and python-fcl, on one core, turn by turn: poses per second, and the same contacts."
+    model = benches.add_parser("model", help="the egocentric model beside MuJoCo and python-fcl", description=text, epilog=_NOTES)
+    model.add_argument("--objects", type=_objects, nargs="+", default=[0, 10, 100, 1000], metavar="N", help="boxes, 0 to 1000 each")
+    model.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
+    model.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, and 50 poses to compare")
+    model.add_argument("--figure", type=Path, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)")
+    model.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and print."""
+    try:
+        return _figure(arguments) if arguments.figure else _model(arguments)
+    except MujocoMissing as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+
+
+def _model(arguments: argparse.Namespace) -> int:
+    from experiments.bench.model import Settings, measure
+    from experiments.bench.model_report import report
+
+    amount = {"rounds": 5, "poses": 500, "compared_poses": 50} if arguments.quick else {}
+    if arguments.rounds:
+        amount["rounds"] = arguments.rounds
+    result = measure(Settings(boxes=tuple(sorted(set(arguments.objects))), **amount))
+    print(json.dumps(result, indent=2) if arguments.json else report(result))
+    return 0 if all(one["passed"] for one in result["requirements"] + result["agreement"]) else FAILED
+
+
+def _figure(arguments: argparse.Namespace) -> int:
+    from experiments.bench.model_cost import draw, measure
+    from experiments.matplotlib_figure import MatplotlibMissing
+
+    try:
+        curves = measure(arguments.rounds or (3 if arguments.quick else 9))
+        draw(curves, arguments.figure)
+    except MatplotlibMissing as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    print(json.dumps(curves, indent=2) if arguments.json else arguments.figure)
+    return 0
+
+
+def _objects(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text) <= 1000):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 1000")
+    return int(text)
