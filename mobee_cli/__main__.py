@@ -21,6 +21,7 @@ VERBS = {
     "topic": "what is said on the bus: list, echo, hz",
     "router": "only the router, when each service runs by itself",
     "robots": "robots and worlds that come with mobee",
+    "convert": "a robot from zero-position XML to URDF, or back",
     "experiment": "claims of the papers, measured: list, run, figure",
     "bench": "how fast mobee is on this machine, beside its peers",
     "check": "what is wrong with a robot or world of your own",

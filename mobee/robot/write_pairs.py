@@ -20,12 +20,15 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
         first, second = sorted(pair)
         elements.append(_element(robot.links, first, second, {"reason": reason}))
     for role, pairs in (("solid", robot.solid_pairs), ("field", robot.field_pairs)):
-        elements += _of_role(robot, role, pairs)
+        elements += role_elements(robot, role, pairs, own=True)
     return elements
 
 
-def _of_role(robot: Robot, role: str, pairs: Ints) -> list[ET.Element]:
-    """What still has to be left out of one role, given the pairs of links that are left out for both."""
+def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
+    """What still has to be left out of one role where the file's rule leaves out `untested`.
+
+    `own`: by that rule fields of one part are tested against each other too.
+    """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)
     wanted = np.zeros((len(robot.shapes),) * 2, dtype=bool)
@@ -36,6 +39,9 @@ def _of_role(robot: Robot, role: str, pairs: Ints) -> list[ET.Element]:
     for a, b in map(tuple, robot.untested):
         free[a, b] = free[b, a] = False
     extra = free[link[:, None], link] & (link[:, None] != link) & ~wanted  # tested by the file so far, but not by the robot
+    if role == "field" and not own:
+        part = np.array([robot.shapes[k].part for k in chosen])
+        extra &= part[:, None] != part
     elements = _parts(robot, role, chosen, wanted, extra)
     for a, b in combinations(range(len(robot.links)), 2):
         block = np.ix_(link == a, link == b)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.drives import Drive, drives_of
+from mobee.robot.number_text import degrees, number, numbers
 from mobee.robot.robot import Array, Clause, Joint, Motor, Robot, Shape
 from mobee.robot.write_pairs import ignore_elements
 from mobee.robot.xml_node import DEEPEST
@@ -46,8 +47,8 @@ def _motor(motor: Motor) -> ET.Element:
     low, high = motor.limits
     values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
     values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
-    angles = {name: _degrees(value) for name, value in values.items()}
-    return ET.Element("motor", {"name": motor.name} | angles | {"torque": _text(motor.max_torque)})
+    angles = {name: degrees(value) for name, value in values.items()}
+    return ET.Element("motor", {"name": motor.name} | angles | {"torque": number(motor.max_torque)})
 
 
 def _clause(robot: Robot, clause: Clause) -> ET.Element:
@@ -55,7 +56,7 @@ def _clause(robot: Robot, clause: Clause) -> ET.Element:
     for row, offset in zip(clause.a, clause.b, strict=True):
         used = np.flatnonzero(row)
         names = " ".join(robot.motors[k] for k in used)
-        ET.SubElement(element, "constraint", a=_texts(row[used]), q=names, b=_degrees(offset))
+        ET.SubElement(element, "constraint", a=numbers(row[used]), q=names, b=degrees(offset))
     return element
 
 
@@ -82,7 +83,7 @@ def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Eleme
     joint: Joint = robot.joints[index]
     motor = robot.motor_table[drive.motor]
     ends = drive.scale * motor.limits + drive.offset
-    text = _degrees if joint.kind == "revolute" else _text
+    text = degrees if joint.kind == "revolute" else number
     names = {"name": joint.name, "moves": robot.links[index + 1], "motor": motor.name}
     kind = {"type": "prismatic"} if joint.kind == "prismatic" else {}
     return ET.SubElement(into, "joint", names | kind | _vector("xyz", joint.axis) | {"minPos": text(ends[0]), "maxPos": text(ends[1])})
@@ -106,23 +107,23 @@ def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> 
     for marker in robot.markers.values():
         if marker.link == link:
             place = _vector(("px", "py", "pz"), marker.position - origin) | _vector(("nx", "ny", "nz"), marker.normal)
-            ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": _texts(marker.rotation.reshape(9))})
+            ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": numbers(marker.rotation.reshape(9))})
 
 
 def _volume(shape: Shape, origin: Array) -> dict[str, str]:
     place = _vector(("px", "py", "pz"), shape.position - origin)
     match shape.kind:
         case "sphere":
-            return {"radius": _text(shape.size[0])} | place
+            return {"radius": number(shape.size[0])} | place
         case "capsule" | "cylinder":
-            size = {"radius": _text(shape.size[0]), "height": _text(shape.size[1])}
+            size = {"radius": number(shape.size[0]), "height": number(shape.size[1])}
             return size | place | _vector(("hx", "hy", "hz"), shape.rotation[:, 2])
         case "box":
-            width, height, depth = map(_text, shape.size)
+            width, height, depth = map(number, shape.size)
             return {"width": width, "height": height, "depth": depth} | place | _turn(shape.rotation)
     if shape.vertices is None:
         raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
-    return {"points": _texts((shape.vertices @ shape.rotation.T).reshape(-1))} | place
+    return {"points": numbers((shape.vertices @ shape.rotation.T).reshape(-1))} | place
 
 
 def _turn(rotation: Array) -> dict[str, str]:
@@ -132,24 +133,8 @@ def _turn(rotation: Array) -> dict[str, str]:
         rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
         axis = rotation[:, 1]
     rest = align(Y, axis).T @ rotation
-    return _vector(("hx", "hy", "hz"), axis) | {"angle": _degrees(np.arctan2(rest[0, 2], rest[0, 0]))}
+    return _vector(("hx", "hy", "hz"), axis) | {"angle": degrees(np.arctan2(rest[0, 2], rest[0, 0]))}
 
 
 def _vector(names: tuple[str, str, str] | str, vector: Array) -> dict[str, str]:
-    return {name: _text(value) for name, value in zip(names, vector, strict=True)}
-
-
-def _texts(values: Array) -> str:
-    return " ".join(map(_text, values))
-
-
-def _degrees(value: float) -> str:
-    """The angle in degrees, rounded where that reads back as exactly the same radians."""
-    degrees = float(np.rad2deg(value))
-    rounded = round(degrees, 9)
-    return _text(rounded if np.deg2rad(rounded) == value else degrees)
-
-
-def _text(value: float) -> str:
-    """The shortest text that reads back as exactly this number."""
-    return repr(float(value)) if value % 1 or abs(value) > 1e15 else str(int(value))
+    return {name: number(value) for name, value in zip(names, vector, strict=True)}

@@ -29,6 +29,7 @@ class PairRules:
     links: dict[str, int]  # URDF link -> link of the robot
     adjacent: dict[LinkPair, str]
     srdf: Srdf
+    own: bool = False  # fields of one part are tested against each other too
 
 
 def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
@@ -57,7 +58,7 @@ def shape_pairs(shapes: Sequence[Shape], owners: Sequence[str], role: str, rules
         near[a, b] = near[b, a] = True
     tested = (link[:, None] != link) & ~disabled[owner[:, None], owner]
     tested &= ~near[link[:, None], link] | _matrix(rules.srdf.enabled, names)[owner[:, None], owner]
-    if role == "field":
+    if role == "field" and not rules.own:
         parts = {shape.part: k for k, shape in enumerate(shapes)}
         part = np.array([parts[shapes[index].part] for index in chosen], dtype=np.intp)
         tested &= part[:, None] != part

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -23,28 +24,45 @@ LARGEST = 1e4  # m
 CLOSE = 1e-9  # m, for the ends of a cylinder that carries two spheres as caps
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A shape, where it was read, and whether it stands on the world."""
+
+    node: Node
+    shape: Shape
+    base: bool
+
+
 @dataclass(slots=True, eq=False)
 class ShapeReader:
     """Reads the shapes of one robot; each mesh file is opened once."""
 
     meshes: Meshes
-    known: dict[tuple[Path, tuple[float, ...]], Array]
+    parts: Collection[str]
+    known: dict[tuple[Path, tuple[float, ...]], Array] = field(default_factory=dict)
 
-    def read(self, link: Node, index: int, frame: Frame, part: str) -> list[tuple[Node, Shape]]:
+    def read(self, link: Node, index: int, frame: Frame, part: str) -> list[Found]:
         """The solids of a <link>, and the fields that `write_urdf` noted; `frame`: the link's at zero pose, root frame."""
-        name = link.text("name")
-        found: list[tuple[Node, Shape]] = []
+        found: list[Found] = []
         for node in link:
             if node.tag not in LINK_TAGS and nearest(node.tag, LINK_TAGS):
                 node.warn(f"unknown tag is ignored. {nearest(node.tag, LINK_TAGS)}")
-            noted = node.tag == "mobee" and "field" in node.attributes
-            if node.tag != "collision" and not noted:
-                continue
-            place = frame @ read_origin(node)
-            called = node.text("field") if noted else node.optional("name") or name
-            shape = Shape(called, index, "sphere", (), place.position, place.rotation, "field" if noted else "solid", part)
-            found.append((node, self._shaped(node, shape)))
+            if node.tag == "collision":
+                found.append(self._read(node, node.optional("name") or link.text("name"), child(node, "mobee"), index, frame, part))
+            elif node.tag == "mobee" and "field" in node.attributes:
+                one = self._read(node, node.text("field"), node, index, frame, part)
+                found.append(replace(one, shape=replace(one.shape, role="field")))
         return _capsules(found)
+
+    def _read(self, node: Node, name: str, note: Node | None, link: int, frame: Frame, part: str) -> Found:
+        base = link == 0
+        if note is not None:
+            note.check_attributes({"field", "part", "base"})
+            part = note.choice("part", note.optional("part") or part, self.parts, "part")
+            base = note.flag("base", default=base)
+        place = frame @ read_origin(node)
+        shape = Shape(name, link, "sphere", (), place.position, place.rotation, "solid", part)
+        return Found(node, self._shaped(node, shape), base)
 
     def _shaped(self, node: Node, shape: Shape) -> Shape:
         geometry = child(node, "geometry")
@@ -97,21 +115,22 @@ def _length(form: Node, name: str) -> float:
     return value
 
 
-def _capsules(found: list[tuple[Node, Shape]]) -> list[tuple[Node, Shape]]:
+def _capsules(found: list[Found]) -> list[Found]:
     """URDF has no capsule of its own, so a cylinder with a sphere of its radius at either end is one."""
-    spheres = [(k, shape) for k, (_, shape) in enumerate(found) if shape.kind == "sphere"]
+    spheres = [k for k, one in enumerate(found) if one.shape.kind == "sphere"]
     caps: set[int] = set()
     merged = []
-    for node, shape in found:
+    for one in found:
+        shape = one.shape
         if shape.kind == "cylinder":
             radius, height = shape.size
             ends = [shape.position + side * height / 2.0 * shape.rotation[:, 2] for side in (1.0, -1.0)]
-            at_ends = [[k for k, s in spheres if s.role == shape.role and _is_cap(s, radius, end)] for end in ends]
+            at_ends = [[k for k in spheres if found[k].shape.role == shape.role and _is_cap(found[k].shape, radius, end)] for end in ends]
             if all(at_ends):
                 caps |= {at_ends[0][0], at_ends[1][0]}
                 shape = replace(shape, kind="capsule")
-        merged.append((node, shape))
-    return [entry for k, entry in enumerate(merged) if k not in caps]
+        merged.append(replace(one, shape=shape))
+    return [one for k, one in enumerate(merged) if k not in caps]
 
 
 def _is_cap(sphere: Shape, radius: float, end: Array) -> bool:
@@ -120,18 +139,18 @@ def _is_cap(sphere: Shape, radius: float, end: Array) -> bool:
 
 def grown(shape: Shape, by: float, name: str) -> Shape:
     """The field around a solid that reaches `by` [m] farther; around a mesh it is a capsule."""
-    field = replace(shape, name=name, role="field")
+    around = replace(shape, name=name, role="field")
     match shape.kind:
         case "sphere" | "capsule":
-            return replace(field, size=(shape.size[0] + by, *shape.size[1:]))
+            return replace(around, size=(shape.size[0] + by, *shape.size[1:]))
         case "cylinder":
-            return replace(field, size=(shape.size[0] + by, shape.size[1] + 2 * by))
+            return replace(around, size=(shape.size[0] + by, shape.size[1] + 2 * by))
         case "box":
-            return replace(field, size=tuple(edge + 2 * by for edge in shape.size))
+            return replace(around, size=tuple(edge + 2 * by for edge in shape.size))
     vertices = shape.vertices
     if vertices is None:
         raise ValueError(f"the convex shape {shape.name!r} has no vertices")
     fit = smallest_capsule(vertices)
     place = Frame(shape.position, shape.rotation) @ Frame(fit.centre, fit.rotation)
     size = (fit.size[0] + by, fit.size[1])
-    return replace(field, kind="capsule", size=size, position=place.position, rotation=place.rotation, vertices=None)
+    return replace(around, kind="capsule", size=size, position=place.position, rotation=place.rotation, vertices=None)

@@ -1,0 +1,91 @@
+"""A URDF's tree laid out at zero pose: links, joints and markers in the root frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mobee.robot.robot import Array, Joint, Marker
+from mobee.robot.urdf.frames import IDENTITY, Frame, child, triple
+from mobee.robot.urdf.motors import joint_limits
+from mobee.robot.urdf.tree import Tree, UrdfJoint
+from mobee.robot.xml_node import Node
+from mobee.robot.xml_volume import Z, turn_about
+
+
+@dataclass(slots=True, eq=False)
+class Skeleton:
+    """The tree laid out at zero pose; the links of fixed joints have become part of what carries them."""
+
+    links: list[str]
+    index: dict[str, int]  # URDF link -> link of the robot
+    frames: dict[str, Frame]  # URDF link -> its frame, root frame
+    joints: list[Joint] = field(default_factory=list)
+    moving: list[UrdfJoint] = field(default_factory=list)
+    marked: list[str] = field(default_factory=list)  # links that become markers
+
+
+def lay_out(tree: Tree) -> Skeleton:
+    """The skeleton of a tree; joints without play become part of what carries them."""
+    skeleton = Skeleton([tree.root], {tree.root: 0}, {tree.root: IDENTITY})
+    for joint in tree.walk():
+        frame = skeleton.frames[joint.parent] @ joint.origin
+        parent = skeleton.index[joint.parent]
+        held = IDENTITY if joint.kind == "fixed" else _locked(joint)
+        if held is not None:
+            skeleton.frames[joint.child] = frame @ held
+            skeleton.index[joint.child] = parent
+            skeleton.marked.append(joint.child)
+            continue
+        axis = frame.rotation @ joint.axis
+        kind: Literal["revolute", "prismatic"] = "prismatic" if joint.kind == "prismatic" else "revolute"
+        skeleton.joints.append(Joint(joint.name, parent, kind, axis / np.linalg.norm(axis), frame.position, np.zeros(2)))
+        skeleton.moving.append(joint)
+        skeleton.links.append(joint.child)
+        skeleton.frames[joint.child] = frame
+        skeleton.index[joint.child] = len(skeleton.joints)
+        if joint.child not in tree.below:
+            skeleton.marked.append(joint.child)
+    return skeleton
+
+
+def _locked(joint: UrdfJoint) -> Frame | None:
+    """Where a joint whose limits leave it one place holds what it carries; None for one that moves."""
+    if child(joint.node, "mimic") is not None or child(joint.node, "limit") is None:
+        return None
+    low, high = joint_limits(joint)
+    if high > low:
+        return None
+    joint.node.warn(f"joint {joint.name!r} has lower = upper = {low:g}, so it is fixed there")
+    return Frame(low * joint.axis, np.eye(3)) if joint.kind == "prismatic" else Frame(np.zeros(3), turn_about(joint.axis, low))
+
+
+def read_markers(tree: Tree, skeleton: Skeleton, where: dict[tuple[str, str], str]) -> Iterator[Marker]:
+    """A marker for the frame of every link that a fixed joint holds, and of every link at an end of the tree."""
+    notes = {link: note for link in skeleton.marked for note in tree.links[link] if note.tag == "mobee" and "marker" in note.attributes}
+    taken: set[str] = set()
+    for link in sorted(skeleton.marked, key=lambda name: name not in notes):  # names that write_urdf noted come first
+        node, frame = notes.get(link, tree.links[link]), skeleton.frames[link]
+        name = node.text("marker") if link in notes else link
+        if name in taken and link in notes:
+            node.fail("marker", f"a second marker {name!r}", "Rename one of the two")
+        if name in taken:
+            continue
+        taken.add(name)
+        where["marker", name] = f"{node.file}:{node.line}"
+        normal = frame.rotation @ (_normal(node) if link in notes else Z)
+        yield Marker(name, skeleton.index[link], frame.position, frame.rotation, normal)
+
+
+def _normal(note: Node) -> Array:
+    """The direction that `write_urdf` noted, in the link's frame; z where there is none."""
+    if "normal" not in note.attributes:
+        return Z
+    normal = triple(note, "normal")
+    length = float(np.linalg.norm(normal))
+    if length < 1e-9:
+        note.fail("normal", "has no length", "Write a direction in the link's frame, such as 0 0 1")
+    return normal / length
