@@ -1,0 +1,37 @@
+"""Runs a coverage-guided fuzzer (atheris) on one reader; see README.md."""
+
+from __future__ import annotations
+
+import random
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import atheris
+
+from tests.fuzz.mutations import mutated
+
+SECONDS = 5  # an input that takes longer is a finding
+
+
+def fuzz(feed: Callable[[bytes, Path], bool], seeds: list[bytes], names: list[str]) -> None:
+    """Feed what libFuzzer makes of the seeds to `feed` until it raises; options of libFuzzer are read from the command line."""
+    with tempfile.TemporaryDirectory() as folder:
+        corpus, work = Path(folder) / "corpus", Path(folder) / "work"
+        corpus.mkdir()
+        work.mkdir()
+        for index, seed in enumerate(seeds):
+            (corpus / str(index)).write_bytes(seed)
+
+        def mutate(data: bytes, max_size: int, seed: int) -> bytes:
+            rng = random.Random(seed)
+            if rng.random() < 0.3:
+                return bytes(atheris.Mutate(data, max_size))
+            return mutated(data.decode("utf-8", "surrogateescape"), rng, names).encode("utf-8", "surrogateescape")[:max_size]
+
+        def one(data: bytes) -> None:
+            feed(data, work)
+
+        atheris.Setup([*sys.argv, f"-timeout={SECONDS}", "-max_len=8192", str(corpus)], one, custom_mutator=mutate)
+        atheris.Fuzz()
