@@ -26,8 +26,9 @@ from mobee.engine.pack import (
     UInts,
 )
 from mobee.engine.place import bound_clusters, place_shapes, settle_slots
-from mobee.engine.rows import NUMBERS, REALS, find_contacts, push_links, sort_rows
+from mobee.engine.rows import NUMBERS, REALS, append_rows, find_contacts, push_links, sort_rows
 from mobee.engine.scene import CELLS, COUNT, W_START
+from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
 
 _ROW, _LINK = np.uint64(ROW), np.uint64(12)
@@ -97,13 +98,12 @@ def contacts(
         bound_clusters(integers, slots, x, y, z, balls)
         pairs = own_pairs(integers, floats, slots, x, y, z, balls, first, second)
         pairs = world_pairs(integers, slots, balls, world, places, near, near_slot, first, second, pairs)
+        pairs = sieve(slots, first, second, pairs)
         count = find_contacts(
             integers, vertices, world, carried, own_shapes, reaching, slots, first, second, pairs, out, found_numbers, found_reals
         )
         if count == np.uint64(0):
             continue
-        push_links(found_numbers, found_reals, count, wrench)
-        project(integers, floats, frames, wrench, cut, torques, b * q.shape[1])
         rows = np.int64(count)
         if used + rows > room:
             room = 2 * room + rows
@@ -111,13 +111,9 @@ def contacts(
             wider[: used * NUMBERS], taller[: used * REALS] = numbers[: used * NUMBERS], reals[: used * REALS]
             numbers, reals = wider, taller
         sort_rows(found_numbers, rows, keys, order)
-        for c in range(rows):
-            n, r = (used + c) * NUMBERS, (used + c) * REALS
-            numbers[n] = b
-            for k in range(1, NUMBERS):
-                numbers[n + k] = found_numbers[order[c] * NUMBERS + k]
-            for k in range(REALS):
-                reals[r + k] = found_reals[order[c] * REALS + k]
+        append_rows(b, found_numbers, found_reals, order, rows, numbers, reals, used)
+        push_links(numbers, reals, used, rows, wrench)  # in the order of the rows: the sum does not depend on how they were found
+        project(integers, floats, frames, wrench, cut, torques, b * q.shape[1])
         used += rows
     return numbers[: used * NUMBERS], reals[: used * REALS], torque
 

@@ -17,10 +17,11 @@ ROW_KIND, ROW_POSITION, ROW_ROTATION, ROW_HALF, ROW_BOUND = 0, 1, 4, 13, 16
 ROW = 17
 
 # A slot of a pose, root frame: centre (3), rotation (9, row-major), half sizes (3), half core segment (3), radius about the core,
-# radius of the enclosing sphere, kind.  Half sizes: sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges;
-# convex (first vertex, number of vertices, 0).  The core is the axis of a capsule or cylinder, else zero.
-CENTER, ROTATION, HALF, CORE, RADIUS, BOUND, KIND = 0, 3, 12, 15, 18, 19, 20
-SLOT = 24  # 21 used; three cache lines
+# radius of the enclosing sphere, kind, square of the half core's length and its inverse (0 without a core).  Half sizes: sphere
+# (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges; convex (first vertex, number of vertices, 0).  The core is
+# the axis of a capsule or cylinder.
+CENTER, ROTATION, HALF, CORE, RADIUS, BOUND, KIND, LENGTH, INVERSE = 0, 3, 12, 15, 18, 19, 20, 21, 22
+SLOT = 24  # 23 used; three cache lines
 
 
 class Volume(Protocol):

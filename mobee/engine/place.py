@@ -15,7 +15,9 @@ from mobee.engine.layout import (
     CORE,
     CYLINDER,
     HALF,
+    INVERSE,
     KIND,
+    LENGTH,
     RADIUS,
     ROTATION,
     ROW,
@@ -34,6 +36,7 @@ _SLOT, _ROW, _LINK = np.uint64(SLOT), np.uint64(ROW), np.uint64(12)
 _1, _2, _3, _4, _5, _6 = (np.uint64(k) for k in range(1, 7))
 _7, _8, _9, _10, _11 = (np.uint64(k) for k in range(7, 12))
 _CENTER, _ROTATION, _HALF, _CORE, _RADIUS, _BOUND, _KIND = (np.uint64(k) for k in (CENTER, ROTATION, HALF, CORE, RADIUS, BOUND, KIND))
+_LENGTH, _INVERSE = np.uint64(LENGTH), np.uint64(INVERSE)
 _ROW_KIND, _ROW_POSITION, _ROW_ROTATION, _ROW_HALF, _ROW_BOUND = (
     np.uint64(k) for k in (ROW_KIND, ROW_POSITION, ROW_ROTATION, ROW_HALF, ROW_BOUND)
 )
@@ -91,6 +94,8 @@ def settle_slots(rows: Array, start: np.uint64, first: np.uint64, count: np.uint
         slots[at + _RADIUS] = rows[r + _ROW_HALF] if kind < BOX else 0.0
         slots[at + _BOUND] = rows[r + _ROW_BOUND]
         slots[at + _KIND] = kind
+        squared = rows[r + _ROW_HALF + _1] ** 2 if long else 0.0
+        slots[at + _LENGTH], slots[at + _INVERSE] = squared, 1.0 / squared if squared > 0.0 else 0.0
 
 
 @inner

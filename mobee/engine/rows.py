@@ -49,36 +49,52 @@ def find_contacts(
     reals: Array,
 ) -> np.uint64:
     """Write a contact for every pair that overlaps to the rows of `numbers` and `reals`; returns how many."""
-    shapes, link, name, role = integers[SHAPES], integers[I_LINK], integers[I_NAME], integers[I_ROLE]
-    cells = world[CELLS] * world[CELLS + 1] * world[CELLS + 2]
-    order = np.uint64(W_START) + cells + _1
-    target = order + world[COUNT]
     found = _0
     for p in range(pairs):
         a, b = first[p], second[p]
         depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
-        if not depth > 0.0:
-            continue
-        i, j = a // _SLOT, b // _SLOT
-        n, r = found * _NUMBERS, found * _REALS
-        numbers[n + _1] = integers[role + i] | (integers[role + j] if j < shapes else _0)  # a carried object meets fields too
-        numbers[n + np.uint64(2)] = _name(integers, name, i, own_shapes, carried)
-        numbers[n + np.uint64(4)] = integers[link + i]
-        if j < shapes:
-            numbers[n + np.uint64(3)] = _name(integers, name, j, own_shapes, carried)
-            numbers[n + np.uint64(5)] = integers[link + j]
-            if numbers[n + np.uint64(3)] < numbers[n + np.uint64(2)]:
-                _swap(numbers, n, out)
-        else:
-            if world[target + (j - shapes)] == _1 and np.int64(integers[link + i]) == reaching:
-                continue
-            numbers[n + np.uint64(3)] = own_shapes + np.int64(world[order + (j - shapes)])
-            numbers[n + np.uint64(5)] = -1
-        reals[r] = depth
-        for k in range(np.uint64(6)):
-            reals[r + _1 + k] = out[k]
-        found += _1
+        if depth > 0.0:
+            found += write_contact(integers, world, carried, own_shapes, reaching, a, b, depth, out, numbers, reals, found)
     return found
+
+
+@inner
+def write_contact(
+    integers: UInts,
+    world: UInts,
+    carried: Ints,
+    own_shapes: int,
+    reaching: int,
+    a: np.uint64,
+    b: np.uint64,
+    depth: float,
+    out: Array,
+    numbers: Ints,
+    reals: Array,
+    row: np.uint64,
+) -> np.uint64:
+    """Write the contact of the slots at a and b to a row; returns 1, or 0 if a target is spared by the link that reaches."""
+    shapes, link, name, role = integers[SHAPES], integers[I_LINK], integers[I_NAME], integers[I_ROLE]
+    i, j = a // _SLOT, b // _SLOT
+    n, r = row * _NUMBERS, row * _REALS
+    numbers[n + _1] = integers[role + i] | (integers[role + j] if j < shapes else _0)  # a carried object meets fields too
+    numbers[n + np.uint64(2)] = _name(integers, name, i, own_shapes, carried)
+    numbers[n + np.uint64(4)] = integers[link + i]
+    if j < shapes:
+        numbers[n + np.uint64(3)] = _name(integers, name, j, own_shapes, carried)
+        numbers[n + np.uint64(5)] = integers[link + j]
+        if numbers[n + np.uint64(3)] < numbers[n + np.uint64(2)]:
+            _swap(numbers, n, out)
+    else:
+        order = np.uint64(W_START) + world[CELLS] * world[CELLS + 1] * world[CELLS + 2] + _1
+        if world[order + world[COUNT] + (j - shapes)] == _1 and np.int64(integers[link + i]) == reaching:
+            return _0
+        numbers[n + np.uint64(3)] = own_shapes + np.int64(world[order + (j - shapes)])
+        numbers[n + np.uint64(5)] = -1
+    reals[r] = depth
+    for k in range(np.uint64(6)):
+        reals[r + _1 + k] = out[k]
+    return _1
 
 
 @inner
@@ -102,9 +118,23 @@ def sort_rows(numbers: Ints, count: int, keys: Ints, order: Ints) -> None:
 
 
 @inner
-def push_links(numbers: Ints, reals: Array, count: np.uint64, wrench: Array) -> None:
-    """Add depth * normal of every field contact to its first link, and the opposite to its second."""
+def append_rows(
+    pose: int, found_numbers: Ints, found_reals: Array, order: Ints, count: int, numbers: Ints, reals: Array, used: int
+) -> None:
+    """Copy the rows of one pose, in order, behind the `used` rows of the poses before."""
     for c in range(count):
+        n, r = (used + c) * NUMBERS, (used + c) * REALS
+        numbers[n] = pose
+        for k in range(1, NUMBERS):
+            numbers[n + k] = found_numbers[order[c] * NUMBERS + k]
+        for k in range(REALS):
+            reals[r + k] = found_reals[order[c] * REALS + k]
+
+
+@inner
+def push_links(numbers: Ints, reals: Array, used: int, count: int, wrench: Array) -> None:
+    """Add depth * normal of every field contact of rows used .. used + count - 1 to its first link, and the opposite to its second."""
+    for c in range(np.uint64(used), np.uint64(used + count)):
         n, r = c * _NUMBERS, c * _REALS
         if numbers[n + _1] != 1:
             continue
