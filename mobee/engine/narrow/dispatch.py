@@ -8,13 +8,14 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.box_box import box_box
+from mobee.engine.narrow.cylinder import sphere_cylinder
 from mobee.engine.narrow.difference import FRAME, relative, rounding
-from mobee.engine.narrow.features import BOX, CAPSULE, CONVEX, SPHERE
+from mobee.engine.narrow.features import BOX, CAPSULE, CYLINDER, SPHERE
 from mobee.engine.narrow.general import general
 from mobee.engine.narrow.gjk import closest
 from mobee.engine.narrow.rounded import capsule_capsule, sphere_capsule, sphere_sphere
 from mobee.engine.narrow.rounded_box import capsule_box, capsule_box_distance, sphere_box
-from mobee.engine.narrow.slots import KIND, turn_round
+from mobee.engine.narrow.slots import KIND
 from mobee.robot.robot import Array
 
 
@@ -26,30 +27,24 @@ def overlap(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     out[:3] is the unit normal (moving a by depth * normal separates them, and no way is shorter) and out[3:6] the point midway
     between the two deepest points, root frame.
     """
-    if P[np.uint64(a) + KIND] <= P[np.uint64(b) + KIND]:
-        return _ordered(P, a, b, V, out)
-    depth = _ordered(P, b, a, V, out)
-    if depth > 0.0:
-        turn_round(out)
-    return depth
-
-
-@inner
-def _ordered(P: Array, a: int, b: int, V: Array, out: Array) -> float:
-    """The first of a kind not after the second's."""
+    turned = P[np.uint64(a) + KIND] > P[np.uint64(b) + KIND]
+    if turned:
+        a, b = b, a
     first, second = P[np.uint64(a) + KIND], P[np.uint64(b) + KIND]
-    if second == SPHERE:
-        return sphere_sphere(P, a, b, V, out)
-    if second == CAPSULE:
-        return sphere_capsule(P, a, b, V, out) if first == SPHERE else capsule_capsule(P, a, b, V, out)
-    if second == BOX:
-        if first == SPHERE:
-            return sphere_box(P, a, b, V, out)
+    if second <= CAPSULE:
         if first == CAPSULE:
-            return capsule_box(P, a, b, V, out)
-        if first == BOX:
-            return box_box(P, a, b, V, out)
-    return general(P, a, b, V, out)
+            depth = capsule_capsule(P, a, b, V, out)
+        else:
+            depth = sphere_capsule(P, a, b, V, out) if second == CAPSULE else sphere_sphere(P, a, b, V, out)
+    elif second == BOX and first <= CAPSULE:
+        depth = sphere_box(P, a, b, V, out) if first == SPHERE else capsule_box(P, a, b, V, out)
+    elif first == BOX and second == BOX:
+        depth = box_box(P, a, b, V, out)
+    else:
+        depth = general(P, a, b, V, out)
+    if turned and depth > 0.0:
+        out[0], out[1], out[2] = -out[0], -out[1], -out[2]
+    return depth
 
 
 @inner
@@ -59,10 +54,17 @@ def distance(P: Array, a: int, b: int, V: Array) -> float:
         a, b = b, a
     i, j = np.uint64(a), np.uint64(b)
     first, second = P[i + KIND], P[j + KIND]
-    if first == CAPSULE and second == BOX:
-        return capsule_box_distance(P, a, b)
-    if second <= CAPSULE or first == SPHERE and second != CONVEX:
-        return max(-_ordered(P, a, b, V, np.empty(6)), 0.0)
-    frame = np.empty(FRAME)
-    relative(P, i, j, frame)
-    return max(closest(P, i, j, V, frame, math.inf)[0] - rounding(P, i) - rounding(P, j), 0.0)
+    if first == SPHERE and second == BOX:
+        apart = -sphere_box(P, a, b, V, np.empty(6))
+    elif first == SPHERE and second == CYLINDER:
+        apart = -sphere_cylinder(P, a, b, V, np.empty(6))
+    elif second <= CAPSULE:
+        # A sphere is a capsule without length.
+        apart = -capsule_capsule(P, a, b, V, np.empty(6))
+    elif first == CAPSULE and second == BOX:
+        apart = capsule_box_distance(P, a, b)
+    else:
+        frame = np.empty(FRAME)
+        relative(P, i, j, frame)
+        apart = closest(P, i, j, V, frame, math.inf)[0] - rounding(P, i) - rounding(P, j)
+    return max(apart, 0.0)

@@ -13,12 +13,15 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.difference import farthest
-from mobee.engine.narrow.slots import TIE, Offset, Vector
-from mobee.robot.robot import Array, Ints
+from mobee.engine.narrow.slots import FOUR, ONE, SIX, THREE, TIE, TWO, ZERO, Offset, Vector, vector
+from mobee.robot.robot import Array
+
+Indices = np.ndarray[tuple[int], np.dtype[np.uint64]]
 
 _STEPS = 124
 _CORNERS = _STEPS + 4
 _FACES = 2 * _CORNERS
+_FULL = np.uint64(_FACES - 8)
 _EXACT = 1e-12  # m, for volumes of up to a metre: the bounds have met
 
 
@@ -28,165 +31,143 @@ def way_out(P: Array, i: Offset, j: Offset, V: Array, frame: Array, shortest: fl
 
     A `way` that is known already, with its reach, stays unless another is shorter by more than TIE.
     """
-    corners, planes, faces, edges = np.empty(3 * _CORNERS), np.empty(4 * _FACES), np.empty(3 * _FACES, np.int64), np.empty(3 * _FACES, np.int64)
-    size, flat = _tetrahedron(P, i, j, V, frame, corners)
-    if size == 0.0:
-        reach = _reach(P, i, j, V, frame, flat)
-        return (reach, flat) if reach < shortest - TIE else (shortest, way)
+    corners, planes = np.empty(3 * _CORNERS), np.empty(4 * _FACES)
+    faces, edges = np.empty(3 * _FACES, np.uint64), np.empty(6 * _FACES, np.uint64)
+    size, (x, y, z) = _tetrahedron(P, i, j, V, frame, corners)
     exact = _EXACT * max(size, 1.0)
-    count, used = 4, 4
-    for face in range(4):
-        a, b, c = (0, 1, 2) if face == 0 else (1, 0, 3) if face == 1 else (2, 1, 3) if face == 2 else (0, 2, 3)
-        _face(corners, planes, faces, face, a, b, c)
+    used = ZERO
+    for face in range(FOUR):
+        a, b = face % THREE, (face + ONE) % THREE
+        # 0 1 2, then 2 1 3, 0 2 3 and 1 0 3.
+        used = _add_face(corners, planes, faces, used, ZERO if face == ZERO else b, ONE if face == ZERO else a, TWO if face == ZERO else THREE)
     best, found = math.inf, way
-    for _ in range(_STEPS):
-        face = _least(planes, used)
-        x, y, z, low = planes[4 * face], planes[4 * face + 1], planes[4 * face + 2], planes[4 * face + 3]
-        px, py, pz = farthest(P, i, j, V, frame, x, y, z)
-        reach = x * px + y * py + z * pz
+    low = -math.inf
+    for count in range(FOUR, np.uint64(_CORNERS)):
+        if size > 0.0:
+            face = _least(planes, used)
+            x, y, z = vector(planes, face * FOUR)
+            low = planes[face * FOUR + THREE]
+        p = farthest(P, i, j, V, frame, x, y, z)
+        reach = x * p[0] + y * p[1] + z * p[2]
         if reach < best:
             best, found = reach, (x, y, z)
-        if best <= 0.0 or best - low <= exact or shortest - TIE <= low or reach - low <= exact:
+        if size == 0.0 or best <= 0.0 or min(best, shortest - TIE, reach) - low <= exact or used > _FULL:
             break
-        corners[3 * count], corners[3 * count + 1], corners[3 * count + 2] = px, py, pz
+        corners[count * THREE], corners[count * THREE + ONE], corners[count * THREE + TWO] = p
         used = _expand(corners, planes, faces, edges, used, count, exact)
-        count += 1
-        if used > _FACES - 8:
-            break
     return (best, found) if best < shortest - TIE else (shortest, way)
 
 
 @inner
-def _reach(P: Array, i: Offset, j: Offset, V: Array, frame: Array, n: Vector) -> float:
-    x, y, z = farthest(P, i, j, V, frame, n[0], n[1], n[2])
-    return n[0] * x + n[1] * y + n[2] * z
-
-
-@inner
-def _least(planes: Array, used: int) -> int:
-    """The face that is closest to the origin; of equals the oldest."""
-    face, least = 0, math.inf
-    for k in range(np.uint64(used)):
-        low = planes[k * np.uint64(4) + np.uint64(3)]
+def _least(planes: Array, used: Offset) -> Offset:
+    """The face that is closest to the origin."""
+    face, least = ZERO, math.inf
+    for k in range(used):
+        low = planes[k * FOUR + THREE]
         if low < least - 0.01 * _EXACT:
-            face, least = np.int64(k), low
+            face, least = k, low
     return face
 
 
 @inner
-def _face(corners: Array, planes: Array, faces: Ints, at: int, a: int, b: int, c: int) -> None:
-    """Write the face a, b, c (seen from outside against the clock) and its plane; one without area is never the closest."""
-    faces[3 * at], faces[3 * at + 1], faces[3 * at + 2] = a, b, c
-    ax, ay, az = corners[3 * a], corners[3 * a + 1], corners[3 * a + 2]
-    ux, uy, uz = corners[3 * b] - ax, corners[3 * b + 1] - ay, corners[3 * b + 2] - az
-    vx, vy, vz = corners[3 * c] - ax, corners[3 * c + 1] - ay, corners[3 * c + 2] - az
+def _add_face(corners: Array, planes: Array, faces: Indices, used: Offset, a: Offset, b: Offset, c: Offset) -> Offset:
+    """Add the face a, b, c (against the clock, seen from outside); one without area is never the closest.  How many then."""
+    ax, ay, az = vector(corners, a * THREE)
+    bx, by, bz = vector(corners, b * THREE)
+    cx, cy, cz = vector(corners, c * THREE)
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = math.sqrt(x * x + y * y + z * z)
-    if length > 1e-14 * math.sqrt((ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)) and length > 0.0:
+    squared, low = x * x + y * y + z * z, math.inf
+    if squared > 1e-28 * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz):
+        length = math.sqrt(squared)
         x, y, z = x / length, y / length, z / length
         low = x * ax + y * ay + z * az
-    else:
-        x, y, z, low = 0.0, 0.0, 0.0, math.inf
-    planes[4 * at], planes[4 * at + 1], planes[4 * at + 2], planes[4 * at + 3] = x, y, z, low
+    at, plane = used * THREE, used * FOUR
+    faces[at], faces[at + ONE], faces[at + TWO] = a, b, c
+    planes[plane], planes[plane + ONE], planes[plane + TWO], planes[plane + THREE] = x, y, z, low
+    return used + ONE
 
 
 @inner
-def _expand(corners: Array, planes: Array, faces: Ints, edges: Ints, used: int, new: int, exact: float) -> int:
+def _expand(corners: Array, planes: Array, faces: Indices, edges: Indices, used: Offset, new: Offset, exact: float) -> Offset:
     """Take away the faces that see the new corner, and span new ones from it to the edge of the hole; how many faces then."""
-    x, y, z = corners[3 * new], corners[3 * new + 1], corners[3 * new + 2]
-    open_edges = 0
-    face = 0
+    px, py, pz = vector(corners, new * THREE)
+    rim, face = ZERO, ZERO
     while face < used:
-        k = np.uint64(4 * face)
-        if planes[k] * x + planes[k + np.uint64(1)] * y + planes[k + np.uint64(2)] * z - planes[k + np.uint64(3)] > 0.1 * exact:
-            for side in range(3):
-                a, b = faces[3 * face + side], faces[3 * face + (side + 1) % 3]
-                open_edges = _toggle(edges, open_edges, a, b)
-            used -= 1
-            for m in range(3):
-                faces[3 * face + m] = faces[3 * used + m]
-            for m in range(4):
-                planes[4 * face + m] = planes[4 * used + m]
+        x, y, z = vector(planes, face * FOUR)
+        if x * px + y * py + z * pz - planes[face * FOUR + THREE] > 0.1 * exact:
+            at = face * THREE
+            for side in range(THREE):
+                rim = _toggle(edges, rim, faces[at + side], faces[at + (side + ONE if side < TWO else ZERO)])
+            used -= ONE
+            for k in range(THREE):
+                faces[at + k] = faces[used * THREE + k]
+            for k in range(FOUR):
+                planes[face * FOUR + k] = planes[used * FOUR + k]
         else:
-            face += 1
-    for edge in range(open_edges):
-        if used < _FACES:
-            _face(corners, planes, faces, used, edges[2 * edge], edges[2 * edge + 1], new)
-            used += 1
+            face += ONE
+    for edge in range(min(rim, np.uint64(_FACES) - used)):
+        used = _add_face(corners, planes, faces, used, edges[edge * TWO], edges[edge * TWO + ONE], new)
     return used
 
 
 @inner
-def _toggle(edges: Ints, count: int, a: int, b: int) -> int:
-    """Add an edge, or take it away if the other face along it is taken away too."""
+def _toggle(edges: Indices, count: Offset, a: Offset, b: Offset) -> Offset:
+    """Add an edge, or take it away if the other face along it is taken away too; how many then."""
     for k in range(count):
-        if edges[2 * k] == b and edges[2 * k + 1] == a:
-            edges[2 * k], edges[2 * k + 1] = edges[2 * count - 2], edges[2 * count - 1]
-            return count - 1
-    if 2 * count + 2 <= len(edges):
-        edges[2 * count], edges[2 * count + 1] = a, b
-        return count + 1
-    return count
+        if edges[k * TWO] == b and edges[k * TWO + ONE] == a:
+            last = (count - ONE) * TWO
+            edges[k * TWO], edges[k * TWO + ONE] = edges[last], edges[last + ONE]
+            return count - ONE
+    edges[count * TWO], edges[count * TWO + ONE] = a, b
+    return count + ONE
 
 
 @inner
 def _tetrahedron(P: Array, i: Offset, j: Offset, V: Array, frame: Array, corners: Array) -> tuple[float, Vector]:
-    """Write four corners of the difference, 0 1 2 against the clock seen from outside; its size [m].
+    """Write four corners of the difference, 0 1 2 against the clock seen from outside; how far the last is from the others [m].
 
-    Size 0: the difference is flat, and the vector is its normal.
+    0: the difference is flat, and the vector is its normal.
     """
-    size, axis = -1.0, 0
-    for k in range(3):
-        n = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-        width = _reach(P, i, j, V, frame, n) + _reach(P, i, j, V, frame, (-n[0], -n[1], -n[2]))
-        if width > size:
-            size, axis = width, k
-    x, y, z = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
-    _put(P, i, j, V, frame, corners, 0, (-x, -y, -z))
-    _put(P, i, j, V, frame, corners, 1, (x, y, z))
-    ux, uy, uz = corners[3] - corners[0], corners[4] - corners[1], corners[5] - corners[2]
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
-    if length <= TIE:
-        return 0.0, (0.0, 0.0, 1.0)
-    ux, uy, uz = ux / length, uy / length, uz / length
-    # Two directions square to the first edge.
-    least = min(abs(ux), abs(uy), abs(uz))
-    x, y, z = (1.0, 0.0, 0.0) if abs(ux) == least else (0.0, 1.0, 0.0) if abs(uy) == least else (0.0, 0.0, 1.0)
-    x, y, z = uy * z - uz * y, uz * x - ux * z, ux * y - uy * x
-    length = math.sqrt(x * x + y * y + z * z)
-    first = x / length, y / length, z / length
-    second = uy * first[2] - uz * first[1], uz * first[0] - ux * first[2], ux * first[1] - uy * first[0]
-    far = 0.0
-    for k in range(4):
-        n = first if k < 2 else second
-        turn = 1.0 if k % 2 == 0 else -1.0
-        _put(P, i, j, V, frame, corners, 3, (turn * n[0], turn * n[1], turn * n[2]))
-        x, y, z = corners[9] - corners[0], corners[10] - corners[1], corners[11] - corners[2]
-        x, y, z = uy * z - uz * y, uz * x - ux * z, ux * y - uy * x
-        off = math.sqrt(x * x + y * y + z * z)
-        if off > far + TIE:
-            far = off
-            for m in range(3):
-                corners[6 + m] = corners[9 + m]
-    if far == 0.0:
-        return 0.0, first
-    x, y, z = corners[6] - corners[0], corners[7] - corners[1], corners[8] - corners[2]
-    x, y, z = uy * z - uz * y, uz * x - ux * z, ux * y - uy * x
-    length = math.sqrt(x * x + y * y + z * z)
-    x, y, z = x / length, y / length, z / length
-    low = x * corners[0] + y * corners[1] + z * corners[2]
-    above, below = _reach(P, i, j, V, frame, (x, y, z)) - low, _reach(P, i, j, V, frame, (-x, -y, -z)) + low
-    if above + below <= TIE:
-        return 0.0, ((x, y, z) if above + low <= below - low else (-x, -y, -z))
-    if above > below:
-        # The fourth corner belongs behind the face 0 1 2.
-        for m in range(3):
-            corners[3 + m], corners[6 + m] = corners[6 + m], corners[3 + m]
-        x, y, z = -x, -y, -z
-    _put(P, i, j, V, frame, corners, 3, (-x, -y, -z))
-    return size, (x, y, z)
+    one, two, three = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    px = py = pz = ux = uy = uz = width = turned = 0.0
+    for count in range(FOUR):
+        # Each the farthest from the first along the directions square to those that there are.
+        width = -1.0 if count == ZERO else TIE
+        x, y, z = px, py, pz
+        for which in range(SIX if count == ONE else FOUR if count == TWO else TWO):
+            n = one if which < TWO else two if which < FOUR else three
+            turn = 1.0 if which & ONE == ZERO else -1.0
+            qx, qy, qz = farthest(P, i, j, V, frame, turn * n[0], turn * n[1], turn * n[2])
+            off = turn * (n[0] * (qx - px) + n[1] * (qy - py) + n[2] * (qz - pz))
+            if off > width or count == ZERO:
+                width, turned, x, y, z = off, turn, qx, qy, qz
+        if width == TIE:
+            return 0.0, one
+        corners[count * THREE], corners[count * THREE + ONE], corners[count * THREE + TWO] = x, y, z
+        if count == ZERO:
+            px, py, pz = x, y, z
+        elif count == ONE:
+            ux, uy, uz = x - px, y - py, z - pz
+            ax, ay, az = abs(ux), abs(uy), abs(uz)
+            if ax <= ay and ax <= az:
+                one = _unit(0.0, -uz, uy)
+            elif ay <= az:
+                one = _unit(uz, 0.0, -ux)
+            else:
+                one = _unit(-uy, ux, 0.0)
+            two = _unit(uy * one[2] - uz * one[1], uz * one[0] - ux * one[2], ux * one[1] - uy * one[0])
+        elif count == TWO:
+            vx, vy, vz = x - px, y - py, z - pz
+            one = _unit(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+    if turned > 0.0:
+        # The last is in front of 0 1 2: turn those round.
+        for k in range(THREE):
+            corners[k], corners[k + THREE] = corners[k + THREE], corners[k]
+    return width, one
 
 
 @inner
-def _put(P: Array, i: Offset, j: Offset, V: Array, frame: Array, corners: Array, at: int, n: Vector) -> None:
-    corners[3 * at], corners[3 * at + 1], corners[3 * at + 2] = farthest(P, i, j, V, frame, n[0], n[1], n[2])
+def _unit(x: float, y: float, z: float) -> Vector:
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length

@@ -8,25 +8,25 @@ import numpy as np
 
 from mobee.engine import layout
 from mobee.engine.compiled import inner
-from mobee.engine.narrow.slots import HALF, KIND, ONE, RADIUS, TWO, Offset, Vector, into, out_of, vector
+from mobee.engine.narrow.slots import FOUR, HALF, KIND, ONE, RADIUS, THREE, TWO, ZERO, Offset, Vector, into, out_of, vector
 from mobee.robot.robot import Array
 
 SPHERE, CAPSULE, CYLINDER, BOX, CONVEX = layout.SPHERE, layout.CAPSULE, layout.CYLINDER, layout.BOX, layout.CONVEX
 ALIGNED = 1e-6  # sine of the angle below which a direction counts as square to an edge or a face
-CORNERS = 32  # of the polygon that stands for a cap
+CORNERS = np.uint64(32)  # of the polygon that stands for a cap
 
 
 @inner
-def most_corners(P: Array, i: Offset) -> int:
+def most_corners(P: Array, i: Offset) -> Offset:
     """How many points the feature of a volume has at most."""
     kind = P[i + KIND]
     if kind == CONVEX:
-        return int(P[i + HALF + ONE])
-    return CORNERS if kind == CYLINDER else 4
+        return np.uint64(P[i + HALF + ONE])
+    return CORNERS if kind == CYLINDER else FOUR
 
 
 @inner
-def feature(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: Vector, out: Array) -> int:
+def feature(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: Vector, out: Array) -> Offset:
     """Write the corners, in order round the feature that is farthest along n, as coordinates along t and u; how many.
 
     c is the volume's centre from the plane's origin; n, t, u and c are in the root frame.
@@ -34,45 +34,37 @@ def feature(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: V
     kind = P[i + KIND]
     nx, ny, nz = into(P, i, n[0], n[1], n[2])
     hx, hy, hz = vector(P, i + HALF)
-    if kind == BOX:
-        x, y, z = _at(nx, hx), _at(ny, hy), _at(nz, hz)
-        dx, dy, dz = hx - abs(x), hy - abs(y), hz - abs(z)
-        flat = (dx > 0.0) + (dy > 0.0) + (dz > 0.0)
-        if flat == 1:
-            _put(P, i, t, u, c, x - dx, y - dy, z - dz, 0, out)
-            _put(P, i, t, u, c, x + dx, y + dy, z + dz, 1, out)
-            return 2
-        if flat == 0:
-            _put(P, i, t, u, c, x, y, z, 0, out)
-            return 1
-        for corner in range(4):
-            one = -1.0 if corner < 2 else 1.0
-            two = -1.0 if 0 < corner < 3 else 1.0
-            if dz == 0.0:
-                _put(P, i, t, u, c, x + one * dx, y + two * dy, z, corner, out)
-            elif dy == 0.0:
-                _put(P, i, t, u, c, x + one * dx, y, z + two * dz, corner, out)
-            else:
-                _put(P, i, t, u, c, x, y + one * dy, z + two * dz, corner, out)
-        return 4
     if kind == CONVEX:
         return _convex(P, i, V, (nx, ny, nz), t, u, c, out)
-    z = _at(nz, hy) if kind != SPHERE else 0.0
+    # Others: a point and up to two half edges across the direction, or a cap.
+    z = _at(nz, hz if kind == BOX else hy if kind != SPHERE else 0.0)
     side = math.sqrt(nx * nx + ny * ny)
-    x = y = 0.0
-    if kind == CYLINDER:
+    x, y, corners = 0.0, 0.0, ONE
+    if kind == BOX:
+        x, y = _at(nx, hx), _at(ny, hy)
+    elif kind == CYLINDER:
         if side < ALIGNED:
-            for corner in range(CORNERS):
-                angle = 2.0 * math.pi * corner / CORNERS
-                _put(P, i, t, u, c, hx * math.cos(angle), hx * math.sin(angle), z, corner, out)
-            return CORNERS
-        x, y = hx * nx / side, hx * ny / side
-    if kind == SPHERE or z != 0.0:
-        _put(P, i, t, u, c, x, y, z, 0, out)
-        return 1
-    _put(P, i, t, u, c, x, y, -hy, 0, out)
-    _put(P, i, t, u, c, x, y, hy, 1, out)
-    return 2
+            corners = CORNERS
+        else:
+            x, y = hx * nx / side, hx * ny / side
+    dx, dy, dz = (hx - abs(x), hy - abs(y), hz - abs(z)) if kind == BOX else (0.0, 0.0, hy - abs(z) if kind != SPHERE else 0.0)
+    flat = (dx > 0.0) + (dy > 0.0) + (dz > 0.0)
+    if flat > 0:
+        corners = TWO if flat == 1 else FOUR
+    for corner in range(corners):
+        # Round a square; a single edge takes the first two corners of it, which differ in both signs.
+        one, two = (1.0 if corner == ZERO or corner == THREE else -1.0), (1.0 if corner < TWO else -1.0)
+        if flat == 1:
+            two = one
+        if corners == CORNERS:
+            angle = 2.0 * math.pi * corner / CORNERS
+            px, py, pz = hx * math.cos(angle), hx * math.sin(angle), z
+        elif dx > 0.0:
+            px, py, pz = x + one * dx, y + two * dy, z + two * dz
+        else:
+            px, py, pz = x, y + one * dy, z + two * dz
+        _put(P, i, t, u, c, px, py, pz, corner, out)
+    return corners
 
 
 @inner
@@ -104,16 +96,16 @@ def _at(slope: float, half: float) -> float:
 
 
 @inner
-def _put(P: Array, i: Offset, t: Vector, u: Vector, c: Vector, x: float, y: float, z: float, at: int, out: Array) -> None:
+def _put(P: Array, i: Offset, t: Vector, u: Vector, c: Vector, x: float, y: float, z: float, at: Offset, out: Array) -> None:
     x, y, z = out_of(P, i, x, y, z)
     x, y, z = x + c[0], y + c[1], z + c[2]
-    k = np.uint64(at) * TWO
+    k = at * TWO
     out[k] = t[0] * x + t[1] * y + t[2] * z
     out[k + ONE] = u[0] * x + u[1] * y + u[2] * z
 
 
 @inner
-def _convex(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: Vector, out: Array) -> int:
+def _convex(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: Vector, out: Array) -> Offset:
     """The feature of a convex hull, n in its own axes: the outline of the vertices that are farthest, within rounding."""
     first, count = np.uint64(P[i + HALF]), np.uint64(P[i + HALF + ONE])
     farthest, size = -math.inf, 0.0
@@ -121,38 +113,36 @@ def _convex(P: Array, i: Offset, V: Array, n: Vector, t: Vector, u: Vector, c: V
         x, y, z = vector(V, (first + k) * np.uint64(3))
         farthest = max(farthest, n[0] * x + n[1] * y + n[2] * z)
         size = max(size, abs(x), abs(y), abs(z))
-    found = 0
+    found = ZERO
     for k in range(count):
         x, y, z = vector(V, (first + k) * np.uint64(3))
         if n[0] * x + n[1] * y + n[2] * z >= farthest - ALIGNED * size:
             _put(P, i, t, u, c, x, y, z, found, out)
-            found += 1
+            found += ONE
     return outline(out, found, ALIGNED * size)
 
 
 @inner
-def outline(points: Array, count: int, near: float) -> int:
+def outline(points: Array, count: Offset, near: float) -> Offset:
     """Keep, in order, the corners of the convex hull of points of the plane (x, y each); how many (Jarvis's march)."""
-    start = 0
-    for k in range(1, count):
-        ahead = points[2 * k] - points[2 * start]
-        if ahead < -near or (ahead <= near and points[2 * k + 1] < points[2 * start + 1]):
-            start = k
-    kept, current = 0, start
+    current = ZERO
+    for k in range(ONE, count):
+        ahead = points[k * TWO] - points[current * TWO]
+        if ahead < -near or (ahead <= near and points[k * TWO + ONE] < points[current * TWO + ONE]):
+            current = k
+    kept = ZERO
     while True:
-        points[2 * kept], points[2 * current] = points[2 * current], points[2 * kept]
-        points[2 * kept + 1], points[2 * current + 1] = points[2 * current + 1], points[2 * kept + 1]
-        x, y = points[2 * kept], points[2 * kept + 1]
-        kept += 1
-        # The start competes too: choosing it ends the march.
-        following, fx, fy = 0, points[0] - x, points[1] - y
+        for k in range(TWO):
+            points[kept * TWO + k], points[current * TWO + k] = points[current * TWO + k], points[kept * TWO + k]
+        x, y = points[kept * TWO], points[kept * TWO + ONE]
+        kept += ONE
+        # The start competes, too: choosing it ends the march.
+        following, fx, fy = ZERO, points[ZERO] - x, points[ONE] - y
         for k in range(kept, count):
-            dx, dy = points[2 * k] - x, points[2 * k + 1] - y
+            dx, dy = points[k * TWO] - x, points[k * TWO + ONE] - y
             turn, old, new = fx * dy - fy * dx, math.sqrt(fx * fx + fy * fy), math.sqrt(dx * dx + dy * dy)
-            if new <= near:
-                continue
-            if old <= near or turn < -near * new or (turn <= near * new and new > old and fx * dx + fy * dy > 0.0):
+            if new > near and (old <= near or turn < -near * new or (turn <= near * new and new > old and fx * dx + fy * dy > 0.0)):
                 following, fx, fy = k, dx, dy
-        if following == 0:
+        if following == ZERO:
             return kept
         current = following

@@ -8,13 +8,15 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.difference import farthest
-from mobee.engine.narrow.slots import Offset, Vector
+from mobee.engine.narrow.slots import FOUR, ONE, THREE, TWO, ZERO, Offset, Vector, vector
 from mobee.robot.robot import Array
 
 _STEPS = 100
 _EXACT = 1e-15  # relative: the bounds have met
+_ORIGIN = 1e-12  # m: what is so close to the origin holds it
 _THIN = 1e-28  # squared sine of the angle below which a triangle is one of its sides
-_ZERO = 1e-12  # m: so close to the origin, it belongs to the difference
+_FLAT = 1e-24  # squared sine of the angle below which a tetrahedron is one of its faces
+_NOWHERE = (0.0, 0.0, 0.0)
 
 
 @inner
@@ -24,136 +26,129 @@ def closest(P: Array, i: Offset, j: Offset, V: Array, frame: Array, limit: float
     Once the distance is known to be larger than `limit`, a lower bound of it that is larger, too.
     """
     corners = np.empty(12)
-    x, y, z = -frame[0], -frame[1], -frame[2]
-    x, y, z = farthest(P, i, j, V, frame, x, y, z)
-    corners[0], corners[1], corners[2] = x, y, z
-    count, squared = 1, x * x + y * y + z * z
+    count, squared = ZERO, math.inf
+    x, y, z = frame[0], frame[1], frame[2]
+    distance = math.sqrt(x * x + y * y + z * z)
     for _ in range(_STEPS):
-        distance = math.sqrt(squared)
-        if distance < _ZERO:
-            break
-        px, py, pz = farthest(P, i, j, V, frame, -x, -y, -z)
-        bound = (x * px + y * py + z * pz) / distance
+        if distance < _ORIGIN:
+            if count > ZERO:
+                return 0.0, _NOWHERE
+            x, distance = 1.0, 1.0
+        p = farthest(P, i, j, V, frame, -x, -y, -z)
+        bound = (x * p[0] + y * p[1] + z * p[2]) / distance
         if bound > limit:
             return bound, (x, y, z)
-        if distance - bound <= _EXACT * distance:
-            return distance, (x, y, z)
-        corners[3 * count], corners[3 * count + 1], corners[3 * count + 2] = px, py, pz
-        count, (nx, ny, nz) = _reduce(corners, count + 1)
-        nearer = nx * nx + ny * ny + nz * nz
-        if count == 4:
+        if count > ZERO and distance - bound <= _EXACT * distance:
             break
+        _set(corners, count, p)
+        count, (nx, ny, nz) = _reduce(corners, count + ONE, bound > 0.0)
+        if count == FOUR:
+            return 0.0, _NOWHERE
+        nearer = nx * nx + ny * ny + nz * nz
         if nearer >= squared:
-            return distance, (x, y, z)
+            break
         x, y, z, squared = nx, ny, nz, nearer
-    else:
-        return math.sqrt(squared), (x, y, z)
-    return 0.0, (0.0, 0.0, 0.0)
+        distance = math.sqrt(squared)
+    return distance, (x, y, z)
 
 
 @inner
-def _reduce(corners: Array, count: int) -> tuple[int, Vector]:
-    """Keep the corners of a simplex that span its point closest to the origin; how many, and the point.  4: it is inside."""
-    if count == 2:
-        kept, point = _on_segment(corners, 0, 1, 1, 2)
-        return _keep(corners, kept, 0, 1, 1), point
-    if count == 3:
-        kept, point = _on_triangle(corners, 0, 1, 2)
-        return _keep(corners, kept, 0, 1, 2), point
-    least, kept, face, point = math.inf, 0, -1, (0.0, 0.0, 0.0)
-    for other in range(4):
-        a, b, c = (1, 2, 3) if other == 0 else (0, 2, 3) if other == 1 else (0, 1, 3) if other == 2 else (0, 1, 2)
-        if _beyond(corners, a, b, c, other):
-            here, (x, y, z) = _on_triangle(corners, a, b, c)
+def _set(corners: Array, at: Offset, point: Vector) -> None:
+    k = at * THREE
+    corners[k], corners[k + ONE], corners[k + TWO] = point
+
+
+@inner
+def _reduce(corners: Array, count: Offset, apart: bool) -> tuple[Offset, Vector]:
+    """Keep the corners of a simplex that span its point closest to the origin; how many, and the point.  4: it is inside.
+
+    What is known to be apart from the origin does not hold it, whatever rounding says of a thin tetrahedron.
+    """
+    if count == ONE:
+        return ONE, vector(corners, ZERO)
+    # Of up to four triangles; fewer corners are a triangle with corners given twice.
+    face, kept, point, least = FOUR, ZERO, _NOWHERE, math.inf
+    for other in range(FOUR if count == FOUR else ONE):
+        a, b, c = _others(other, count)
+        p, q, r = vector(corners, a * THREE), vector(corners, b * THREE), vector(corners, c * THREE)
+        if count < FOUR or apart or _beyond(p, q, r, vector(corners, other * THREE)):
+            here, (x, y, z) = _on_triangle(p, q, r)
             squared = x * x + y * y + z * z
             if squared < least:
-                least, kept, face, point = squared, here, other, (x, y, z)
-    if face < 0:
-        return 4, point
-    a, b, c = (1, 2, 3) if face == 0 else (0, 2, 3) if face == 1 else (0, 1, 3) if face == 2 else (0, 1, 2)
-    return _keep(corners, kept, a, b, c), point
+                face, kept, point, least = other, here, (x, y, z), squared
+    if face == FOUR:
+        return FOUR, point
+    left = ZERO
+    a, b, c = _others(face, count)
+    if kept & ONE:
+        _set(corners, left, vector(corners, a * THREE))
+        left += ONE
+    if kept & TWO:
+        _set(corners, left, vector(corners, b * THREE))
+        left += ONE
+    if kept & FOUR:
+        _set(corners, left, vector(corners, c * THREE))
+        left += ONE
+    return left, point
 
 
 @inner
-def _keep(corners: Array, kept: int, a: int, b: int, c: int) -> int:
-    count = 0
-    for bit in range(3):
-        if kept & (1 << bit):
-            which = a if bit == 0 else b if bit == 1 else c
-            for k in range(3):
-                corners[3 * count + k] = corners[3 * which + k]
-            count += 1
-    return count
+def _others(other: Offset, count: Offset) -> tuple[Offset, Offset, Offset]:
+    """The corners of a face, in order: those of four that are not `other`; of fewer all, the last one twice if they are two."""
+    if count < FOUR:
+        return ZERO, ONE, count - ONE
+    return (ONE if other == ZERO else ZERO), (ONE if other > ONE else TWO), (TWO if other == THREE else THREE)
 
 
 @inner
-def _corner(corners: Array, a: int) -> Vector:
-    k = np.uint64(3 * a)
-    return corners[k], corners[k + np.uint64(1)], corners[k + np.uint64(2)]
+def _beyond(p: Vector, q: Vector, r: Vector, other: Vector) -> bool:
+    """Whether the origin and the other corner are not on the same side of the face p, q, r; so, too, if the four are flat."""
+    nx, ny, nz = _normal(p, q, r)
+    ox, oy, oz = other[0] - p[0], other[1] - p[1], other[2] - p[2]
+    side, origin = nx * ox + ny * oy + nz * oz, -(nx * p[0] + ny * p[1] + nz * p[2])
+    flat = side * side <= _FLAT * (nx * nx + ny * ny + nz * nz) * (ox * ox + oy * oy + oz * oz)
+    return flat or origin * side <= 0.0
 
 
 @inner
-def _beyond(corners: Array, a: int, b: int, c: int, other: int) -> bool:
-    """Whether the origin and the other corner are not on the same side of the face a, b, c."""
-    ax, ay, az = _corner(corners, a)
-    bx, by, bz = _corner(corners, b)
-    cx, cy, cz = _corner(corners, c)
-    ox, oy, oz = _corner(corners, other)
-    bx, by, bz, cx, cy, cz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    side = nx * (ox - ax) + ny * (oy - ay) + nz * (oz - az)
-    origin = -(nx * ax + ny * ay + nz * az)
-    return origin * side <= 0.0
-
-
-@inner
-def _on_segment(corners: Array, a: int, b: int, a_bit: int, b_bit: int) -> tuple[int, Vector]:
-    """The point of a segment closest to the origin, and the bits of the corners that it needs."""
-    ax, ay, az = _corner(corners, a)
-    bx, by, bz = _corner(corners, b)
-    ux, uy, uz = bx - ax, by - ay, bz - az
-    along, squared = -(ux * ax + uy * ay + uz * az), ux * ux + uy * uy + uz * uz
-    if along <= 0.0 or squared == 0.0:
-        return a_bit, (ax, ay, az)
-    if along >= squared:
-        return b_bit, (bx, by, bz)
-    w = along / squared
-    return a_bit | b_bit, (ax + w * ux, ay + w * uy, az + w * uz)
-
-
-@inner
-def _on_triangle(corners: Array, a: int, b: int, c: int) -> tuple[int, Vector]:
-    """The point of a triangle closest to the origin, and the corners (bits 1, 2, 4) of the face, side or corner it lies on."""
-    ax, ay, az = _corner(corners, a)
-    bx, by, bz = _corner(corners, b)
-    cx, cy, cz = _corner(corners, c)
-    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+def _on_triangle(p: Vector, q: Vector, r: Vector) -> tuple[Offset, Vector]:
+    """The point of a triangle closest to the origin, and which corners (bits 1, 2, 4) span the face, side or corner it lies on."""
+    nx, ny, nz = _normal(p, q, r)
     squared = nx * nx + ny * ny + nz * nz
-    # Outside which sides does the origin lie, seen along the normal?
-    beyond_c = _turn(ax, ay, az, ux, uy, uz, nx, ny, nz) > 0.0
-    beyond_a = _turn(bx, by, bz, cx - bx, cy - by, cz - bz, nx, ny, nz) > 0.0
-    beyond_b = _turn(cx, cy, cz, -vx, -vy, -vz, nx, ny, nz) > 0.0
-    thin = squared <= _THIN * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
-    if not (thin or beyond_a or beyond_b or beyond_c):
+    thin = squared <= _THIN * _squared(p, q) * _squared(p, r)
+    if not (thin or _outside(p, q, nx, ny, nz) or _outside(q, r, nx, ny, nz) or _outside(r, p, nx, ny, nz)):
         # Through the normal: exact also where the triangle is narrow.
-        w = (nx * ax + ny * ay + nz * az) / squared
-        return 7, (w * nx, w * ny, w * nz)
-    least, kept, point = math.inf, 0, (0.0, 0.0, 0.0)
-    for side in range(3):
-        if side == 0:
-            here, (x, y, z) = _on_segment(corners, a, b, 1, 2)
-        elif side == 1:
-            here, (x, y, z) = _on_segment(corners, b, c, 2, 4)
-        else:
-            here, (x, y, z) = _on_segment(corners, a, c, 1, 4)
+        w = (nx * p[0] + ny * p[1] + nz * p[2]) / squared
+        return ONE | TWO | FOUR, (w * nx, w * ny, w * nz)
+    kept, point, least = ZERO, _NOWHERE, math.inf
+    for side in range(THREE):
+        start, end = (q if side == ONE else p), (q if side == ZERO else r)
+        ux, uy, uz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+        along, length = -(ux * start[0] + uy * start[1] + uz * start[2]), ux * ux + uy * uy + uz * uz
+        w = 0.0 if along <= 0.0 else 1.0 if along >= length else along / length
+        x, y, z = start[0] + w * ux, start[1] + w * uy, start[2] + w * uz
         squared = x * x + y * y + z * z
         if squared < least:
-            least, kept, point = squared, here, (x, y, z)
+            first, last = (TWO if side == ONE else ONE), (TWO if side == ZERO else FOUR)
+            kept = first if w == 0.0 else last if w == 1.0 else first | last
+            point, least = (x, y, z), squared
     return kept, point
 
 
 @inner
-def _turn(ax: float, ay: float, az: float, ux: float, uy: float, uz: float, nx: float, ny: float, nz: float) -> float:
-    """Positive if, seen against n, the origin is to the right of the line through a along u."""
-    return nx * (uy * az - uz * ay) + ny * (uz * ax - ux * az) + nz * (ux * ay - uy * ax)
+def _outside(p: Vector, q: Vector, nx: float, ny: float, nz: float) -> bool:
+    """Whether, seen against n, the origin is to the right of the line from p to q."""
+    x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    return nx * (y * p[2] - z * p[1]) + ny * (z * p[0] - x * p[2]) + nz * (x * p[1] - y * p[0]) > 0.0
+
+
+@inner
+def _squared(p: Vector, q: Vector) -> float:
+    x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    return x * x + y * y + z * z
+
+
+@inner
+def _normal(p: Vector, q: Vector, r: Vector) -> Vector:
+    ux, uy, uz, vx, vy, vz = q[0] - p[0], q[1] - p[1], q[2] - p[2], r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx

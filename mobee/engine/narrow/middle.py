@@ -9,7 +9,7 @@ import numpy as np
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.features import feature, most_corners, reach
 from mobee.engine.narrow.rounded import closest_parameters
-from mobee.engine.narrow.slots import CENTER, ROTATION, THREE, ONE, TWO, SIX, Offset, Vector, centers_apart, store, vector
+from mobee.engine.narrow.slots import CENTER, ONE, THREE, TWO, ZERO, Offset, Vector, centers_apart, store, vector
 from mobee.robot.robot import Array
 
 _NEAR = 1e-9  # m: a corner this close to an edge lies on it
@@ -30,7 +30,8 @@ def store_contact(P: Array, i: Offset, j: Offset, V: Array, normal: Vector, dept
     t = x / length, y / length, z / length
     u = ny * t[2] - nz * t[1], nz * t[0] - nx * t[2], nx * t[1] - ny * t[0]
     ma, mb = most_corners(P, i), most_corners(P, j)
-    one, two, spare = np.empty(2 * (ma + mb)), np.empty(2 * (ma + mb)), np.empty(2 * (ma + mb))
+    room = (ma + mb) * TWO
+    one, two, spare = np.empty(room), np.empty(room), np.empty(room)
     ka = feature(P, i, V, (-nx, -ny, -nz), t, u, c, one)
     kb = feature(P, j, V, normal, t, u, (0.0, 0.0, 0.0), two)
     p, q = _shared(one, ka, two, kb, spare)
@@ -48,19 +49,16 @@ def store_contact(P: Array, i: Offset, j: Offset, V: Array, normal: Vector, dept
 
 
 @inner
-def _shared(one: Array, ka: int, two: Array, kb: int, spare: Array) -> tuple[float, float]:
+def _shared(one: Array, ka: Offset, two: Array, kb: Offset, spare: Array) -> tuple[float, float]:
     """The middle of what two convex features of a plane (corners x, y, in order) share."""
-    if ka == 1 and kb == 1:
+    if ka == ONE and kb == ONE:
         return (one[0] + two[0]) / 2.0, (one[1] + two[1]) / 2.0
-    if ka == 1:
-        return one[0], one[1]
-    if kb == 1:
-        return two[0], two[1]
-    if ka == 2 and kb == 2:
+    if ka == TWO and kb == TWO:
         return _crossing(one, two)
-    if kb == 2:
-        return _clipped(two, kb, one, ka, spare)
-    return _clipped(one, ka, two, kb, spare)
+    # The one with more corners is the window that the other is seen through.
+    if kb < ka:
+        one, two, ka, kb = two, one, kb, ka
+    return (one[0], one[1]) if ka == ONE else _clipped(one, ka, two, kb, spare)
 
 
 @inner
@@ -72,59 +70,56 @@ def _crossing(one: Array, two: Array) -> tuple[float, float]:
 
 
 @inner
-def _clipped(one: Array, count: int, window: Array, sides: int, spare: Array) -> tuple[float, float]:
+def _clipped(one: Array, count: Offset, window: Array, sides: Offset, spare: Array) -> tuple[float, float]:
     """The middle of the outline of a polygon or segment cut by each side of another polygon (Sutherland and Hodgman)."""
     area = 0.0
-    for k in range(1, sides - 1):
-        ax, ay = window[2 * k] - window[0], window[2 * k + 1] - window[1]
-        area += ax * (window[2 * k + 3] - window[1]) - ay * (window[2 * k + 2] - window[0])
+    for k in range(ONE, sides - ONE):
+        ax, ay = window[k * TWO] - window[0], window[k * TWO + ONE] - window[1]
+        area += ax * (window[k * TWO + THREE] - window[1]) - ay * (window[k * TWO + TWO] - window[0])
     turn = 1.0 if area >= 0.0 else -1.0
-    whole = _middle(one, count)
     for k in range(sides):
-        m = k + 1 if k + 1 < sides else 0
-        x, y = window[2 * k], window[2 * k + 1]
-        dx, dy = window[2 * m] - x, window[2 * m + 1] - y
+        m = k + ONE if k + ONE < sides else ZERO
+        x, y = window[k * TWO], window[k * TWO + ONE]
+        dx, dy = window[m * TWO] - x, window[m * TWO + ONE] - y
         length = math.sqrt(dx * dx + dy * dy)
-        if length <= _NEAR:
-            continue
-        count = _cut(one, count, x, y, -turn * dy / length, turn * dx / length, spare)
-        if count == 0:
-            return whole
-        for i in range(2 * count):
-            one[i] = spare[i]
+        if length > _NEAR:
+            left = _cut(one, count, x, y, -turn * dy / length, turn * dx / length, spare)
+            if left == ZERO:
+                break
+            count = left
+            for i in range(count * TWO):
+                one[i] = spare[i]
     return _middle(one, count)
 
 
 @inner
-def _cut(points: Array, count: int, x: float, y: float, nx: float, ny: float, out: Array) -> int:
+def _cut(points: Array, count: Offset, x: float, y: float, nx: float, ny: float, out: Array) -> Offset:
     """Write the part of a convex polygon that is not beyond the line through (x, y) with the inward normal n; how many corners."""
-    kept = 0
-    px, py = points[2 * count - 2], points[2 * count - 1]
+    kept, last = ZERO, (count - ONE) * TWO
+    px, py = points[last], points[last + ONE]
     before = (px - x) * nx + (py - y) * ny
     for k in range(count):
-        qx, qy = points[2 * k], points[2 * k + 1]
+        qx, qy = points[k * TWO], points[k * TWO + ONE]
         here = (qx - x) * nx + (qy - y) * ny
         if (here < -_NEAR and before > _NEAR) or (here > _NEAR and before < -_NEAR):
             weight = before / (before - here)
-            out[2 * kept], out[2 * kept + 1] = px + weight * (qx - px), py + weight * (qy - py)
-            kept += 1
+            out[kept * TWO], out[kept * TWO + ONE] = px + weight * (qx - px), py + weight * (qy - py)
+            kept += ONE
         if here >= -_NEAR:
-            out[2 * kept], out[2 * kept + 1] = qx, qy
-            kept += 1
+            out[kept * TWO], out[kept * TWO + ONE] = qx, qy
+            kept += ONE
         px, py, before = qx, qy, here
     return kept
 
 
 @inner
-def _middle(points: Array, count: int) -> tuple[float, float]:
+def _middle(points: Array, count: Offset) -> tuple[float, float]:
     """The mean of the outline: of a polygon, however thin, of a segment or of a point."""
-    total = x = y = 0.0
-    px, py = points[2 * count - 2], points[2 * count - 1]
+    total, x, y, last = 0.0, 0.0, 0.0, (count - ONE) * TWO
+    px, py = points[last], points[last + ONE]
     for k in range(count):
-        qx, qy = points[2 * k], points[2 * k + 1]
+        qx, qy = points[k * TWO], points[k * TWO + ONE]
         length = math.sqrt((qx - px) * (qx - px) + (qy - py) * (qy - py))
         total, x, y = total + length, x + length * (px + qx) / 2.0, y + length * (py + qy) / 2.0
         px, py = qx, qy
-    if total <= _NEAR:
-        return px, py
-    return x / total, y / total
+    return (px, py) if total <= _NEAR else (x / total, y / total)

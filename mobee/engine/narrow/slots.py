@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from mobee.engine import layout
@@ -13,7 +11,8 @@ from mobee.robot.robot import Array
 Offset = np.uint64
 Vector = tuple[float, float, float]
 
-ONE, TWO, THREE, SIX = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(6)
+# As globals, numbers keep their type; a literal would have a function compiled once more for each of its values.
+ZERO, ONE, TWO, THREE, FOUR, SIX = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4), np.uint64(6)
 CENTER, ROTATION, HALF = np.uint64(layout.CENTER), np.uint64(layout.ROTATION), np.uint64(layout.HALF)
 CORE, RADIUS, KIND = np.uint64(layout.CORE), np.uint64(layout.RADIUS), np.uint64(layout.KIND)
 
@@ -83,16 +82,3 @@ def store(out: Array, normal: Vector, point: Vector) -> None:
     """Write a contact."""
     out[0], out[1], out[2] = normal
     out[3], out[4], out[5] = point
-
-
-@inner
-def turn_round(out: Array) -> None:
-    """Make it the contact of the same two volumes named the other way round."""
-    out[0], out[1], out[2] = -out[0], -out[1], -out[2]
-
-
-@inner
-def perpendicular(x: float, y: float, z: float, length: float) -> Vector:
-    """The cross product scaled to unit length, given its length."""
-    inverse = 1.0 / math.sqrt(length)
-    return x * inverse, y * inverse, z * inverse
