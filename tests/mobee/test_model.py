@@ -225,7 +225,9 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
     thread.start()
     counts = set()
     try:
-        for _ in range(400):
+        for _ in range(100_000):
+            if len(counts) > 10:
+                break
             pose = model.evaluate(STRETCHED)
             boxes = [name for name in pose.objects if name.startswith("box")]
             touched = [c.second for c in pose.contacts if c.kind == "solid"]
@@ -236,4 +238,4 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
         stop.set()
         thread.join()
     assert failures == []
-    assert len(counts) > 2  # the world did change under the evaluations
+    assert len(counts) > 10  # the world did change under the evaluations
