@@ -60,11 +60,15 @@ def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
     """The summary of what is never tested, or all of it."""
     tested = f"{count(robot.solid_pairs, 'pair')} of solids, {len(robot.field_pairs)} of fields"
     lines = ["", f"Tested: {tested}. Never tested{'' if every else ' (--pairs names them)'}:"]
+    kinds: dict[str, list[UntestedGroup]] = {}
     for group in groups:
-        shapes = f"{group.solids} of solids, {group.fields} of fields"
-        lines += _wrapped(f"{group.reason}: {count(group.links, 'pair')} of links ({shapes})", "  ", "    ")
+        kinds.setdefault(group.reason if every else group.kind, []).append(group)
+    for title, alike in kinds.items():
+        links = [link for group in alike for link in group.links]
+        shapes = f"{sum(group.solids for group in alike)} of solids, {sum(group.fields for group in alike)} of fields"
+        lines += _wrapped(f"{alike[0].reason if len(alike) == 1 else title}: {count(links, 'pair')} of links ({shapes})", "  ", "    ")
         if every:
-            lines += _wrapped(", ".join(one if one == other else f"{one} - {other}" for one, other in group.links), "    ")
+            lines += _wrapped(", ".join(one if one == other else f"{one} - {other}" for one, other in links), "    ")
     return lines
 
 

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
+import shutil
+import textwrap
+from collections import Counter
+from typing import Any
 
-from mobee.robot.load import load_robot, shipped_robots, shipped_worlds
+from mobee.robot.load import ROBOTS, WORLDS, load_robot, load_world, shipped_robots, shipped_worlds
+
+_README = "README.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,13 +21,76 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the robots with their parts, and the worlds."""
-    robots = {name: {part: list(body.motors) for part, body in load_robot(name).parts.items()} for name in shipped_robots()}
-    if arguments.json:
-        print(json.dumps({"robots": robots, "worlds": shipped_worlds()}, indent=2))
-        return 0
-    for name, parts in robots.items():
-        counts = ", ".join(f"{part} {len(motors)}" for part, motors in parts.items())
-        print(f"{name:<12} {sum(map(len, parts.values()))} motors: {counts}")
-    print(f"worlds: {', '.join(shipped_worlds())}")
+    """Print the robots with their parts and shapes, the worlds, and where all of it is from."""
+    text = (ROBOTS / _README).read_text()
+    listed = {
+        "robots": {name: _robot(name, text) for name in shipped_robots()},
+        "worlds": {name: _world(name, (WORLDS / _README).read_text()) for name in shipped_worlds()},
+        "licences": _section(text, "Licences"),
+        "readme": [str(folder / _README) for folder in (ROBOTS, WORLDS)],
+    }
+    print(json.dumps(listed, indent=2) if arguments.json else _as_text(listed))
     return 0
+
+
+def _robot(name: str, readme: str) -> dict[str, Any]:
+    robot = load_robot(name)
+    roles = Counter(shape.role for shape in robot.shapes)
+    return {
+        "parts": {part: list(body.motors) for part, body in robot.parts.items()},
+        "counts": {
+            "joints": len(robot.joints),
+            "solids": roles["solid"],
+            "fields": roles["field"],
+            "markers": len(robot.markers),
+            "constraints": len(robot.clauses),
+        },
+        "about": _row(readme, name),
+        "file": str(ROBOTS / f"{name}.xml"),
+    }
+
+
+def _world(name: str, readme: str) -> dict[str, Any]:
+    objects = {thing.name: thing.role for thing in load_world(name).objects.values()}
+    return {"objects": objects, "about": _row(readme, name), "file": str(WORLDS / f"{name}.xml")}
+
+
+def _row(readme: str, name: str) -> str:
+    """What the README's table says of a file."""
+    found = re.search(rf"^\| `{re.escape(name)}\.xml` \| (.*?) \|$", readme, re.MULTILINE)
+    return _plain(found[1]) if found else ""
+
+
+def _section(readme: str, title: str) -> str:
+    found = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", readme, re.MULTILINE | re.DOTALL)
+    return _plain(found[1]) if found else ""
+
+
+def _plain(markdown: str) -> str:
+    """Without marks and line breaks; a link is its text."""
+    return " ".join(re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", markdown).replace("`", "").replace("**", "").split())
+
+
+def _as_text(listed: dict[str, Any]) -> str:
+    lines = []
+    for name, robot in listed["robots"].items():
+        parts = ", ".join(f"{part} {len(motors)}" for part, motors in robot["parts"].items())
+        lines += _entry(name, f"{sum(map(len, robot['parts'].values()))} motors: {parts}")
+        lines += _entry("", ", ".join(f"{count} {what}" for what, count in robot["counts"].items() if count))
+        lines += _entry("", robot["about"])
+    lines += ["", "Worlds"]
+    for name, world in listed["worlds"].items():
+        lines += _entry(name, ", ".join(f"{thing} ({role})" for thing, role in world["objects"].items()))
+    lines += [
+        "",
+        *_entry("Licences", listed["licences"]),
+        "",
+        "Grammar and origin of every number:",
+        *(f"  {path}" for path in listed["readme"]),
+    ]
+    return "\n".join(lines)
+
+
+def _entry(name: str, text: str) -> list[str]:
+    columns = shutil.get_terminal_size().columns  # 80 in a pipe
+    return textwrap.wrap(text, columns, initial_indent=f"{name:<12} ", subsequent_indent=" " * 13, break_on_hyphens=False)

@@ -6,13 +6,23 @@ from collections.abc import Iterator
 
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
+from mobee.robot.check.words import count, some
 
 
 def unreachable_markers(subject: Subject) -> Iterator[Finding]:
-    """Markers on links that stay where they are, whatever the motors do."""
-    for marker in subject.robot.markers.values():
-        if marker.link in subject.moved:
-            continue
+    """Markers on links that stay where they are, whatever the motors do; one note of all in a URDF, where every link is a marker."""
+    unmoved = [marker for marker in subject.robot.markers.values() if marker.link not in subject.moved]
+    if subject.is_urdf and unmoved:
+        yield Finding(
+            "note",
+            "marker",
+            subject.where("marker", unmoved[0].name),
+            f"{count(unmoved, 'marker')} that no motor moves: {some(marker.name for marker in unmoved)}",
+            "their Jacobian is zero: they can neither be reached with nor be pushed",
+            "nothing, if they are frames of the base",
+        )
+        return
+    for marker in unmoved:
         yield Finding(
             "warning",
             "marker",

@@ -46,7 +46,9 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 subject.where("shape", contact.first),
                 f"at home {pair} collide, {length(contact.depth)} deep",
                 "the robot starts in a collision that it could not have moved into",
-                "move the home, make a shape smaller, or correct where one is placed",
+                "choose a home with `mobee convert`, for a URDF has none (0 is taken, or the nearest limit), or correct a shape"
+                if subject.is_urdf
+                else "move the home, make a shape smaller, or correct where one is placed",
             )
         else:
             yield Finding(
@@ -75,5 +77,15 @@ def foreign_solids(subject: Subject) -> Iterator[Finding]:
             subject.where("shape", field.name),
             f"at home field {field.name!r} of part {part!r} reaches {length(depth)} into solid {solid.name!r} of {other!r}",
             f"fields feel fields only: {part} comes this near without a force",
-            f"give the link of {solid.name!r} a field that encloses it, or make {field.name!r} smaller",
+            f"nothing, if the limits keep them apart; else test the fields of {subject.robot.links[solid.link]!r} against those of "
+            f"{subject.robot.links[field.link]!r} (`mobee check --pairs` says why they are not)"
+            if _left_out(subject, field.link, solid.link)
+            else f"give the link of {solid.name!r} a field that encloses it, or make {field.name!r} smaller",
         )
+
+
+def _left_out(subject: Subject, one: int, other: int) -> bool:
+    """Whether both links have fields that are never tested against each other."""
+    shapes, links = subject.robot.shapes, {one, other}
+    bearing = {shape.link for shape in shapes if shape.role == "field"}
+    return links <= bearing and not any({shapes[i].link, shapes[j].link} == links for i, j in subject.robot.field_pairs)

@@ -37,3 +37,8 @@ def test_shapes_of_one_link_are_rigid(tmp_path: Path) -> None:
     robot = arm(tmp_path, ("<marker", '<sphere name="palm" radius="0.02"/><marker'))
     (same,) = [group for group in untested_groups(robot) if group.reason == SAME_LINK]
     assert (same.links, same.solids, same.fields) == ((("bend", "bend"),), 1, 0)
+
+
+def test_reasons_that_differ_in_a_name_only_are_of_one_kind(tmp_path: Path) -> None:
+    robot = replace(arm(tmp_path), untested={frozenset((0, 1)): "adjacent: joint pan", frozenset((1, 2)): "adjacent: joint bend"})
+    assert [group.kind for group in untested_groups(robot) if group.reason.startswith("adjacent")] == ["adjacent"] * 2
