@@ -1,38 +1,89 @@
-"""Loads the engine's machine code, and says so where a person would wait for it to be compiled."""
+"""Loads the engine's machine code; where it has to be compiled first, says so and lets one process do it for all."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 
 MODULES = ("mobee.engine.scene", "mobee.engine.evaluate")
+PATIENCE = 300.0  # s that a process waits for another that compiles
 
 
 def load() -> None:
-    """Import what is compiled; the first time after an install or an edit with a line on stderr before and after."""
+    """Import what is compiled; after an install or an edit this takes half a minute, with progress on standard error."""
     if MODULES[-1] in sys.modules:
         return
-    from mobee.engine.compiled import cache_folder, is_ready, mark_ready
+    from mobee.engine.compiled import FOLDER
 
-    ready = is_ready()
-    start = time.perf_counter()
-    if not ready:
-        print(
-            f"mobee: compiling the engine into {cache_folder()}, once after an install (about half a minute) ...",
-            file=sys.stderr,
-            flush=True,
-        )
+    if is_ready(FOLDER):
+        _import()
+        mark_used(FOLDER)
+        return
+    with _turn(FOLDER) as writable:
+        if is_ready(FOLDER):
+            _import()
+        else:
+            _compile(FOLDER, writable)
+
+
+def _import() -> None:
     for module in MODULES:
         importlib.import_module(module)
-    if not ready:
-        mark_ready()
-        _say(f"the engine is compiled, {time.perf_counter() - start:.0f} s.")
 
 
-def _say(what: str) -> None:
-    print(f"mobee: {what}", file=sys.stderr, flush=True)
+def _compile(folder: Path, writable: bool) -> None:
+    from mobee.engine.progress import Progress, say
+    from mobee.engine.shelf import Shelf
+
+    with Progress(folder):
+        _import()
+    if writable and Shelf.unwritten is not None:
+        say(f"could not keep the engine's machine code: {Shelf.unwritten}. The next start compiles again.")
+    elif writable and cache_folder() == folder:  # else a source was edited meanwhile, and nobody knows which version was read
+        mark_ready(folder)
 
 
-if __name__ == "__main__":
-    load()
+@contextlib.contextmanager
+def _turn(folder: Path) -> Iterator[bool]:
+    """Wait until no other process compiles into a folder; gives whether it can be written."""
+    from mobee.engine.progress import say
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("ab")
+    except OSError as error:
+        say(
+            f"cannot write {folder}: {error.strerror}. The engine is compiled in memory, which every start has to wait for; "
+            "let the environment variable MOBEE_CACHE name a folder that can be written."
+        )
+        yield False
+        return
+    with lock:
+        _wait(lock.fileno())
+        yield True
+
+
+def _wait(lock: int) -> None:
+    try:
+        import fcntl
+    except ImportError:  # not on Windows: each process compiles, and the files are whole all the same
+        return
+    from mobee.engine.progress import say
+
+    end = time.monotonic() + PATIENCE
+    told = False
+    while time.monotonic() < end:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # let go when the file is closed, at the latest when the process ends
+            return
+        except BlockingIOError:
+            if not told:
+                say("another process compiles the engine; waiting for it ...")
+                told = True
+            time.sleep(0.1)
