@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -289,6 +290,40 @@ def test_the_world_is_edited_by_calls(run: Stage) -> None:
     assert run.world()["crate"].geometry == BALL
     run.edit("remove", OneName, name="crate")
     assert "crate" not in run.world()
+
+
+def test_edits_from_several_callers_are_felt_by_the_very_next_tick_while_ticks_go_on(run: Stage) -> None:
+    palm = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
+    away = [-0.9, 0.0, 0.9]
+
+    def is_felt(name: str) -> bool:
+        """In the answer to the first tick that begins from now on."""
+        seen, k = len(run.contacts), run.rig.bus.k
+        answer = wait_for(lambda: next((c for c in run.contacts[seen:] if c.re_k > k), None), f"a tick after {k}")
+        return name in {contact.second for contact in answer.contacts}
+
+    def edit(name: str) -> bool:
+        for _ in range(5):
+            run.edit("add", AddObject, name=name, geometry=BALL, position=palm, quaternion=UPRIGHT, role="obstacle")
+            assert is_felt(name)
+            run.edit("role", SetRole, name=name, role="ghost")
+            assert not is_felt(name)
+            run.edit("role", SetRole, name=name, role="target")
+            assert is_felt(name)
+            run.edit("move", MoveObject, name=name, position=away)
+            assert not is_felt(name)
+            run.edit("move", MoveObject, name=name, position=palm)
+            assert is_felt(name)
+            run.edit("remove", OneName, name=name)
+            assert not is_felt(name)
+        return True
+
+    with ThreadPoolExecutor() as callers:
+        edits = [callers.submit(edit, f"ball {number}") for number in range(4)]
+        while not all(done.done() for done in edits):
+            run.tick()
+    assert all(done.result() for done in edits)
+    assert set(run.world()) == set(library().world.objects)
 
 
 def test_an_attached_object_goes_with_its_link_and_stays_where_it_is_detached(run: Stage) -> None:
