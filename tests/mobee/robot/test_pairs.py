@@ -57,3 +57,44 @@ def test_the_icubs_clusters_are_its_anatomy() -> None:
         assert frozenset((first, second)) in joined
     for first, second in (("chest", "l_forearm"), ("l_shoulder_3", "l_hand"), ("l_shoulder_1", "r_shoulder_1"), ("head", "l_shoulder_1")):
         assert frozenset((first, second)) not in joined
+
+
+def names_of(robot: Robot, pair: frozenset[int]) -> str:
+    return " ".join(sorted(robot.links[k] for k in pair))
+
+
+def test_every_pair_of_links_is_tested_or_has_its_reason(tmp_path: Path) -> None:
+    robot = chain(tmp_path, '<ignore first="b" second="j2"/>', steps=(0.3, 0.04, 0.3, 0.3, 0.3), hand=3)
+    assert {names_of(robot, pair): reason for pair, reason in robot.untested.items()} == {
+        "b j0": "joined at a cluster of joints (j0, j1)",
+        "b j1": "joined at a cluster of joints (j0, j1)",
+        "j0 j1": "joined at a cluster of joints (j0, j1)",
+        "j1 j2": "joined at j2",
+        "j2 j3": "joined at j3",
+        "j3 j4": "joined at j4",
+        "b j2": "the file says so, line 10",
+    }
+    tested = {frozenset((robot.shapes[i].link, robot.shapes[j].link)) for i, j in robot.solid_pairs}
+    assert tested | robot.untested.keys() == {frozenset((a, b)) for a in range(6) for b in range(a)}
+    assert not tested & robot.untested.keys()
+
+
+def test_a_hand_has_its_joint_as_reason(tmp_path: Path) -> None:
+    robot = chain(tmp_path, steps=(0.3, 0.3, 0.3, 0.3, 0.3), hand=1)
+    hand = {names_of(robot, pair) for pair, reason in robot.untested.items() if reason == "same hand (noSelfCollision of joint j1)"}
+    assert hand == {"j1 j3", "j1 j4", "j2 j4"}  # what is joined has that reason
+
+
+def test_a_pair_ignored_for_solids_only_is_untested_unless_its_fields_meet(tmp_path: Path) -> None:
+    one_part = chain(tmp_path, '<ignore first="b" second="j1" role="solid"/>')
+    assert one_part.untested[frozenset((0, 2))] == "the file says so, line 8"
+    assert frozenset((0, 2)) not in chain(tmp_path, '<ignore first="b" second="j1" role="field"/>').untested
+
+
+def test_of_the_shipped_robots_every_pair_of_links_with_solids_is_tested_or_has_a_reason() -> None:
+    for name in ("icub", "icub_2014", "katana", "icub_katana"):
+        robot = load_robot(name)
+        bearing = sorted({shape.link for shape in robot.shapes if shape.role == "solid"})
+        tested = {frozenset((robot.shapes[i].link, robot.shapes[j].link)) for i, j in (*robot.solid_pairs, *robot.field_pairs)}
+        assert {frozenset((a, b)) for a in bearing for b in bearing if a < b} <= tested | robot.untested.keys()
+        assert not tested & robot.untested.keys()

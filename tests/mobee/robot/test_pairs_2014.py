@@ -39,3 +39,11 @@ def test_the_published_robot_spares_neighbours_and_its_hands_but_not_its_arms() 
     for first, second in (("chest", "l_forearm"), ("l_forearm", "r_forearm"), ("head", "r_forearm")):
         assert frozenset((first, second)) in fields
     assert frozenset(("root_link", "chest")) not in fields
+
+
+def test_the_published_robot_gives_a_reason_for_what_it_spares() -> None:
+    robot = load_robot("icub_2014")
+    reasons = {frozenset(robot.links[k] for k in pair): reason for pair, reason in robot.untested.items()}
+    assert reasons[frozenset(("l_hand", "l_pinky_0_link"))] == "same hand (noSelfCollision)"
+    assert reasons[frozenset(("l_shoulder_3", "l_forearm"))] == "neighbours (rule of 2014)"
+    assert frozenset(("chest", "l_forearm")) not in reasons

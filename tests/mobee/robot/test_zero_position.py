@@ -157,6 +157,17 @@ def test_unknown_tags_and_attributes_are_ignored_with_a_warning_that_names_the_l
         assert len(read_robot(path).shapes) == 1
 
 
+def test_unknown_tags_are_ignored_wherever_they_stand(tmp_path: Path) -> None:
+    for line in (
+        "<constraintList><note/><constraint a='1' q='0' b='180'/></constraintList>",
+        '<marker name="m"><note/></marker>',
+        "<note><joint/></note>",
+    ):
+        path = robot_file(tmp_path, ARM[0], *ARM[1:4], line, ARM[4])
+        with pytest.warns(UserWarning, match="toy.xml:6: <note>: unknown tag is ignored with all inside"):
+            assert read_robot(path).motors == ("pan",)
+
+
 MOTOR = '<motor name="pan" minPos="-90" maxPos="90"><joint z="1"/></motor>'
 BAD = {
     "no number": ('<sphere radius="big"/>', "<sphere> radius: 'big' is not a number"),
