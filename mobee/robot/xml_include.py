@@ -1,4 +1,4 @@
-"""The tag robot: another robot file, standing somewhere in this one."""
+"""The tag robot: another robot file, zero-position XML or URDF, standing somewhere in this one."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from mobee.robot.join import Placed
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.read import read_urdf
 from mobee.robot.xml_file import is_file
 from mobee.robot.xml_node import Node, listed, shown
 from mobee.robot.xml_volume import AXIS, PLACE, Z, align, direction, turn_about
@@ -50,7 +51,12 @@ def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot])
         node.fail("file", f"more than {DEEPEST} files inside each other, or {MOST_FILES} in all", "Include fewer robots")
     axis = direction(node, AXIS, (0.0, 0.0, 1.0))
     rotation = turn_about(axis, np.deg2rad(node.number("angle", 0.0))) @ align(Z, axis)
-    return Placed(prefix, read(path, trail), node.vector(PLACE), rotation)
+    if path.suffix.lower() == ".urdf":
+        trail.into(path)
+        robot = read_urdf(path)
+    else:
+        robot = read(path, trail)
+    return Placed(prefix, robot, node.vector(PLACE), rotation)
 
 
 def _find(node: Node) -> Path:

@@ -30,6 +30,15 @@ def test_a_robot_of_another_file_stands_where_the_tag_says(tmp_path: Path) -> No
     np.testing.assert_array_equal(robot.solid_pairs, [[0, 1]])
 
 
+def test_a_urdf_may_be_included_too(tmp_path: Path) -> None:
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    joint = f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{limit}</joint>'
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm"><link name="a"/><link name="b"/>{joint}</robot>', encoding="utf-8")
+    robot = read_robot(written(tmp_path, "both.xml", '<robot name="u" file="arm.urdf" px="1"/>', '<robot name="k" file="katana"/>'))
+    assert robot.motors[0] == "u_j"
+    np.testing.assert_allclose(robot.joints[0].point, [1, 0, 0])
+
+
 def test_the_z_axis_of_an_included_robot_is_turned_to_h(tmp_path: Path) -> None:
     written(tmp_path, "arm.xml", ARM)
     robot = read_robot(written(tmp_path, "both.xml", '<robot file="arm.xml" hx="1"/>'))
