@@ -21,6 +21,8 @@ from mobee.robot.pairs import CLUSTER
 from mobee.robot.robot import Ints, Joint, LinkPair, Shape
 from mobee.robot.urdf.srdf import NamePair, Srdf
 
+MOST_BETWEEN = 6  # joints at one place: there are no more ways to move
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRules:
@@ -38,11 +40,16 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
     found: dict[LinkPair, str] = {}
     for index, joint in enumerate(joints):
         found[frozenset((joint.parent, index + 1))] = f"adjacent: joint {joint.name}"
-        between, link = [joint.name], joint.parent
-        while link > 0 and link not in solid and float(np.linalg.norm(joints[link - 1].point - joint.point)) < CLUSTER:
-            between.append(joints[link - 1].name)
-            link = joints[link - 1].parent
-            found[frozenset((link, index + 1))] = f"adjacent: joints {', '.join(reversed(between))} at one place"
+        link, between = joint.parent, 1
+        while (
+            0 < link
+            and link not in solid
+            and between < MOST_BETWEEN
+            and float(np.linalg.norm(joints[link - 1].point - joint.point)) < CLUSTER
+        ):
+            first = joints[link - 1]
+            link, between = first.parent, between + 1
+            found[frozenset((link, index + 1))] = f"adjacent: joints {first.name} to {joint.name} at one place"
     return found
 
 

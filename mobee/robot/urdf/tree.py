@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 import numpy as np
 
@@ -57,10 +58,12 @@ def read_tree(robot: Node) -> Tree:
     joints: dict[str, UrdfJoint] = {}
     for node in robot:
         if node.tag == "link":
-            _unique(node, links)
+            if node.text("name") in links:
+                _twice(node, links[node.text("name")])
             links[node.text("name")] = node
         elif node.tag == "joint":
-            _unique(node, {name: joint.node for name, joint in joints.items()})
+            if node.text("name") in joints:
+                _twice(node, joints[node.text("name")].node)
             joints[node.text("name")] = _read_joint(node)
     if not links:
         robot.fail("link", "the robot has no link", 'Add <link name="base"/>, or check that this is the file that xacro wrote')
@@ -69,10 +72,8 @@ def read_tree(robot: Node) -> Tree:
     return _connect(robot, links, joints)
 
 
-def _unique(node: Node, taken: dict[str, Node]) -> None:
-    name = node.text("name")
-    if name in taken:
-        node.fail("name", f"a second {node.tag} {name!r}", f"The first is in line {taken[name].line}: rename one")
+def _twice(node: Node, first: Node) -> NoReturn:
+    node.fail("name", f"a second {node.tag} {node.text('name')!r}", f"The first is in line {first.line}: rename one")
 
 
 def _read_joint(node: Node) -> UrdfJoint:
