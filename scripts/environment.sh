@@ -1,4 +1,4 @@
-# Sourced by ./launch and ./test: makes .venv from requirements.lock when it is missing or stale.
+# Sourced by ./launch and ./test: makes .venv from requirements.lock when it is missing or stale, and compiles the engine.
 # shellcheck shell=bash
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
@@ -83,4 +83,11 @@ ensure_environment() {
     if command -v flock >/dev/null; then flock 9; fi
     install_environment "$python" "$dependencies" "$project"
   ) 9>"$root/.venv.lock"
+}
+
+# Compiles the model's engine when its machine code is missing or its sources have changed; says how far it is.
+ensure_engine() {
+  local folder
+  folder="$("$venv/bin/python" -I "$root/mobee/engine/cache.py")" || return 1
+  [[ -e "$folder/ready" ]] || (cd "$root" && "$venv/bin/python" -m mobee.engine >/dev/null)
 }

@@ -6,7 +6,7 @@ A function with signatures is compiled, or loaded, when its module is imported, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -36,7 +36,7 @@ def inner(function: F) -> F:
 
 
 def _njit(function: F, signatures: tuple[str, ...]) -> F:
-    compiled = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
     if compiled is not function:  # NUMBA_DISABLE_JIT, for debugging, leaves it as it is
         compiled._cache = Shelf(function, FOLDER)
         for signature in signatures:

@@ -16,7 +16,10 @@ PERIOD = 10.0  # s between lines where they stay
 _DECORATED = re.compile(r"^@(?:inner|entry\b)", re.MULTILINE)
 
 
-class Progress(event.Listener):  # type: ignore[misc]  # Numba has no type information
+_events: Any = event  # Numba's type information ends here
+
+
+class Progress(event.Listener):
     """Counts what Numba compiles between `with` and its end."""
 
     def __init__(self, folder: Path) -> None:
@@ -29,11 +32,11 @@ class Progress(event.Listener):  # type: ignore[misc]  # Numba has no type infor
 
     def __enter__(self) -> Progress:
         say(f"compiling the engine into {self._folder}, once after an install or an edit: about half a minute ...")
-        event.register("numba:compile", self)
+        _events.register("numba:compile", self)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        event.unregister("numba:compile", self)
+        _events.unregister("numba:compile", self)
         if self._on_terminal:
             sys.stderr.write("\r\033[K")
         if kind is None:

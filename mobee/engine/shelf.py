@@ -23,7 +23,11 @@ from numba.core.serialize import dumps
 _CHECKSUM = 32  # bytes at the start of a file
 
 
-class Shelf(NullCache):  # type: ignore[misc]  # Numba has no type information
+_rebuild: Any = CompileResult._rebuild  # Numba's type information ends here
+_bytes: Any = dumps
+
+
+class Shelf(NullCache):
     """The machine code of one function, as Numba's dispatcher asks for it."""
 
     unwritten: OSError | None = None  # why the first file that could not be written was not; of all shelves
@@ -47,11 +51,11 @@ class Shelf(NullCache):  # type: ignore[misc]  # Numba has no type information
         payload = content[_CHECKSUM:]
         if hashlib.sha256(payload).digest() != content[:_CHECKSUM]:
             return None
-        return CompileResult._rebuild(target_context, *pickle.loads(payload))
+        return _rebuild(target_context, *pickle.loads(payload))
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Write the file of a compiled function; where that fails the function works all the same."""
-        payload = dumps(data._reduce())
+        payload = _bytes(data._reduce())
         path = self._path(sig, data.codegen)
         new = path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}")
         try:

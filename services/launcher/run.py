@@ -22,6 +22,7 @@ from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
 from services.launcher.child import Program
+from services.launcher.engine import EngineMissing, compile_engine
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
@@ -56,11 +57,12 @@ def launch(options: Options) -> int:
         check_robots(scenario)
         check_extras(scenario)
         check_ports(scenario)
+        compile_engine()
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
         session = open_router(endpoint)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (MissingExtra, PortInUse, BusUnreachable) as error:
+    except (MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)
