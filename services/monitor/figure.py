@@ -17,7 +17,7 @@ from services.monitor.volumes import drawn, recolored
 
 TIMELINE = "time"
 NORMAL = 0.05  # m, the arrow of a marker
-PUSH = 5.0  # length of a contact's arrow, in depths
+PUSH, LONGEST = 5.0, 0.15  # length of a contact's arrow: in depths, and at most in m
 
 
 class Figure:
@@ -77,7 +77,7 @@ class Figure:
                 "contacts",
                 rr.Arrows3D(
                     origins=[contact.point for contact in contacts],
-                    vectors=[PUSH * contact.depth * contact.normal for contact in contacts],
+                    vectors=[min(PUSH * contact.depth, LONGEST) * contact.normal for contact in contacts],
                     colors=[palette.FORCES["collision"]] * len(contacts),
                     radii=0.002,
                 ),

@@ -7,7 +7,7 @@ import rerun as rr
 
 from mobee.kinematics.quaternion import from_matrix
 from mobee.robot.robot import Array, ShapeKind
-from services.monitor.hull import hull_triangles
+from mobee.robot.urdf.hull import facets
 from services.monitor.palette import Rgba
 
 
@@ -39,13 +39,12 @@ def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
 
 def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
     """The hull of points (v, 3) with flat faces: every triangle has corners of its own."""
-    triangles = hull_triangles(points)
-    corners = points[triangles]
+    corners = facets(points)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return rr.Mesh3D(
         vertex_positions=corners.reshape(-1, 3),
-        triangle_indices=np.arange(3 * len(triangles)).reshape(-1, 3),
+        triangle_indices=np.arange(3 * len(corners)).reshape(-1, 3),
         vertex_normals=np.repeat(normals, 3, axis=0),
         albedo_factor=color,
     )

@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from mobee_cli.__main__ import main
+from tests.mobee.robot.check.arm import ARM
+from tests.mobee.robot.robot_files import robot_file
+
+pytest.importorskip("rerun")
+from services.monitor.page import program  # noqa: E402
+
+BALL = '<World><sphere name="ball" radius="0.03" px="-0.37" pz="0.1"/></World>'
+
+
+def test_a_recording_holds_robot_world_and_contacts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot, world, saved = robot_file(tmp_path, *ARM.splitlines()), tmp_path / "world.xml", tmp_path / "toy.rrd"
+    world.write_text(BALL)
+    assert main(["view", str(robot), "--world", str(world), "--save", str(saved)]) == 0
+    assert capsys.readouterr().out == f"{saved}: open it with `rerun {saved}`\n"
+    private = {**os.environ, "XDG_CONFIG_HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path)}
+    stats = subprocess.run([str(program()), "rrd", "stats", str(saved)], capture_output=True, text=True, check=True, env=private)
+    shown = {line.split(":")[0] for line in stats.stdout.splitlines() if line.startswith("/")}
+    assert {"/robot/bend", "/robot/bend/solids/fore", "/world/ball", "/contacts", "/plots/motors", "/events"} <= shown
+
+
+def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
+    robot = robot_file(tmp_path, *ARM.splitlines())
+    command = [sys.executable, "-m", "mobee_cli", "view", str(robot)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as shown:
+        assert shown.stdout and shown.stderr
+        told = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/\?url=\S+)\n", shown.stdout.readline())
+        assert told
+        with urllib.request.urlopen(told[1], timeout=5.0) as answer:
+            assert b"<html" in answer.read(2000).lower()
+        shown.send_signal(signal.SIGINT)
+        assert shown.wait(timeout=20) == 0
+        assert "Traceback" not in shown.stderr.read()
+
+
+def test_without_the_viewer_it_is_said_how_to_install_it(tmp_path: Path) -> None:
+    """In a process in which rerun cannot be imported, as if it were not installed."""
+    code = "import sys; sys.modules['rerun'] = None; from mobee_cli.__main__ import main; sys.exit(main(['view', 'katana']))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 3
+    assert done.stderr == "mobee view: a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder\n"
+
+
+def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", "icubb"]) == 2
+    assert "Did you mean 'icub'" in capsys.readouterr().err
+    assert main(["view", "katana", "--save", str(tmp_path / "missing" / "out.rrd")]) == 2
+    assert "make it" in capsys.readouterr().err
