@@ -126,7 +126,9 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         markers={one.name(key): marker(old) for key, old in robot.markers.items()},
         shapes=tuple(map(shape, robot.shapes)),
         clauses=tuple(map(clause, robot.clauses)),
-        untested={frozenset(map(link, pair)): reason for pair, reason in robot.untested.items()},
+        untested={
+            frozenset(map(link, pair)): f"{one.prefix}: {reason}" if one.prefix else reason for pair, reason in robot.untested.items()
+        },
         where={(kind, own if kind == "clause" else one.name(own)): line for (kind, own), line in robot.where.items()},
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mobee.robot.pairs import link_pairs
+from mobee.robot.pairs import link_pairs, merged
 from mobee.robot.robot import Ints, LinkPair, Robot, Shape
 
 
@@ -35,4 +35,4 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
     """Each robot's own reasons, but for its base, which has become everybody's, where that is tested now."""
     tested = link_pairs(shapes, *pairs)
-    return {pair: reason for body in bodies for pair, reason in body.untested.items() if pair not in tested}
+    return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from mobee.errors import RobotFileError
 from mobee.robot.robot import Array, Shape
 from mobee.robot.urdf.bounding import smallest, smallest_capsule
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
@@ -92,7 +93,7 @@ class ShapeReader:
             form.fail("scale", "has a factor of 0", "Write three factors such as 0.001 0.001 0.001")
         key = (find_mesh(form), tuple(scale.tolist()))
         if key not in self.known:
-            points = read_mesh(key[0]) * scale
+            points = _points(form, key[0]) * scale
             if not LARGEST >= float(np.ptp(points, axis=0).max()) >= SMALLEST:
                 extent = float(np.ptp(points, axis=0).max())
                 form.fail("scale", f"the mesh is {extent:g} m long", "Correct the scale: URDF counts in metres")
@@ -106,6 +107,13 @@ class ShapeReader:
         centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
         place = frame @ Frame(centre, np.eye(3))
         return replace(shape, kind="convex", position=place.position, vertices=vertices - centre)
+
+
+def _points(form: Node, path: Path) -> Array:
+    try:
+        return read_mesh(path)
+    except RobotFileError as error:
+        raise RobotFileError(f"{error} The robot names it in {form.file}:{form.line}: <mesh>.") from error
 
 
 def _length(form: Node, name: str) -> float:
