@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 
 import numpy as np
@@ -82,7 +81,6 @@ def test_the_next_evaluation_feels_what_another_thread_has_just_done():
     editor.join(PATIENCE)
 
 
-@pytest.mark.xfail(sys.version_info < (3, 12), reason="Pose uses functools.cached_property, which locks all poses before Python 3.12")
 @pytest.mark.parametrize("what", ["transforms", "contacts"])
 def test_all_edits_and_other_evaluations_go_on_while_an_evaluation_is_in_progress(monkeypatch, what):
     """An evaluation that does not come to its end holds up nobody."""
