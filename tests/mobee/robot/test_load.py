@@ -28,10 +28,10 @@ def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
         load_world("tabel")
 
 
-def test_a_missing_file_and_a_urdf_are_refused(tmp_path: Path) -> None:
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match="mine.xml: no such file"):
         load_robot(tmp_path / "mine.xml")
-    with pytest.raises(RobotFileError, match="mine.urdf: URDF files cannot be read yet"):
+    with pytest.raises(RobotFileError, match="mine.urdf: no such file. Give a path to a file"):
         load_robot(tmp_path / "mine.urdf")
 
 
