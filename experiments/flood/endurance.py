@@ -24,6 +24,7 @@ from mobee import Model, load_robot
 from mobee.model import Pose
 
 ROBOT = "icub"
+RECORDS = "endurance.csv"
 COLUMNS = ("seconds", "evaluations", "edits", "objects", "resident_mb", "torn", "exceptions")
 BURST, BREATH = 20, 1e-2  # edits, then s: the checks, in Python, need their time as well
 SAMPLE = 1.0  # s
@@ -125,7 +126,7 @@ class Endurance:
 
 def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[str, Any]:
     """Let `threads` threads edit for `duration` s, a record a second in endurance.csv; returns the verdict."""
-    path = folder / "endurance.csv"
+    path = folder / RECORDS
     path.unlink(missing_ok=True)  # an endurance that was broken off begins again
     run = Endurance(threads, seed)
     with Records(path, COLUMNS) as records, Progress() as progress, run.running():

@@ -1,8 +1,8 @@
-"""Figure 2.4: our curves beside what the thesis says in numbers."""
+"""Figure 2.4: our curves beside what the thesis says in numbers; and what an endurance run looks like over time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from experiments.flood.rates import binned
@@ -20,7 +20,7 @@ STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
 def draw(records: Sequence[Record], path: Path) -> Path:
     """Evaluations a second against the number of objects; raises InvalidValue if there is nothing to draw."""
     if not records:
-        raise InvalidValue(f"no records of a flood in {path.parent}: it was stopped before the first, or was an endurance run.")
+        raise InvalidValue(f"{path.parent} has no records of a flood: it was stopped before the first.")
     drawing = new_figure(8.0, 5.0)
     axes = drawing.add_subplot()
     claim = 'thesis: iCub, "hundreds of poses per second\n… with hundreds of obstacles"'
@@ -36,6 +36,21 @@ def draw(records: Sequence[Record], path: Path) -> Path:
     axes.set_title("Thesis figure 2.4: model evaluations while the world is flooded with edits")
     axes.grid(which="both", alpha=0.2)
     axes.legend(fontsize=8)
+    drawing.savefig(path, dpi=150)
+    return path
+
+
+def draw_endurance(records: Sequence[Mapping[str, str]], path: Path) -> Path:
+    """Resident memory, and the edits and evaluations so far, over time."""
+    drawing = new_figure(8.0, 5.0)
+    above, below = drawing.subplots(2, 1, sharex=True)
+    minutes = [float(record["seconds"]) / 60.0 for record in records]
+    above.plot(minutes, [float(record["resident_mb"] or "nan") for record in records])
+    above.set(ylabel="resident memory [MB]", ylim=(0.0, None), title="Several threads edit the world while the model evaluates")
+    for column in ("edits", "evaluations"):
+        below.plot(minutes, [int(record[column]) for record in records], label=column)
+    below.set(xlabel="time [min]", ylabel="so far", yscale="log")
+    below.legend()
     drawing.savefig(path, dpi=150)
     return path
 

@@ -6,6 +6,7 @@ import pytest
 
 import mobee
 from experiments import flood
+from experiments.flood.endurance import endure
 from experiments.matplotlib_figure import MatplotlibMissing
 
 HEAD = "robot,objects,edits,seconds,evaluations\n"
@@ -17,6 +18,12 @@ def test_the_figure_is_drawn_from_the_records(tmp_path):
     picture = flood.figure(tmp_path)
     assert picture.parent == tmp_path
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_of_an_endurance_run_its_course_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    endure(tmp_path, threads=1, duration=0.2, seed=0)
+    assert flood.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
 
 
 def test_without_records_there_is_nothing_to_draw(tmp_path):
