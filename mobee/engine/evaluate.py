@@ -40,13 +40,13 @@ def link_poses(integers: UInts, floats: Array, q: Array) -> Array:
     count, links = len(q), np.int64(integers[LINKS])
     joints = np.int64(integers[JOINTS])
     angles, sines, cosines = np.empty(joints), np.empty(joints), np.empty(joints)
-    flat = np.empty(12 * links)
+    flat, moved = np.empty(12 * links), np.ones(links, dtype=np.bool_)
     out = np.empty((count, links, 4, 4))
     motors = q.ravel()
     for b in range(count):
         joint_angles(integers, floats, motors, b * q.shape[1], angles)
         sines_cosines(angles, sines, cosines)
-        place_links(integers, floats, angles, sines, cosines, flat)
+        place_links(integers, floats, angles, sines, cosines, moved, flat)
         for link in range(links):
             for k in range(3):
                 for c in range(4):
@@ -86,15 +86,15 @@ def contacts(
     first, second = np.empty(most, dtype=np.uint64), np.empty(most, dtype=np.uint64)
     found_numbers, found_reals = np.empty(most * NUMBERS, dtype=np.int64), np.empty(most * REALS)
     keys, order = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
-    wrench, out = np.zeros(6 * links), np.empty(6)
+    wrench, out, moved = np.zeros(6 * links), np.empty(6), np.ones(links, dtype=np.bool_)
     room, used = 16 + 4 * len(q), 0
     numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
     motors, torques = q.ravel(), torque.ravel()
     for b in range(len(q)):
         joint_angles(integers, floats, motors, b * q.shape[1], angles)
         sines_cosines(angles, sines, cosines)
-        place_links(integers, floats, angles, sines, cosines, frames)
-        place_shapes(integers, floats, frames, slots, x, y, z)
+        place_links(integers, floats, angles, sines, cosines, moved, frames)
+        place_shapes(integers, floats, frames, moved, slots, x, y, z)
         bound_clusters(integers, slots, x, y, z, balls)
         pairs = own_pairs(integers, floats, slots, x, y, z, balls, first, second)
         pairs = world_pairs(integers, slots, balls, world, places, near, near_slot, first, second, pairs)
@@ -132,12 +132,12 @@ def jacobians(integers: UInts, floats: Array, q: Array, link: int, point: Array)
     """How points fixed to a link move with each motor, (B, 6, n): `point` (B, 3), in the link's frame, which is the root's at zero pose."""
     joints, links, motors = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[MOTORS])
     angles, sines, cosines, frames = np.empty(joints), np.empty(joints), np.empty(joints), np.empty(12 * links)
-    out = np.zeros((len(q), 6, motors))
+    out, moved = np.zeros((len(q), 6, motors)), np.ones(links, dtype=np.bool_)
     flat = q.ravel()
     for b in range(len(q)):
         joint_angles(integers, floats, flat, b * motors, angles)
         sines_cosines(angles, sines, cosines)
-        place_links(integers, floats, angles, sines, cosines, frames)
+        place_links(integers, floats, angles, sines, cosines, moved, frames)
         t = 12 * link
         x = frames[t] * point[b, 0] + frames[t + 1] * point[b, 1] + frames[t + 2] * point[b, 2] + frames[t + 3]
         y = frames[t + 4] * point[b, 0] + frames[t + 5] * point[b, 1] + frames[t + 6] * point[b, 2] + frames[t + 7]

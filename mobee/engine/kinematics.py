@@ -17,6 +17,7 @@ from mobee.engine.pack import (
     I_MOTOR,
     I_PARENT,
     JOINTS,
+    Flags,
     UInts,
 )
 from mobee.robot.robot import Array
@@ -69,8 +70,8 @@ def sines_cosines(angles: Array, sines: Array, cosines: Array) -> None:
 
 
 @inner
-def place_links(integers: UInts, floats: Array, angles: Array, sines: Array, cosines: Array, links: Array) -> None:
-    """Fill `links` (12 L,), three rows of (rotation, shift) a link; the base stands still."""
+def place_links(integers: UInts, floats: Array, angles: Array, sines: Array, cosines: Array, moved: Flags, links: Array) -> None:
+    """Fill `links` (12 L,), three rows of (rotation, shift) a link, where `moved` (L,) says so; the base stands still."""
     for k in range(_U12):
         links[k] = 0.0
     links[0], links[5], links[10] = 1.0, 1.0, 1.0
@@ -78,6 +79,8 @@ def place_links(integers: UInts, floats: Array, angles: Array, sines: Array, cos
     u3 = np.uint64(3)
     u4, u5, u6, u7, u8, u10, u11 = np.uint64(4), np.uint64(5), np.uint64(6), np.uint64(7), np.uint64(8), np.uint64(10), np.uint64(11)
     for j in range(integers[JOINTS]):
+        if not moved[j + _U1]:
+            continue
         p, o, f, g = integers[parent + j] * _U12, (j + _U1) * _U12, turn + _U9 * j, shift + u6 * j
         s, c = sines[j], cosines[j]
         r00, r01, r02, t0 = links[p], links[p + _U1], links[p + _U2], links[p + u3]

@@ -26,6 +26,7 @@ F_SCALE, F_OFFSET, F_ROTATION, F_SHIFT, F_AXIS, F_POINT, F_ROW, F_REACH = range(
 HEADER = 25
 
 UInts = NDArray[Any]  # of np.uint64, which the type checker would not let meet an int
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

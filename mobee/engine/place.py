@@ -29,7 +29,7 @@ from mobee.engine.layout import (
     SLOT,
     SPHERE,
 )
-from mobee.engine.pack import CLUSTERS, F_ROW, I_LINK, I_START, SHAPES, UInts
+from mobee.engine.pack import CLUSTERS, F_ROW, I_LINK, I_START, SHAPES, Flags, UInts
 from mobee.robot.robot import Array
 
 _SLOT, _ROW, _LINK = np.uint64(SLOT), np.uint64(ROW), np.uint64(12)
@@ -52,10 +52,15 @@ def _turn(links: Array, frame: np.uint64, floats: Array, f: np.uint64, slots: Ar
 
 
 @inner
-def place_shapes(integers: UInts, floats: Array, links: Array, slots: Array, x: Array, y: Array, z: Array) -> None:
-    """Fill what changes with the pose in every shape's slot, and the centres once more as columns x, y, z (S,)."""
+def place_shapes(integers: UInts, floats: Array, links: Array, moved: Flags, slots: Array, x: Array, y: Array, z: Array) -> None:
+    """Fill what changes with the pose in every shape's slot, and the centres once more as columns x, y, z (S,).
+
+    Where `moved` (L,) says that the link has not, all stays as it is.
+    """
     link, row = integers[I_LINK], integers[F_ROW]
     for i in range(integers[SHAPES]):
+        if not moved[integers[link + i]]:
+            continue
         at, frame, r = i * _SLOT, integers[link + i] * _LINK, row + i * _ROW
         p = r + _ROW_POSITION
         a, b, c = floats[p], floats[p + _1], floats[p + _2]
