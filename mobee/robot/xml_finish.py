@@ -15,7 +15,8 @@ from mobee.robot.xml_ignore import without_ignored
 from mobee.robot.xml_motors import finish_joints, order_motors, read_clauses
 from mobee.robot.xml_node import Node
 
-MOST = 1000  # of any one tag
+MOST_JOINTS = 500  # pairs of links grow with the square
+MOST_ELEMENTS_2014 = 500  # and the descents of pairs_2014.py faster
 
 
 def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
@@ -66,8 +67,8 @@ def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, I
     if rule == "joined":
         untested = merged(joined_links(joints), hand_links(draft.subtree, joints))
         return tested_pairs(draft.shapes, "field", untested), tested_pairs(draft.shapes, "solid", untested), untested
-    if len(draft.elements) > MOST:
-        root.fail("adjacency", f"the rule of 2014 knows at most {MOST} links and joints", 'Write adjacency="joined"')
+    if len(draft.elements) > MOST_ELEMENTS_2014:
+        root.fail("adjacency", f"the rule of 2014 is for at most {MOST_ELEMENTS_2014} links and joints", 'Write adjacency="joined"')
     field_pairs, solid_pairs = (published_pairs(draft.elements, draft.hosts, draft.shapes, role) for role in ("field", "solid"))
     tested = link_pairs(draft.shapes, field_pairs, solid_pairs)
     reasons = published_untested(draft.elements, draft.hosts, draft.shapes)
@@ -79,8 +80,8 @@ def _with_others(robot: Robot, draft: Draft) -> Robot:
     node, _ = draft.others[-1]
     own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers else []
     placed = own + [other for _, other in draft.others]
-    if sum(len(one.robot.shapes) for one in placed) > MOST_SHAPES or sum(len(one.robot.joints) for one in placed) > MOST:
-        node.fail("file", f"more than {MOST_SHAPES} shapes or {MOST} joints in all", "Include fewer or simpler robots")
+    if sum(len(one.robot.shapes) for one in placed) > MOST_SHAPES or sum(len(one.robot.joints) for one in placed) > MOST_JOINTS:
+        node.fail("file", f"more than {MOST_SHAPES} shapes or {MOST_JOINTS} joints in all", "Include fewer or simpler robots")
     try:
         joined = join_placed(placed, robot.name)
     except InvalidValue as error:

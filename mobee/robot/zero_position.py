@@ -12,14 +12,14 @@ from mobee.robot.robot import Joint, Robot
 from mobee.robot.xml_body import read_marker, read_shape, read_skeleton
 from mobee.robot.xml_convex import CONVEX_ATTRIBUTES
 from mobee.robot.xml_draft import Draft, Place, enter
-from mobee.robot.xml_finish import MOST, finish_robot
+from mobee.robot.xml_finish import MOST_JOINTS, finish_robot
 from mobee.robot.xml_ignore import IGNORE_ATTRIBUTES
 from mobee.robot.xml_include import INCLUDE_ATTRIBUTES, Trail, read_include
 from mobee.robot.xml_motors import read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
 
-MOST_IGNORES = 20_000  # a file that `write_xml` wrote names every pair
+MOST = {"joint": MOST_JOINTS, "ignore": 20_000}  # of one tag, in a file; 1000 of the others. `write_xml` names every ignored pair
 ROOT = "zeropositionkinematictree"
 AXES = ("x", "y", "z")
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
@@ -73,7 +73,7 @@ def _check_counts(root: Node) -> None:
     while waiting:
         node = waiting.pop()
         counts[node.tag] += 1
-        most = MOST_IGNORES if node.tag == "ignore" else MOST
+        most = MOST.get(node.tag, 1000)
         if counts[node.tag] > most and node.tag in KNOWN:
             node.fail("size of the file", f"more than {most} of this tag", "Divide the robot, or leave out what does not matter")
         waiting += reversed(node.children)

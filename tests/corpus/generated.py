@@ -31,7 +31,7 @@ REFUSED: dict[str, tuple[Callable[[], bytes], str]] = {
     "200 thousand elements": (many("<a/>", 200_000), "more than 50000 elements"),
     "nested 5000 deep": (lambda: around("<link>" * 5000 + "</link>" * 5000), "nested more than 200 elements deep"),
     "nested 200 thousand deep": (lambda: around("<a>" * 200_000 + "</a>" * 200_000), "nested more than 200 elements deep"),
-    "2000 joints": (many('<joint name="j{}" z="1"/>', 2000), "more than 1000 of this tag"),
+    "2000 joints": (many('<joint name="j{}" z="1"/>', 2000), "more than 500 of this tag"),
     "3000 shapes": (
         many(
             '<link><sphere radius="1"/><box width="1" height="1" depth="1"/><capsule name="c{}" radius="1" height="1"/></link>',
@@ -43,13 +43,13 @@ REFUSED: dict[str, tuple[Callable[[], bytes], str]] = {
     "a megabyte as a link": (lambda: around(f'<ignore first="{"pam" * 300_000}" second="pan"/>'), "unknown link 'pampam"),
     "a megabyte as a motor": (lambda: around(f'<joint name="j" z="1" motor="{"pam" * 300_000}"/>'), "unknown motor 'pampam"),
     "a megabyte as a tag": (lambda: around(f'<{"link" * 250_000}/><link x="far"/>'), "'far' is not a number"),
-    "2000 links and the rule of 2014": (
-        lambda: (
-            many('<link><link x="{}"/></link>', 499)()
-            .replace(b'"toy"', b'"toy" adjacency="published_2014"')
-            .replace(b'"498"', b'"498" radius="-1"')
-        ),
-        "-1 is not positive",
+    "800 links and the rule of 2014": (
+        lambda: many('<link x="{}"/>', 800)().replace(b'"toy"', b'"toy" adjacency="published_2014"'),
+        "the rule of 2014 is for at most 500 links and joints",
+    ),
+    "500 joints in one place and a mistake in the end": (
+        lambda: many('<joint name="j{}" z="1"/>', 498)().replace(b"</bodypart>", b'</bodypart><ignore first="j1" second="nobody"/>'),
+        "unknown link 'nobody'",
     ),
 }
 
