@@ -42,10 +42,24 @@ def test_the_main_flow_in_the_readme_runs(tmp_path: Path) -> None:
 
 
 def test_the_readers_own_robot_learns(tmp_path: Path) -> None:
-    (flow,) = blocks("docs/robots.md", tmp_path)
+    flow, _ = blocks("docs/robots.md", tmp_path)
     motors, transition = run(tmp_path, "-c", flow).splitlines()
     assert motors.startswith("('pan', 'bend') [")
     assert transition.startswith("Transition(n=10, ")
+
+
+def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
+    _, check = blocks("docs/robots.md", tmp_path)
+    assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [
+        ["error", "slips.xml:3"],
+        ["warning", "slips.xml:5"],
+        ["note", "slips.xml:1"],
+    ]
+    printed = re.search(r"^\$ mobee check slips\.xml\n(.*?)^\.\.\.$", (ROOT / "docs/robots.md").read_text(), re.DOTALL | re.MULTILINE)
+    assert printed
+    told = subprocess.run([sys.executable, "-m", "mobee_cli", "check", "slips.xml"], cwd=tmp_path, capture_output=True, text=True)
+    assert told.returncode == 1
+    assert told.stdout.startswith(printed[1])
 
 
 @pytest.mark.system

@@ -29,8 +29,9 @@ def fields(subject: Subject) -> Iterator[Finding]:
             subject.where("robot", subject.robot.name),
             "the robot has no field",
             "it feels no force before its solids touch: the controller cannot keep it away from itself or from the world",
-            ("write it as XML with `mobee convert`, then " if subject.is_urdf else "")
-            + 'give what shall keep away a field: field=".06" at a link, or a shape with field="true"',
+            "`mobee convert IN.urdf OUT.xml --field 0.03` gives every solid a field that reaches 3 cm farther; keep those that you want"
+            if subject.is_urdf
+            else 'give what shall keep away a field: field=".06" at a link, or a shape with field="true"',
         )
         return
     bare = [subject.robot.links[link] for (link, _), (solids, around) in sorted(links.items()) if solids and not around]

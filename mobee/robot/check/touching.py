@@ -46,7 +46,7 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 subject.where("shape", contact.first),
                 f"at home {pair} collide, {length(contact.depth)} deep",
                 "the robot starts in a collision that it could not have moved into",
-                "choose a home with `mobee convert`, for a URDF has none (0 is taken, or the nearest limit), or correct a shape"
+                'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
                 if subject.is_urdf
                 else "move the home, make a shape smaller, or correct where one is placed",
             )
