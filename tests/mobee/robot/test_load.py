@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from mobee.errors import RobotFileError, UnknownName
+from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.model import Model
 from mobee.robot.load import ROBOTS, load_robot, load_world, shipped_robots, shipped_worlds
+from tests.mobee.robot.urdf_files import arm_with, srdf_file
 
 
 def test_every_shipped_robot_and_world_is_read_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
@@ -33,6 +36,36 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         load_robot(tmp_path / "mine.xml")
     with pytest.raises(RobotFileError, match="mine.urdf: no such file. Give a path to a file"):
         load_robot(tmp_path / "mine.urdf")
+
+
+def test_a_urdf_is_loaded_by_its_path_with_its_options(tmp_path: Path) -> None:
+    path = arm_with(tmp_path, '<box size="0.1 0.1 0.1"/>')
+    assert [shape.name for shape in load_robot(path).shapes] == ["palm"]
+    assert [shape.name for shape in load_robot(str(path), field=0.03).shapes] == ["palm", "palm_field"]
+    assert Model(load_robot(path, meshes="bounding")).evaluate(np.zeros(2)).position("hand") == pytest.approx([2, 0, 0])
+    srdf = srdf_file(tmp_path, '<group name="left"><joint name="shoulder"/></group><group name="right"><joint name="elbow"/></group>')
+    assert list(load_robot(path).parts) == list(load_robot(path, srdf=srdf).parts) == ["left", "right"]
+
+
+@pytest.mark.parametrize("option", [{"field": 0.03}, {"meshes": "hull"}, {"srdf": "x.srdf"}])
+def test_options_of_a_urdf_are_refused_for_other_files(option: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValue, match=f"{next(iter(option))}= is for .urdf files, and .*katana.xml is none.*Leave it out"):
+        load_robot("katana", **option)
+
+
+def test_unknown_values_of_options_are_refused(tmp_path: Path) -> None:
+    path = arm_with(tmp_path, '<box size="0.1 0.1 0.1"/>')
+    with pytest.raises(InvalidValue, match='meshes=.exact. is unknown. Valid: "hull", "bounding"'):
+        load_robot(path, meshes="exact")  # type: ignore[arg-type]
+    with pytest.raises(RobotFileError, match="nowhere.srdf: cannot be read"):
+        load_robot(path, srdf=tmp_path / "nowhere.srdf")
+
+
+def test_xacro_is_refused_with_the_command_that_makes_a_urdf_of_it(tmp_path: Path) -> None:
+    with pytest.raises(
+        RobotFileError, match="mine.urdf.xacro: xacro files are made into URDF first. Run: xacro mine.urdf.xacro > mine.urdf"
+    ):
+        load_robot(tmp_path / "mine.urdf.xacro")
 
 
 def test_the_katana_of_appendix_b_rests_without_touching_itself() -> None:

@@ -93,7 +93,8 @@ def random_robot(seed: int, tilt: float) -> Robot:
     for k in range(count + 1):
         for kind, size in kinds.items():
             rotation = upside_down if rng.random() < 0.5 else turned(seed + k)
-            vertices = rng.normal(size=(8, 3)) if kind == "convex" else None
+            corners = rng.normal(size=(8, 3))
+            vertices = corners / np.linalg.norm(corners, axis=1)[:, None] if kind == "convex" else None
             role = "field" if rng.random() < 0.4 else "solid"
             part = str(rng.choice(list(parts)))
             name = f"s{k}_{kind}"
