@@ -72,7 +72,7 @@ def place_shapes(integers: UInts, floats: Array, links: Array, moved: Flags, slo
         if kind == SPHERE:
             continue
         f = r + _ROW_ROTATION
-        for column in range(_1 if kind == CAPSULE else _3):  # of a capsule only the axis and one across are ever asked for
+        for column in range(_3):
             _turn(links, frame, floats, f + column, slots, at + _ROTATION + column)
         if kind == CAPSULE or kind == CYLINDER:
             half = floats[r + _ROW_HALF + _1]
