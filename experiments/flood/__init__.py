@@ -3,7 +3,7 @@
 Claim: every joint moves, one thread removes and creates boxes as fast as it can, ever more of them; the model gives a consistent
 answer hundreds of times a second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4,
 figure 2.4.  Published: "hundreds of poses per second for a humanoid with hundreds of obstacles" on a dual-core 2.4 GHz laptop;
-the figure's curves are not given as numbers.  Run time: about five minutes for the whole algorithm, 1000 numbers of
+the figure's curves are not given as numbers.  Run time: three to five minutes for the whole algorithm, 1000 numbers of
 objects with 1000 removals and creations each, for both robots.
 
 `--check` runs the endurance instead: several threads add, move, remove, attach, detach and change roles in one world while the

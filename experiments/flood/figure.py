@@ -12,7 +12,7 @@ from mobee.errors import InvalidValue
 
 COLORS = {"katana": "tab:orange", "icub": "tab:blue"}
 LABELS = {"katana": "Katana", "icub": "iCub"}
-BIN = 0.2  # s of flood a point of a curve
+BIN = 1.0  # s of flood a point of a curve
 HUNDREDS = (100.0, 1000.0)
 STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
 
@@ -46,7 +46,8 @@ def draw_endurance(records: Sequence[Mapping[str, str]], path: Path) -> Path:
     above, below = drawing.subplots(2, 1, sharex=True)
     minutes = [float(record["seconds"]) / 60.0 for record in records]
     above.plot(minutes, [float(record["resident_mb"] or "nan") for record in records])
-    above.set(ylabel="resident memory [MB]", ylim=(0.0, None), title="Several threads edit the world while the model evaluates")
+    above.set(ylabel="resident memory [MB]", title="Several threads edit the world while the model evaluates")
+    above.set_ylim(0.0, 1.2 * above.get_ylim()[1])
     for column in ("edits", "evaluations"):
         below.plot(minutes, [int(record[column]) for record in records], label=column)
     below.set(xlabel="time [min]", ylabel="so far", yscale="log")
