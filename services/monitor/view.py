@@ -20,7 +20,7 @@ from services.monitor.output import open_output
 from services.monitor.sweep import RATE, sweep
 
 VIEWPOINT = np.array([-1.0, -0.9, 0.6])  # from where the robot is seen
-MOST_NAMES = 8  # a longer legend hides the plot
+MOST_NAMES = 4  # a longer legend hides the plot
 DISTANCE = 1.4  # of the eye, in diameters of the scene
 
 

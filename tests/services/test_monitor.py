@@ -18,6 +18,7 @@ import pytest
 
 from bus_schema import keys
 from bus_schema.messages import ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, Transition, WorldObject
+from bus_schema.rpc import ObjectState
 from mobee.kinematics import link_transforms
 from mobee.kinematics.quaternion import to_matrix
 from mobee.robot.load import load_robot
@@ -72,6 +73,16 @@ class Notebook:
 def channels(shape: Any) -> list[tuple[int, int, int, int]]:
     packed = [int(value) for value in shape.colors.as_arrow_array().to_pylist()]
     return [(value >> 24, value >> 16 & 255, value >> 8 & 255, value & 255) for value in packed]
+
+
+def test_a_capsule_of_the_world_is_drawn_as_one() -> None:
+    notebook = Notebook()
+    turn = [0.5**0.5, 0.0, 0.5**0.5, 0.0]  # z to x
+    pole = ObjectState("pole", Geometry("capsule", [0.1, 0.4]), position=[1.0, 0.0, 0.0], quaternion=turn, role="obstacle", link="")
+    Scene(notebook.stream, ROBOT).set_objects([pole])
+    capsule = notebook.logged["scene/objects/pole"][-1]
+    assert isinstance(capsule, rr.Capsules3D)
+    np.testing.assert_allclose(capsule.translations.as_arrow_array().to_pylist(), [[0.8, 0.0, 0.0]], atol=1e-6)
 
 
 def test_a_field_is_red_while_it_is_in_contact() -> None:

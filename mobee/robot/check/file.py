@@ -65,4 +65,4 @@ def _listening(said: list[Finding]) -> Iterator[None]:
     for warning in caught:
         found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
         where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
-        said.append(Finding("warning", "reader", where, what, "what is ignored is missing from the robot", remedy))
+        said.append(Finding("warning", "reader", where, what, "the robot is not all that the file says", remedy))

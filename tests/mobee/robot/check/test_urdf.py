@@ -1,0 +1,58 @@
+"""A URDF and its SRDF, checked: the lines are theirs, and so are the remedies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mobee.robot.check import Finding, check_file
+
+URDF = """\
+<robot name="toy">
+ <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+ <link name="upper"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+ <link name="fore"><collision><geometry><sphere radius="0.06"/></geometry></collision></link>
+ <joint name="pan" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1"/><axis xyz="0 0 1"/>
+  <limit lower="-90" upper="90" velocity="1" effort="1"/></joint>
+ <joint name="bend" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.06"/><axis xyz="0 1 0"/>
+  <limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+ {}
+</robot>
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "toy.urdf"
+
+
+def of(path: Path, check: str) -> list[Finding]:
+    return [finding for finding in check_file(path).findings if finding.check == check]
+
+
+def test_limits_in_degrees_are_found_with_the_line_of_the_joint(file: Path) -> None:
+    file.write_text(URDF.format(""))
+    (finding,) = of(file, "joint-limits")
+    assert finding.where == f"{file}:5"
+    assert "joint 'pan' turns -5157 to 5157 deg" in finding.what
+
+
+def test_a_pair_that_always_touches_is_left_out_in_the_srdf(file: Path) -> None:
+    file.write_text(URDF.format("").replace('radius="0.06"', 'radius="0.12"'))
+    (finding,) = of(file, "always-touching")
+    assert finding.where == f"{file}:2"
+    assert '<disable_collisions link1="base" link2="fore" reason="Default"/>' in finding.remedy
+    file.with_suffix(".srdf").write_text('<robot name="toy"><disable_collisions link1="base" link2="fore" reason="Default"/></robot>')
+    assert of(file, "always-touching") == []
+
+
+def test_frames_of_the_base_are_a_note(file: Path) -> None:
+    fixed = '<link name="plate"/><joint name="bolt" type="fixed"><parent link="base"/><child link="plate"/></joint>'
+    file.write_text(URDF.format(fixed))
+    assert [(finding.severity, finding.what) for finding in of(file, "marker")] == [("note", "1 marker that no motor moves: plate")]
+
+
+def test_small_ranges_are_no_slip_for_a_urdf_is_read_in_radians(file: Path) -> None:
+    file.write_text(URDF.format("").replace('"-90" upper="90"', '"-0.1" upper="0.1"').replace('"-2" upper="2"', '"-0.05" upper="0.05"'))
+    assert of(file, "unit") == []
