@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 
 MOST_VERTICES = 64
 THINNEST = 1e-4  # m, half the thickness that a flat mesh is given
-MARGIN = 1e-9  # of the mesh's size, so that rounding leaves no vertex outside
+FLAT = 1e-7  # m, the thickness below which a mesh is flat
+SLIM = 1e-5  # the same, and half of what it is given, as a part of the mesh's length
+MARGIN = 1e-7  # of the mesh's size, so that neither rounding nor merging leaves a point outside
+NEAR = 1e-8  # of the mesh's size between corners that are one
 
 
 def convex_hull(points: Array) -> Array:
@@ -16,15 +20,19 @@ def convex_hull(points: Array) -> Array:
 
     It is the exact hull where that has no more vertices; else planes of the hull's facets are intersected, most
     protruding corner first, until 64 vertices are reached. Flat meshes are given a thickness of 0.2 mm.
+    Raises InvalidValue for points that no hull can be computed of.
     """
-    from scipy.spatial import ConvexHull  # 0.3 s, and only robots with meshes need it
+    from scipy.spatial import ConvexHull, QhullError  # 0.3 s, and only robots with meshes need it
 
-    points = _thickened(points)
-    hull = ConvexHull(points)
-    if len(hull.vertices) <= MOST_VERTICES:
-        exact: Array = points[hull.vertices]
-        return exact
-    return _enclosing(points[hull.vertices], hull.equations)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0  # digits are best spent near 0
+    local = _thickened(points - middle)
+    try:
+        hull = ConvexHull(local)
+        vertices = local[hull.vertices] if len(hull.vertices) <= MOST_VERTICES else _enclosing(local[hull.vertices], hull.equations)
+    except QhullError as error:
+        raise InvalidValue(f"the points have no convex hull ({str(error).splitlines()[0]})") from error
+    hull_vertices: Array = vertices + middle
+    return hull_vertices
 
 
 def facets(vertices: Array) -> Array:
@@ -46,9 +54,10 @@ def _thickened(points: Array) -> Array:
         thin = axes[:, 2]
         along = spread @ thin
         extent = float(np.abs(spread).max())
-        if along.max() - along.min() > max(2.0 * THINNEST * 1e-3, 1e-5 * extent):
+        if along.max() - along.min() > max(FLAT, SLIM * extent):
             return points
-        points = np.vstack([points + THINNEST * thin, points - THINNEST * thin])
+        half = max(THINNEST, SLIM * extent)
+        points = np.vstack([points + half * thin, points - half * thin])
     return points
 
 
@@ -63,13 +72,13 @@ def _enclosing(vertices: Array, planes: Array) -> Array:
     chosen = np.hstack([box, -(box @ vertices.T).max(axis=1, keepdims=True) - MARGIN * size])
     best = None
     while True:
-        corners = _merged(HalfspaceIntersection(chosen, inside).intersections, 1e-7 * size)
+        corners = _merged(HalfspaceIntersection(chosen, inside).intersections, NEAR * size)
         if best is not None and len(corners) > MOST_VERTICES:
             return best
         best = corners
         protruding = corners @ planes[:, :3].T + planes[:, 3]  # (corners, planes) m
         worst = np.unravel_index(int(protruding.argmax()), protruding.shape)
-        if protruding[worst] < 1e-7 * size:
+        if protruding[worst] < MARGIN * size:
             return best
         chosen = np.vstack([chosen, planes[worst[1]]])
 

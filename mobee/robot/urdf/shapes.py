@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.errors import RobotFileError
+from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.robot import Array, Shape
 from mobee.robot.urdf.bounding import smallest, smallest_capsule
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
@@ -97,7 +97,10 @@ class ShapeReader:
             if not LARGEST >= float(np.ptp(points, axis=0).max()) >= SMALLEST:
                 extent = float(np.ptp(points, axis=0).max())
                 form.fail("scale", f"the mesh is {extent:g} m long", "Correct the scale: URDF counts in metres")
-            self.known[key] = convex_hull(points)
+            try:
+                self.known[key] = convex_hull(points)
+            except InvalidValue as error:
+                form.fail("filename", str(error), "Export the mesh again, or draw a box or cylinder instead")
         vertices = self.known[key]
         frame = Frame(shape.position, shape.rotation)
         if self.meshes == "bounding":
