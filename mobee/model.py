@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,16 @@ from mobee.engine import engine_of
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.jacobian import point_jacobian
 from mobee.robot.robot import Array, Ints, Robot
+
+if TYPE_CHECKING:
+    from mobee.engine.track import Track
+
+
+class Finder(Protocol):
+    """What finds contacts."""
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
+        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
 
 
 class Engine(Protocol):
@@ -120,6 +130,10 @@ class Pose:
             for name, thing in self._snapshot.objects.items()
         }
 
+    def feel(self, finder: Finder) -> None:
+        """Have the contacts found now, and by other means than the model's own."""
+        self._felt = finder.contacts(self._flat, self._snapshot, self._reaching)
+
     @property
     def _flat(self) -> Array:
         return self.q.reshape(-1, self.q.shape[-1])
@@ -162,6 +176,17 @@ class Model:
         if value.ndim == 1:
             self.world.follow(pose)
         return pose
+
+    def track(self, skin: float = 0.02) -> Track:
+        """An evaluator for poses that follow each other closely, as while the robot moves; one for each thread.
+
+        `skin` m: pairs nearer than this are kept in a list.  The reference engine, python-fcl, has none and evaluates as ever.
+        """
+        if not 0.0 < skin < math.inf:
+            raise InvalidValue(f"skin {skin} m: must be a finite distance above 0")
+        from mobee.engine.track import Track
+
+        return Track(self.evaluate, self._engine, skin)
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
         """The marker's Jacobian, (..., 6, n): linear rows [m/rad] then angular, root frame, per motor (thesis eq. 5.1)."""

@@ -12,7 +12,7 @@ from mobee.engine.pack import Carried, Packed, pack
 from mobee.engine.rows import NUMBERS, REALS
 from mobee.engine.scene import COUNT, Scene, scene
 from mobee.errors import UnknownName
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array, Ints, Robot
 
 
 class Engine:
@@ -40,7 +40,7 @@ class Engine:
 
         `reaching`: link that spares the targets, -1 for none; `cut`: see `project`.
         """
-        here = self._scene_of(snapshot)
+        here = self.scene_of(snapshot)
         packed = here.packed
         room = self._take_room(here)
         own = len(self.robot.shapes)
@@ -48,8 +48,11 @@ class Engine:
             packed.integers, packed.floats, packed.vertices, here.integers, here.floats, here.carried, own, reaching, cut, q, room
         )
         self._rooms.append((here, room))
-        table = ContactTable(self._shapes, snapshot.names, numbers.reshape(-1, NUMBERS), reals.reshape(-1, REALS))
-        return table, torque
+        return self.table(snapshot, numbers, reals), torque
+
+    def table(self, snapshot: Snapshot, numbers: Ints, reals: Array) -> ContactTable:
+        """The table of what compiled code has written."""
+        return ContactTable(self._shapes, snapshot.names, numbers.reshape(-1, NUMBERS), reals.reshape(-1, REALS))
 
     def _take_room(self, here: Scene) -> Array:
         packed, size = here.packed, (len(here.packed.order) + int(here.integers[COUNT])) * SLOT
@@ -64,7 +67,8 @@ class Engine:
         evaluate.settle(packed.integers, packed.floats, here.integers, here.snapshot.rows.reshape(-1), room)
         return room
 
-    def _scene_of(self, snapshot: Snapshot) -> Scene:
+    def scene_of(self, snapshot: Snapshot) -> Scene:
+        """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
         known = self._scene
         if known is not None and known.snapshot is snapshot:
             return known

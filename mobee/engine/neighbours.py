@@ -1,0 +1,271 @@
+"""The contacts of poses that follow each other closely, by a list of neighbours (Verlet): pairs nearer than the skin at one pose.
+
+A list is of use until two volumes together may have moved by the skin since; until then a pair is looked at only when what its two
+volumes have moved adds up to what was between them.  What has not moved at all is neither placed nor tested again.  Where poses are
+far apart a list does not pay: every pose is then evaluated as any other, until the steps become short.
+
+What is remembered stands in three flat arrays, see `sizes`; nothing is allocated but the results.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mobee.engine.broad import own_pairs, world_pairs
+from mobee.engine.compiled import entry, inner
+from mobee.engine.forces import project
+from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
+from mobee.engine.layout import BOUND, CAPSULE, KIND, RADIUS, SLOT
+from mobee.engine.narrow.dispatch import overlap
+from mobee.engine.pack import CLUSTERS, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, UInts
+from mobee.engine.place import bound_clusters, place_shapes
+from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows, write_contact
+from mobee.engine.scene import COUNT
+from mobee.engine.sieve import sieve
+from mobee.robot.robot import Array, Ints
+
+# Header of `ints`: what there is, how many pairs are listed, how many poses the list has served.
+STATE, LISTED, SERVED = range(3)
+HEADER = 3
+EMPTY, PLACED, LIST, RENEW = range(4)  # nothing; the last pose; a list; the last pose, in a world that has changed under a useful list
+_PLAIN, _BUILD, _USE = range(3)
+
+MARGIN = 1e-9  # m: above the rounding of distances and of what was moved
+SHORT = 4.0  # steps of the present length that a new list must last to be worth making
+
+_0, _1, _12 = np.uint64(0), np.uint64(1), np.uint64(12)
+_BOUND, _KIND, _RADIUS = np.uint64(BOUND), np.uint64(KIND), np.uint64(RADIUS)
+_SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
+
+
+def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int, int]:
+    """How long the arrays of floats, of unsigned and of signed integers are, in this order."""
+    most = shapes * (shapes + 1) // 2 + shapes * objects
+    return joints + 24 * links + 8 * shapes + 5 * objects + most * (1 + 2 * REALS), 2 * most + objects, HEADER + most * (3 + 2 * NUMBERS)
+
+
+@inner
+def _find_moved(integers: UInts, angles: Array, last: Array, fresh: bool, moved: Flags) -> None:
+    """Mark the links (L,) that are carried by a joint whose angle differs from the last, and remember the angles."""
+    moved[0] = fresh
+    for j in range(integers[JOINTS]):
+        moved[j + _1] = moved[integers[integers[I_PARENT] + j]] or angles[j] != last[j]
+        last[j] = angles[j]
+
+
+@inner
+def _reach_out(integers: UInts, slots: Array, arm: Array) -> None:
+    """Fill how far from a shape's centre its points are that turn with it, (S,) [m]: of a ball none, of a capsule its axis."""
+    for i in range(integers[SHAPES]):
+        at = i * _SLOT
+        arm[i] = slots[at + _BOUND] - (slots[at + _RADIUS] if slots[at + _KIND] <= CAPSULE else 0.0)
+
+
+@inner
+def _measure(
+    integers: UInts,
+    moved: Flags,
+    frames: Array,
+    then: Array,
+    arm: Array,
+    x: Array,
+    y: Array,
+    z: Array,
+    x0: Array,
+    y0: Array,
+    z0: Array,
+    turn: Array,
+    way: Array,
+) -> float:
+    """Fill what every shape that moved may be away from where it was, `way` (S,) [m]; returns the most of all."""
+    for link in range(integers[LINKS]):
+        if not moved[link]:
+            continue
+        o, squared = link * _12, 0.0
+        for k in (0, 1, 2, 4, 5, 6, 8, 9, 10):
+            d = frames[o + np.uint64(k)] - then[o + np.uint64(k)]
+            squared += d * d
+        turn[link] = math.sqrt(0.5 * squared)  # by which a point 1 m from the centre is turned away: 2 sin(angle / 2)
+    most, start = 0.0, integers[I_LINK]
+    for i in range(integers[SHAPES]):
+        if moved[integers[start + i]]:
+            d, e, f = x[i] - x0[i], y[i] - y0[i], z[i] - z0[i]
+            way[i] = math.sqrt(d * d + e * e + f * f) + turn[integers[start + i]] * arm[i]
+        most = max(most, way[i])
+    return most
+
+
+@inner
+def _test(
+    integers: UInts,
+    vertices: Array,
+    world: UInts,
+    carried: Ints,
+    own_shapes: int,
+    reaching: int,
+    skin: float,
+    mode: int,
+    slots: Array,
+    way: Array,
+    first: UInts,
+    second: UInts,
+    gap: Array,
+    row_of: Ints,
+    pairs: np.uint64,
+    kept_numbers: Ints,
+    kept_reals: Array,
+    out: Array,
+    numbers: Ints,
+    reals: Array,
+) -> tuple[np.uint64, np.uint64]:
+    """Write the contacts among the pairs; returns how many, and how many of the pairs are neighbours, which then come first."""
+    found, kept = _0, _0
+    for p in range(pairs):
+        a, b = first[p], second[p]
+        if mode == _USE:
+            between = way[a // _SLOT] + way[b // _SLOT]
+            if between < gap[p]:
+                continue
+            if between == 0.0:  # both are where they were when the list was made
+                if row_of[p] >= 0:
+                    _copy(kept_numbers, kept_reals, np.uint64(row_of[p]), numbers, reals, found)
+                    found += _1
+                continue
+        depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
+        if mode == _BUILD:
+            if -depth >= skin:
+                continue
+            first[kept], second[kept], gap[kept], row_of[kept] = a, b, -depth - MARGIN, -1
+            kept += _1
+        if depth > 0.0:
+            written = write_contact(integers, world, carried, own_shapes, reaching, a, b, depth, out, numbers, reals, found)
+            if mode == _BUILD and written == _1:
+                _copy(numbers, reals, found, kept_numbers, kept_reals, found)
+                row_of[kept - _1] = np.int64(found)
+            found += written
+    return found, kept
+
+
+@inner
+def _copy(from_numbers: Ints, from_reals: Array, here: np.uint64, numbers: Ints, reals: Array, there: np.uint64) -> None:
+    """Copy one row."""
+    for k in range(_NUMBERS):
+        numbers[there * _NUMBERS + k] = from_numbers[here * _NUMBERS + k]
+    for k in range(_REALS):
+        reals[there * _REALS + k] = from_reals[here * _REALS + k]
+
+
+@inner
+def _choose(ints: Ints, most: float, skin: float) -> int:
+    """How to evaluate a pose in which a shape may be `most` away [m] from the pose remembered."""
+    state = ints[STATE]
+    if state == LIST:
+        if 2.0 * most < skin - MARGIN:
+            ints[SERVED] += 1
+            return _USE
+        return _BUILD if ints[SERVED] > 1 else _PLAIN
+    if state == RENEW or state == PLACED and SHORT * 2.0 * most < skin:
+        return _BUILD
+    return _PLAIN
+
+
+@entry(
+    "Tuple((int64[::1], float64[::1], float64[:,::1]))("
+    "uint64[::1], float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], float64[::1], int64[::1], int64, int64, "
+    "float64, float64[:,::1], float64[::1], float64[::1], uint64[::1], int64[::1])"
+)
+def follow(
+    integers: UInts,
+    floats: Array,
+    wide: Array,
+    vertices: Array,
+    world: UInts,
+    places: Array,
+    wide_places: Array,
+    carried: Ints,
+    own_shapes: int,
+    reaching: int,
+    skin: float,
+    q: Array,
+    slots: Array,
+    memory: Array,
+    pairs_memory: UInts,
+    ints: Ints,
+) -> tuple[Ints, Array, Array]:
+    """What `evaluate.contacts` returns for poses q (B, n) that follow each other, and what it remembers for the next call.
+
+    `wide`, `wide_places`: `floats` and `places` in which every pair and object reaches farther by the skin [m]; `memory`,
+    `pairs_memory` and `ints`: as long as `sizes` says, and kept for the same robot, world and reaching link.
+    """
+    joints, links, shapes = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[SHAPES])
+    objects, motors = np.int64(world[COUNT]), q.shape[1]
+    most = shapes * (shapes + 1) // 2 + shapes * objects
+    o, n = joints, 12 * links
+    last, frames, then = memory[:o], memory[o : o + n], memory[o + n : o + 2 * n]
+    o, n = o + 2 * n, shapes
+    x, y, z = memory[o : o + n], memory[o + n : o + 2 * n], memory[o + 2 * n : o + 3 * n]
+    x0, y0, z0 = memory[o + 3 * n : o + 4 * n], memory[o + 4 * n : o + 5 * n], memory[o + 5 * n : o + 6 * n]
+    arm, way = memory[o + 6 * n : o + 7 * n], memory[o + 7 * n : o + 8 * n + objects]
+    o, n = o + 8 * n + objects, most
+    near, gap = memory[o : o + 4 * objects], memory[o + 4 * objects : o + 4 * objects + n]
+    o = o + 4 * objects + n
+    kept_reals, found_reals = memory[o : o + n * REALS], memory[o + n * REALS : o + 2 * n * REALS]
+    first, second, near_slot = pairs_memory[:n], pairs_memory[n : 2 * n], pairs_memory[2 * n :]
+    o = HEADER
+    row_of, keys, order = ints[o : o + n], ints[o + n : o + 2 * n], ints[o + 2 * n : o + 3 * n]
+    o = o + 3 * n
+    kept_numbers, found_numbers = ints[o : o + n * NUMBERS], ints[o + n * NUMBERS : o + 2 * n * NUMBERS]
+    angles, sines, cosines = np.empty(joints), np.empty(joints), np.empty(joints)
+    moved, turn, balls = np.empty(links, dtype=np.bool_), np.empty(links), np.empty(4 * np.int64(integers[CLUSTERS]))
+    wrench, out = np.zeros(6 * links), np.empty(6)
+    room, used = 16 + 4 * len(q), 0
+    numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
+    given, torques = q.ravel(), torque.ravel()
+    for b in range(len(q)):
+        fresh = ints[STATE] == EMPTY or ints[STATE] == RENEW
+        joint_angles(integers, floats, given, b * motors, angles)
+        sines_cosines(angles, sines, cosines)
+        _find_moved(integers, angles, last, fresh, moved)
+        place_links(integers, floats, angles, sines, cosines, moved, frames)
+        place_shapes(integers, floats, frames, moved, slots, x, y, z)
+        if fresh:
+            _reach_out(integers, slots, arm)
+        else:
+            farthest = _measure(integers, moved, frames, then, arm, x, y, z, x0, y0, z0, turn, way)
+        mode = _choose(ints, 0.0 if fresh else farthest, skin)
+        pairs = np.uint64(ints[LISTED])
+        if mode != _USE:
+            bound_clusters(integers, slots, x, y, z, balls)
+            if mode == _BUILD:
+                for c in range(len(balls) // 4):
+                    balls[4 * c + 3] += skin
+            pairs = own_pairs(integers, wide if mode == _BUILD else floats, slots, x, y, z, balls, first, second)
+            pairs = world_pairs(
+                integers, slots, balls, world, wide_places if mode == _BUILD else places, near, near_slot, first, second, pairs
+            )
+            if mode == _PLAIN:
+                pairs = sieve(slots, first, second, pairs)
+            then[:], x0[:], y0[:], z0[:] = frames, x, y, z
+            way[:] = 0.0
+        count, kept = _test(
+            integers, vertices, world, carried, own_shapes, reaching, skin, mode, slots, way, first, second, gap, row_of, pairs,
+            kept_numbers, kept_reals, out, found_numbers, found_reals,
+        )  # fmt: skip
+        if mode != _USE:
+            ints[STATE], ints[LISTED], ints[SERVED] = (LIST if mode == _BUILD else PLACED), np.int64(kept), 0
+        if count == _0:
+            continue
+        rows = np.int64(count)
+        if used + rows > room:
+            room = 2 * room + rows
+            wider, taller = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS)
+            wider[: used * NUMBERS], taller[: used * REALS] = numbers[: used * NUMBERS], reals[: used * REALS]
+            numbers, reals = wider, taller
+        sort_rows(found_numbers, rows, keys, order)
+        append_rows(b, found_numbers, found_reals, order, rows, numbers, reals, used)
+        push_links(numbers, reals, used, rows, wrench)
+        project(integers, floats, frames, wrench, False, torques, b * motors)
+        used += rows
+    return numbers[: used * NUMBERS], reals[: used * REALS], torque
