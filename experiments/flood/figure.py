@@ -28,6 +28,8 @@ def draw(records: Sequence[Record], path: Path) -> Path:
     axes.axhline(STATE_RATE, color="0.5", linestyle=":", label="thesis: the iCub reports its state at 100 Hz")
     for robot, color in COLORS.items():
         mine = [record for record in records if record["robot"] == robot]
+        if not mine:
+            continue
         flooded = list(binned([record for record in mine if record["edits"]], BIN))
         still = list(binned([record for record in mine if not record["edits"]], 0.0))
         axes.plot(*_columns(flooded), color=color, label=f"{LABELS[robot]}, flooded")
