@@ -51,7 +51,7 @@ def world_file(name_or_path: str | Path) -> Path | None:
     given, path = str(name_or_path), Path(name_or_path)
     if given in shipped_worlds() and given not in shipped_robots():
         return WORLDS / f"{given}.xml"
-    if path.suffix != ".xml" or not path.is_file():
+    if path.suffix.lower() != ".xml" or not path.is_file():
         return None
     return path if read_xml(path).tag == "world" else None
 

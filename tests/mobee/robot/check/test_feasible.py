@@ -37,3 +37,16 @@ def test_one_row_of_a_clause_suffices() -> None:
 
 def test_a_clause_that_fights_the_limits_is_alone() -> None:
     assert conflict([clause(([1, 1, 1], 0.5)), clause(([1, 0, 0], -1.5))], LIMITS, np.zeros((1, 3))) == (1,)
+
+
+def test_among_many_clauses_of_two_rows_the_rows_that_are_nearly_satisfied_are_tried_first() -> None:
+    """Each of 12 motors has to be beyond .98 or below -2, and only the former can be."""
+    limits, count = np.array([[-1.0, 1.0]] * 12), 12
+    made = [clause((list(-np.eye(count)[k]), -2.0), (list(np.eye(count)[k]), -0.98)) for k in range(count)]
+    assert conflict(made, limits, np.zeros((1, count))) == ()
+
+
+def test_clauses_that_share_no_motor_are_judged_apart() -> None:
+    """Two pairs that fight: the first is named, and nothing of the second."""
+    made = [clause(([1, 0, 0], -0.5)), clause(([0, 1, 0], -0.5)), clause(([-1, 0, 0], 0.2)), clause(([0, -1, 0], 0.2))]
+    assert conflict(made, LIMITS, np.zeros((1, 3))) == (0, 2)
