@@ -19,24 +19,30 @@ FOLDER = cache_folder()
 
 # Not `nnan`/`ninf`: the engine tells NaN from numbers.
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
+_AS_WRITTEN = {"contract"}
 
 
 def entry(*signatures: str) -> Callable[[F], F]:
     """Compile a function that Python calls, for these signatures only, when its module is imported; it releases the GIL."""
 
     def compile_now(function: F) -> F:
-        return _njit(function, signatures)
+        return _njit(function, signatures, _FAST)
 
     return compile_now
 
 
 def inner(function: F) -> F:
     """Compile a function that only compiled functions call, with the first that does."""
-    return _njit(function, ())
+    return _njit(function, (), _FAST)
 
 
-def _njit(function: F, signatures: tuple[str, ...]) -> F:
-    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
+def inner_as_written(function: F) -> F:
+    """Like `inner`, for sums whose rounding depends on their order: no term is moved."""
+    return _njit(function, (), _AS_WRITTEN)
+
+
+def _njit(function: F, signatures: tuple[str, ...], fast: set[str]) -> F:
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=fast)(function)
     if compiled is not function:  # NUMBA_DISABLE_JIT, for debugging, leaves it as it is
         compiled._cache = Shelf(function, FOLDER)
         for signature in signatures:

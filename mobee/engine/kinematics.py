@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inner, inner_as_written
 from mobee.engine.pack import (
     DRIVES,
     F_OFFSET,
@@ -41,7 +41,7 @@ def joint_angles(integers: UInts, floats: Array, q: Array, first: int, angles: A
             angles[j] += floats[scale + slot * joints + j] * q[start + integers[motor + slot * joints + j]]
 
 
-@inner
+@inner_as_written
 def sines_cosines(angles: Array, sines: Array, cosines: Array) -> None:
     """Fill sin and 1 - cos of every angle, to the last bits: reduction to a quarter turn (Cody and Waite), then Taylor to 1e-17."""
     largest = 0.0

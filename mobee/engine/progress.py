@@ -13,7 +13,7 @@ from numba.core import event
 
 PERIOD = 10.0  # s between lines where they stay
 
-_DECORATED = re.compile(r"^@(?:inner|entry\b)", re.MULTILINE)
+_DECORATED = re.compile(r"^@(?:inner|entry)", re.MULTILINE)
 
 
 _events: Any = event  # Numba's type information ends here
