@@ -1,0 +1,64 @@
+"""One model, many threads: each evaluation is that of one consistent world, and the same as alone."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+import mobee
+from tests.mobee.engine.random_scenes import loaded, posed, random_world
+
+THREADS = 8
+
+
+def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.Generator) -> None:
+    robot = loaded("katana")
+    model, q = mobee.Model(robot, random_world(rng, robot, 120, 0.4)), posed(rng, robot, 40)
+    stop = threading.Event()
+
+    def edit(seed: int) -> None:
+        mine = np.random.default_rng(seed)
+        while not stop.is_set():
+            name = f"edited{seed}"
+            model.world.add(name, mobee.box(0.2, 0.2, 0.2), position=mine.uniform(-0.4, 0.4, 3))
+            model.world.move(name, position=mine.uniform(-0.4, 0.4, 3))
+            model.world.attach(name, robot.links[mine.integers(len(robot.links))], (mine.uniform(-0.2, 0.2, 3), np.eye(3)))
+            model.world.remove(name)
+
+    def evaluate(seed: int) -> list[mobee.Pose]:
+        poses = []
+        for index in np.random.default_rng(seed).integers(0, len(q), 60):
+            pose = model.evaluate(q[index] if seed % 2 else q[index : index + 3])
+            assert len(pose.table) >= 0  # now, while the others evaluate and edit
+            poses.append(pose)
+        return poses
+
+    editors = [threading.Thread(target=edit, args=(seed,)) for seed in range(2)]
+    for editor in editors:
+        editor.start()
+    try:
+        with ThreadPoolExecutor(THREADS) as pool:
+            threaded = [pose for poses in pool.map(evaluate, range(THREADS)) for pose in poses]
+    finally:
+        stop.set()
+        for editor in editors:
+            editor.join()
+
+    assert len({pose._snapshot.version for pose in threaded}) > 10
+    alone = mobee.Model(robot)
+    for pose in threaded:
+        table, torque = alone._engine.contacts(pose._flat, pose._snapshot, -1)
+        assert np.array_equal(pose.table.numbers, table.numbers)
+        assert np.array_equal(pose.table.reals, table.reals)
+        assert np.array_equal(pose.projection, torque.reshape(pose.q.shape))
+
+
+def test_threads_leave_at_most_a_room_each(rng: np.random.Generator) -> None:
+    robot = loaded("katana")
+    model, q = mobee.Model(robot, random_world(rng, robot, 50)), posed(rng, robot, 30)
+    with ThreadPoolExecutor(THREADS) as pool:
+        for _ in range(5):
+            list(pool.map(lambda one: len(model.evaluate(one).table), q))
+    assert len(model._engine._rooms) <= THREADS  # type: ignore[attr-defined]
