@@ -43,6 +43,7 @@ class Controller:
         if not 0 < speed_scale <= 1:
             raise InvalidValue(f"speed_scale {speed_scale}: must be above 0 and at most 1")
         self.model = model
+        self._track = model.track()
         self.robot = model.robot
         self.gains = gains if gains is not None else Gains.default()
         self.modality: Modality = modality
@@ -134,7 +135,7 @@ class Controller:
             require_stable(self.gains, dt)
         q = self._checked("q", q, len(self.robot.motor_table))
         if forces is None:
-            forces = self.forces(self.model.evaluate(q))
+            forces = self.forces(self._track.evaluate(q))
         a = acceleration(q, self.velocity, self._attractor, forces.total + self._client_forces(q), self.gains)
         wanted = np.clip(self.weight * (self.velocity + a * dt), -self._max_velocity, self._max_velocity)
         change = self._max_acceleration * dt

@@ -60,6 +60,7 @@ class OfflinePlant:
         self._actions: dict[str, _Action] = {}
         self._command: Command | None = None
         self._q = self.motors.encoders(dt)
+        self._track = model.track()
         self.pose: Pose | None = None  # the model at the last tick
 
     @property
@@ -111,7 +112,7 @@ class OfflinePlant:
         if not np.all(np.isfinite(self._q)):
             self._actions.clear()
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
-        self.pose = self.model.evaluate(self._q)
+        self.pose = self._track.evaluate(self._q)
         self._command = self.controller.step(self._q, self.dt, self.controller.forces(self.pose))
         step = self.dt / self._substeps
         for _ in range(self._substeps):

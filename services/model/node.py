@@ -33,6 +33,7 @@ class ModelNode:
         for name, item in list(self._model.world.objects.items()):
             if item.role == "target":
                 self._model.world.remove(name)
+        self._track = self._model.track()
         self._gains = Gains.named(config.gains)
         self._body = Body(service.bus, robot)
         self._q: Array = robot.home
@@ -61,7 +62,7 @@ class ModelNode:
         begin = time.perf_counter()
         self._desk.expire(clock.t)
         self._q = self._body.q()
-        pose = self._desk.pose = self._model.evaluate(self._q)
+        pose = self._desk.pose = self._track.evaluate(self._q)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         touching = {part: list(names) for part, names in touched(pose).items() if names}
         self._forces.put(
