@@ -6,6 +6,8 @@ joints.  The shapes of a group stand side by side in the packed robot; groups ne
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from mobee.engine.layout import ROW_BOUND, ROW_KIND, ROW_POSITION
@@ -13,18 +15,24 @@ from mobee.robot.robot import Array, Ints, Robot
 
 SMALL = 0.25  # of the robot's own radius; measured on the benchmark: 0.1 and 0.5 make the broad phase a fifth slower
 SAMPLES = 16
+_CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 
 
 def clusters(robot: Robot, rows: Array, link: Ints, role: Ints, own: int) -> list[list[int]]:
     """Indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
-    centers = _sampled_centers(robot, rows[:own], link[:own])
-    bound = rows[:own, ROW_BOUND]
+    groups = _CACHE.get(robot)  # what is carried changes while the robot moves, its own groups never do
+    if groups is None:
+        groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], role[:own])
+    return groups + [[index] for index in range(own, len(rows))]
+
+
+def _own_clusters(robot: Robot, rows: Array, link: Ints, role: Ints) -> list[list[int]]:
+    centers = _sampled_centers(robot, rows, link)
     groups: list[list[int]] = []
     for kind in range(2):
-        members = [[int(i) for i in np.flatnonzero((link[:own] == k) & (role[:own] == kind))] for k in range(len(robot.links))]
-        groups += _merge(robot, members, centers, bound)
-    by_kind = [sorted(group, key=lambda index: rows[index, ROW_KIND]) for group in groups]  # runs of one kind are guessed right
-    return by_kind + [[index] for index in range(own, len(rows))]
+        members = [[int(i) for i in np.flatnonzero((link == k) & (role == kind))] for k in range(len(robot.links))]
+        groups += _merge(robot, members, centers, rows[:, ROW_BOUND])
+    return [sorted(group, key=lambda index: rows[index, ROW_KIND]) for group in groups]  # runs of one kind are guessed right
 
 
 def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array) -> list[list[int]]:

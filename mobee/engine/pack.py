@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mobee.engine.clusters import clusters
 from mobee.engine.layout import ROW, ROW_BOUND, convex_row, volume_row
+from mobee.kinematics.vectors import cross
 from mobee.robot.robot import Array, Ints, LinkPair, Robot, Shape
 
 # Header: counts.
@@ -128,8 +129,7 @@ def _tested(robot: Robot, carried: Sequence[Carried]) -> NDArray[np.bool_]:
     count = len(robot.shapes)
     tested = np.zeros((count + len(carried),) * 2, dtype=bool)
     for pairs in (robot.solid_pairs, robot.field_pairs):
-        for a, b in pairs:
-            tested[a, b] = tested[b, a] = True
+        tested[pairs[:, 0], pairs[:, 1]] = tested[pairs[:, 1], pairs[:, 0]] = True
     for k, one in enumerate(carried, start=count):
         for index, shape in enumerate(robot.shapes):
             tested[k, index] = tested[index, k] = meets(robot, one.link, shape.link)
@@ -167,6 +167,7 @@ def _drives(robot: Robot) -> tuple[Ints, Array, Array]:
 def _motions(robot: Robot, axis: Array, point: Array) -> tuple[Array, Array]:
     """A joint's motion is I + sin(a) S + (1 - cos(a)) C: S's and C's rotations as u and u u^T - I, (J, 9), and shifts, (J, 6)."""
     rotation, shift = np.zeros((len(axis), 9)), np.zeros((len(axis), 6))
+    across = cross(axis, point)
     for j, joint in enumerate(robot.joints):
         u, p = axis[j], point[j]
         if joint.kind == "prismatic":
@@ -174,7 +175,7 @@ def _motions(robot: Robot, axis: Array, point: Array) -> tuple[Array, Array]:
             continue
         square = np.outer(u, u) - np.eye(3)
         rotation[j] = *u, square[0, 0], square[1, 1], square[2, 2], square[0, 1], square[0, 2], square[1, 2]
-        shift[j, :3], shift[j, 3:] = -np.cross(u, p), -square @ p
+        shift[j, :3], shift[j, 3:] = -across[j], -square @ p
     return rotation, shift
 
 
