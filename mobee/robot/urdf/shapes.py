@@ -16,6 +16,7 @@ from mobee.robot.urdf.frames import Frame, child, read_origin, triple
 from mobee.robot.urdf.hull import convex_hull
 from mobee.robot.urdf.mesh import read_mesh
 from mobee.robot.urdf.mesh_path import find_mesh
+from mobee.robot.xml_body import MOST_SHAPES
 from mobee.robot.xml_node import SMALLEST, Node, nearest
 
 Meshes = Literal["hull", "bounding"]
@@ -41,6 +42,7 @@ class ShapeReader:
     meshes: Meshes
     parts: Collection[str]
     known: dict[tuple[Path, tuple[float, ...]], Array] = field(default_factory=dict)
+    count: int = 0
 
     def read(self, link: Node, index: int, frame: Frame, part: str) -> list[Found]:
         """The solids of a <link>, and the fields that `write_urdf` noted; `frame`: the link's at zero pose, root frame."""
@@ -56,6 +58,9 @@ class ShapeReader:
         return _capsules(found)
 
     def _read(self, node: Node, name: str, note: Node | None, link: int, frame: Frame, part: str) -> Found:
+        self.count += 1
+        if self.count > MOST_SHAPES:
+            node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
         base = link == 0
         if note is not None:
             note.check_attributes({"field", "part", "base"})
@@ -128,24 +133,24 @@ def _length(form: Node, name: str) -> float:
 
 def _capsules(found: list[Found]) -> list[Found]:
     """URDF has no capsule of its own, so a cylinder with a sphere of its radius at either end is one."""
-    spheres = [k for k, one in enumerate(found) if one.shape.kind == "sphere"]
     caps: set[int] = set()
-    merged = []
-    for one in found:
-        shape = one.shape
-        if shape.kind == "cylinder":
-            radius, height = shape.size
-            ends = [shape.position + side * height / 2.0 * shape.rotation[:, 2] for side in (1.0, -1.0)]
-            at_ends = [[k for k in spheres if found[k].shape.role == shape.role and _is_cap(found[k].shape, radius, end)] for end in ends]
-            if all(at_ends):
-                caps |= {at_ends[0][0], at_ends[1][0]}
-                shape = replace(shape, kind="capsule")
-        merged.append(replace(one, shape=shape))
+    merged = list(found)
+    for role in ("solid", "field"):
+        spheres = [k for k, one in enumerate(found) if one.shape.kind == "sphere" and one.shape.role == role]
+        if len(spheres) < 2:
+            continue
+        balls = np.array([[*found[k].shape.position, found[k].shape.size[0]] for k in spheres])
+        for k, one in enumerate(found):
+            if one.shape.kind != "cylinder" or one.shape.role != role:
+                continue
+            radius, height = one.shape.size
+            half = height / 2.0 * one.shape.rotation[:, 2]
+            ends = [np.append(one.shape.position + side * half, radius) for side in (1.0, -1.0)]
+            at_ends = [np.flatnonzero(np.abs(balls - end).max(axis=1) < CLOSE) for end in ends]
+            if len(at_ends[0]) and len(at_ends[1]):
+                caps |= {spheres[at_ends[0][0]], spheres[at_ends[1][0]]}
+                merged[k] = replace(one, shape=replace(one.shape, kind="capsule"))
     return [one for k, one in enumerate(merged) if k not in caps]
-
-
-def _is_cap(sphere: Shape, radius: float, end: Array) -> bool:
-    return abs(sphere.size[0] - radius) < CLOSE and float(np.abs(sphere.position - end).max()) < CLOSE
 
 
 def grown(shape: Shape, by: float, name: str) -> Shape:

@@ -9,9 +9,11 @@ from pathlib import Path
 from mobee.robot.urdf.frames import bounded
 from mobee.robot.urdf.motors import Drive
 from mobee.robot.urdf.tree import Tree
-from mobee.robot.xml_node import Node, nearest, read_xml
+from mobee.robot.xml_node import Node, nearest, read_xml, shown
 
 NamePair = frozenset[str]
+MOST_GROUPS = 200
+MOST_COMPARED = 100  # names that a misspelt one is compared with
 
 
 @dataclass(slots=True, eq=False)
@@ -31,6 +33,8 @@ def read_srdf(path: Path, tree: Tree) -> Srdf:
         root.fail("root element", "this is not an SRDF file", "Its root is <robot name=...>")
     srdf = Srdf()
     groups = {node.text("name"): node for node in root if node.tag == "group"}
+    if len(groups) > MOST_GROUPS:
+        root.fail("group", f"has {len(groups)} groups", f"Write one group a part; at most {MOST_GROUPS} can be read")
     for name, node in groups.items():
         joints = dict.fromkeys(_joints_of(node, groups, tree))
         srdf.groups[name] = (node, tuple(joints))
@@ -61,7 +65,8 @@ def _known(node: Node, attribute: str, valid: Mapping[str, object]) -> Iterable[
     name = node.text(attribute)
     if name in valid:
         return (name,)
-    node.warn(f"the robot has no {name!r}, so this is ignored. {nearest(name, valid)}")
+    near = nearest(name, valid) if len(valid) <= MOST_COMPARED else ""  # a file may hold thousands of such lines
+    node.warn(f"the robot has no {shown(name)!r}, so this is ignored. {near}")
     return ()
 
 

@@ -49,6 +49,13 @@ def test_a_cylinder_with_spheres_at_its_ends_is_a_capsule(tmp_path: Path) -> Non
     assert [shape.kind for shape in read_urdf(urdf_file(tmp_path, *ARM, other, wrist)).shapes] == ["cylinder", "sphere", "sphere"]
 
 
+def test_more_shapes_than_can_be_tested_are_refused(tmp_path: Path) -> None:
+    ball = '<collision><geometry><sphere radius="1"/></geometry></collision>'
+    wrist = '<joint name="wrist" type="fixed"><parent link="lower"/><child link="hand"/></joint>'
+    with pytest.raises(RobotFileError, match=":7: <collision> size of the file: more than 2000 shapes. Join small shapes"):
+        read_urdf(urdf_file(tmp_path, *ARM, f'<link name="hand">{ball * 2001}</link>', wrist))
+
+
 def test_a_mesh_becomes_its_hull_about_the_hulls_middle(tmp_path: Path) -> None:
     write_stl(tmp_path / "t.stl", tetrahedron(0.1))
     shape = palm(tmp_path, '<mesh filename="t.stl" scale="2 1 -1"/>')

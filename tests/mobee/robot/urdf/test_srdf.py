@@ -145,6 +145,11 @@ def test_names_that_the_robot_does_not_have_are_warned_of(tmp_path: Path) -> Non
         read(tmp_path, '<disable_collisions link1="lefft" link2="right"/>')
 
 
+def test_more_groups_than_a_robot_can_have_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="toy.srdf:1: <robot> group: has 201 groups"):
+        read(tmp_path, *(f'<group name="g{k}"><joint name="elbow"/></group>' for k in range(201)))
+
+
 MALFORMED = {
     "no srdf": (('</robot><robot name="x">',), "not well-formed XML"),
     "no value": (
