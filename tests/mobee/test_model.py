@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -225,9 +226,8 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
     thread.start()
     counts = set()
     try:
-        for _ in range(100_000):
-            if len(counts) > 10:
-                break
+        for _ in range(2000):
+            time.sleep(1e-4)  # lets the other thread have its turn
             pose = model.evaluate(STRETCHED)
             boxes = [name for name in pose.objects if name.startswith("box")]
             touched = [c.second for c in pose.contacts if c.kind == "solid"]
