@@ -7,8 +7,23 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
+from mobee.engine.narrow.features import ALIGNED
 from mobee.engine.narrow.middle import store_contact
-from mobee.engine.narrow.slots import FLAT, HALF, ROTATION, TIE, Offset, Vector, centers_apart, into, out_of, own_axis, sign, vector
+from mobee.engine.narrow.slots import (
+    CENTER,
+    FLAT,
+    HALF,
+    TIE,
+    Offset,
+    Vector,
+    centers_apart,
+    into,
+    out_of,
+    own_axis,
+    sign,
+    store,
+    vector,
+)
 from mobee.robot.robot import Array
 
 _X, _Y, _Z = np.uint64(0), np.uint64(1), np.uint64(2)
@@ -71,8 +86,27 @@ def box_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
             least, depth = k + 1, others[k]
     nx, ny, nz = _direction(P, i, j, least)
     far = sign(nx * x + ny * y + nz * z)
-    store_contact(P, i, j, V, (far * nx, far * ny, far * nz), depth, out)
+    _store(P, i, j, V, (far * nx, far * ny, far * nz), depth, out)
     return depth
+
+
+@inner
+def _store(P: Array, i: Offset, j: Offset, V: Array, n: Vector, depth: float, out: Array) -> None:
+    """Write the contact: at a corner if one of the boxes is met there."""
+    back = depth / 2.0
+    ax, ay, az = into(P, i, -n[0], -n[1], -n[2])
+    bx, by, bz = into(P, j, n[0], n[1], n[2])
+    if min(abs(ax), abs(ay), abs(az)) > ALIGNED:
+        met, x, y, z = i, ax, ay, az
+    elif min(abs(bx), abs(by), abs(bz)) > ALIGNED:
+        met, x, y, z, back = j, bx, by, bz, -back
+    else:
+        store_contact(P, i, j, V, n, depth, out)
+        return
+    hx, hy, hz = vector(P, met + HALF)
+    x, y, z = out_of(P, met, math.copysign(hx, x), math.copysign(hy, y), math.copysign(hz, z))
+    cx, cy, cz = vector(P, met + CENTER)
+    store(out, n, (cx + x + back * n[0], cy + y + back * n[1], cz + z + back * n[2]))
 
 
 @inner

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
-from mobee.engine.narrow.slots import CENTER, HALF, RADIUS, TIE, TOUCHING, ONE, centers_apart, into, out_of, sign, store, vector
+from mobee.engine.narrow.slots import CENTER, HALF, ONE, RADIUS, TIE, TOUCHING, centers_apart, into, out_of, sign, store, vector
 from mobee.robot.robot import Array
 
 

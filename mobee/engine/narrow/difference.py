@@ -11,7 +11,7 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.features import BOX, CAPSULE, CYLINDER, SPHERE
-from mobee.engine.narrow.slots import HALF, KIND, RADIUS, ROTATION, Offset, Vector, centers_apart, into, own_axis, vector
+from mobee.engine.narrow.slots import HALF, KIND, RADIUS, Offset, Vector, centers_apart, into, own_axis, vector
 from mobee.robot.robot import Array
 
 FRAME = 12  # numbers: where the second is, seen from the first (3), and how it is turned (9, row-major)

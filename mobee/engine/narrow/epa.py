@@ -2,7 +2,9 @@
 
 Each step takes the face of the polytope that is closest to the origin (below it, where the polytope does not yet hold the
 origin) and adds the farthest point along its normal, until there is none.  How far the difference reaches along any direction
-tried is a true way out, whatever rounding did to the polytope, and the shortest of these is the answer.
+tried is a true way out, whatever rounding did to the polytope, and the shortest of these is the answer.  It is exact for
+polytopes.  With cylinders it is better than 1e-9 m, but where ways out all round an axis are nearly as short and the steps end
+first: there it may be too long by 1e-6 of the size.
 """
 
 from __future__ import annotations
@@ -13,15 +15,15 @@ import numpy as np
 
 from mobee.engine.compiled import inner
 from mobee.engine.narrow.difference import farthest
+from mobee.engine.narrow.polish import polish
 from mobee.engine.narrow.slots import FOUR, ONE, SIX, THREE, TIE, TWO, ZERO, Offset, Vector, vector
 from mobee.robot.robot import Array
 
 Indices = np.ndarray[tuple[int], np.dtype[np.uint64]]
 
-_STEPS = 124
-_CORNERS = _STEPS + 4
+_CORNERS = 128
 _FACES = 2 * _CORNERS
-_FULL = np.uint64(_FACES - 8)
+_FULL = np.uint64(_FACES - 8)  # which is sooner than there are too many corners
 _EXACT = 1e-12  # m, for volumes of up to a metre: the bounds have met
 
 
@@ -39,7 +41,8 @@ def way_out(P: Array, i: Offset, j: Offset, V: Array, frame: Array, shortest: fl
     for face in range(FOUR):
         a, b = face % THREE, (face + ONE) % THREE
         # 0 1 2, then 2 1 3, 0 2 3 and 1 0 3.
-        used = _add_face(corners, planes, faces, used, ZERO if face == ZERO else b, ONE if face == ZERO else a, TWO if face == ZERO else THREE)
+        a, b, c = (ZERO, ONE, TWO) if face == ZERO else (b, a, THREE)
+        used = _add_face(corners, planes, faces, used, a, b, c)
     best, found = math.inf, way
     low = -math.inf
     for count in range(FOUR, np.uint64(_CORNERS)):
@@ -51,7 +54,10 @@ def way_out(P: Array, i: Offset, j: Offset, V: Array, frame: Array, shortest: fl
         reach = x * p[0] + y * p[1] + z * p[2]
         if reach < best:
             best, found = reach, (x, y, z)
-        if size == 0.0 or best <= 0.0 or min(best, shortest - TIE, reach) - low <= exact or used > _FULL:
+        if size == 0.0 or best <= 0.0 or min(best, shortest - TIE, reach) - low <= exact:
+            break
+        if used > _FULL:
+            best, found = polish(P, i, j, V, frame, min(best, shortest), found if best < shortest - TIE else way)
             break
         corners[count * THREE], corners[count * THREE + ONE], corners[count * THREE + TWO] = p
         used = _expand(corners, planes, faces, edges, used, count, exact)

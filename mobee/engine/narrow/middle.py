@@ -31,7 +31,8 @@ def store_contact(P: Array, i: Offset, j: Offset, V: Array, normal: Vector, dept
     u = ny * t[2] - nz * t[1], nz * t[0] - nx * t[2], nx * t[1] - ny * t[0]
     ma, mb = most_corners(P, i), most_corners(P, j)
     room = (ma + mb) * TWO
-    one, two, spare = np.empty(room), np.empty(room), np.empty(room)
+    memory = np.empty(room * THREE)
+    one, two, spare = memory[:room], memory[room : room * TWO], memory[room * TWO :]
     ka = feature(P, i, V, (-nx, -ny, -nz), t, u, c, one)
     kb = feature(P, j, V, normal, t, u, (0.0, 0.0, 0.0), two)
     p, q = _shared(one, ka, two, kb, spare)

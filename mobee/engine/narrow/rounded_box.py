@@ -7,8 +7,24 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
-from mobee.engine.narrow.slots import CENTER, CORE, FLAT, HALF, RADIUS, TIE, TOUCHING, Offset, Vector, centers_apart, into, out_of
-from mobee.engine.narrow.slots import sign, store, unit, vector
+from mobee.engine.narrow.slots import (
+    CENTER,
+    CORE,
+    FLAT,
+    HALF,
+    RADIUS,
+    TIE,
+    TOUCHING,
+    Offset,
+    Vector,
+    centers_apart,
+    into,
+    out_of,
+    sign,
+    store,
+    unit,
+    vector,
+)
 from mobee.robot.robot import Array
 
 _FAR = 2.0  # a parameter beyond every segment's end

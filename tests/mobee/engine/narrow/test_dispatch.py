@@ -30,7 +30,7 @@ def pair(seed, first, second, spread=0.08):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_the_way_out_just_separates(first, second, seed):
     a, b, _ = pair(seed, first, second)
@@ -43,7 +43,7 @@ def test_the_way_out_just_separates(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), SORTED)
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(seed=SEEDS)
 def test_no_direction_separates_sooner(first, second, seed):
     a, b, rng = pair(seed, first, second)
@@ -54,7 +54,7 @@ def test_no_direction_separates_sooner(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), SORTED)
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_what_touches_and_how_far_the_rest_is_agree_with_coal(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.2)
@@ -65,7 +65,7 @@ def test_what_touches_and_how_far_the_rest_is_agree_with_coal(first, second, see
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_what_is_apart_gets_a_lower_bound_of_its_distance(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.3)
@@ -78,7 +78,7 @@ def test_what_is_apart_gets_a_lower_bound_of_its_distance(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(seed=SEEDS)
 def test_changing_places_turns_the_normal(first, second, seed):
     a, b, _ = pair(seed, first, second)
@@ -90,7 +90,7 @@ def test_changing_places_turns_the_normal(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(seed=SEEDS)
 def test_a_rigid_motion_of_both_moves_the_answer_with_them(first, second, seed):
     a, b, rng = pair(seed, first, second)
