@@ -1,8 +1,9 @@
 """The contacts of poses that follow each other closely, by a list of neighbours (Verlet): pairs nearer than the skin at one pose.
 
 A list is of use until two volumes together may have moved by the skin since; until then a pair is looked at only when what its two
-volumes have moved adds up to what was between them.  What has not moved at all is neither placed nor tested again.  Where poses are
-far apart a list does not pay: every pose is then evaluated as any other, until the steps become short.
+volumes have moved adds up to what was between them, and of two shapes of one hand also only when the joints between them have
+turned enough.  What has not moved at all is neither placed nor tested again.  Where poses are far apart a list does not pay: every
+pose is then evaluated as any other, until the steps become short.
 
 What is remembered stands in three flat arrays, see `sizes`; nothing is allocated but the results.
 """
@@ -19,7 +20,7 @@ from mobee.engine.forces import project
 from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
 from mobee.engine.layout import BOUND, CAPSULE, KIND, RADIUS, SLOT
 from mobee.engine.narrow.dispatch import overlap
-from mobee.engine.pack import CLUSTERS, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, UInts
+from mobee.engine.pack import CLUSTERS, I_KIND, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, UInts
 from mobee.engine.place import bound_clusters, place_shapes
 from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows, write_contact
 from mobee.engine.scene import COUNT
@@ -43,7 +44,11 @@ _SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
 def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int, int]:
     """How long the arrays of floats, of unsigned and of signed integers are, in this order."""
     most = shapes * (shapes + 1) // 2 + shapes * objects
-    return joints + 24 * links + 8 * shapes + 5 * objects + most * (1 + 2 * REALS), 2 * most + objects, HEADER + most * (3 + 2 * NUMBERS)
+    return (
+        2 * joints + 24 * links + 8 * shapes + 5 * objects + most * (1 + 2 * REALS),
+        2 * most + objects,
+        HEADER + most * (3 + 2 * NUMBERS),
+    )
 
 
 @inner
@@ -98,6 +103,30 @@ def _measure(
 
 
 @inner
+def _bend(integers: UInts, angles: Array, then: Array, spans: Array, bend: Array, sway: Array, chain: Array) -> None:
+    """Fill for every link three sums over the joints that carry it, from the base on.
+
+    `bend` [rad]: what they have turned since then; `sway` [m]: how far that may have moved the joint of the link;
+    `chain` [m]: how far the base is along the joints.  See `_swung`.
+    """
+    bend[0], sway[0], chain[0] = 0.0, 0.0, 0.0
+    for j in range(integers[JOINTS]):
+        link, parent, change, span = j + _1, integers[integers[I_PARENT] + j], abs(angles[j] - then[j]), spans[j]
+        slides = integers[integers[I_KIND] + j] == _1
+        span += abs(angles[j]) if slides else 0.0
+        bend[link] = bend[parent] + (0.0 if slides else change)
+        sway[link] = sway[parent] + bend[parent] * span + (change if slides else 0.0)
+        chain[link] = chain[parent] + span
+
+
+@inner
+def _swung(link: np.uint64, base: np.uint64, lever: float, bend: Array, sway: Array, chain: Array) -> float:
+    """How far a point may have moved that is `lever` from the joint of its link, as seen from a link that carries it [m]."""
+    turned = bend[base]
+    return sway[link] - sway[base] - turned * (chain[link] - chain[base]) + (bend[link] - turned) * lever
+
+
+@inner
 def _test(
     integers: UInts,
     vertices: Array,
@@ -109,6 +138,11 @@ def _test(
     mode: int,
     slots: Array,
     way: Array,
+    common: UInts,
+    levers: Array,
+    bend: Array,
+    sway: Array,
+    chain: Array,
     first: UInts,
     second: UInts,
     gap: Array,
@@ -121,7 +155,7 @@ def _test(
     reals: Array,
 ) -> tuple[np.uint64, np.uint64]:
     """Write the contacts among the pairs; returns how many, and how many of the pairs are neighbours, which then come first."""
-    found, kept = _0, _0
+    found, kept, shapes, links, link = _0, _0, integers[SHAPES], integers[LINKS], integers[I_LINK]
     for p in range(pairs):
         a, b = first[p], second[p]
         if mode == _USE:
@@ -133,6 +167,12 @@ def _test(
                     _copy(kept_numbers, kept_reals, np.uint64(row_of[p]), numbers, reals, found)
                     found += _1
                 continue
+            i, j = a // _SLOT, b // _SLOT
+            if gap[p] > 0.0 and j < shapes:
+                one, two = integers[link + i], integers[link + j]
+                base = common[one * links + two]
+                if _swung(one, base, levers[i], bend, sway, chain) + _swung(two, base, levers[j], bend, sway, chain) < gap[p]:
+                    continue
         depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
         if mode == _BUILD:
             if -depth >= skin:
@@ -174,7 +214,7 @@ def _choose(ints: Ints, most: float, skin: float) -> int:
 @entry(
     "Tuple((int64[::1], float64[::1], float64[:,::1]))("
     "uint64[::1], float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], float64[::1], int64[::1], int64, int64, "
-    "float64, float64[:,::1], float64[::1], float64[::1], uint64[::1], int64[::1])"
+    "float64, float64[:,::1], float64[::1], float64[::1], uint64[::1], int64[::1], uint64[::1])"
 )
 def follow(
     integers: UInts,
@@ -193,17 +233,21 @@ def follow(
     memory: Array,
     pairs_memory: UInts,
     ints: Ints,
+    common: UInts,
 ) -> tuple[Ints, Array, Array]:
     """What `evaluate.contacts` returns for poses q (B, n) that follow each other, and what it remembers for the next call.
 
-    `wide`, `wide_places`: `floats` and `places` in which every pair and object reaches farther by the skin [m]; `memory`,
-    `pairs_memory` and `ints`: as long as `sizes` says, and kept for the same robot, world and reaching link.
+    `wide`, `wide_places`: `floats` and `places` in which every pair and object reaches farther by the skin [m]; at the end of
+    `wide` stand each joint's distance from the one before and each shape's from its own [m].  `common`: the last link that
+    carries both of two links, (L L,).  `memory`, `pairs_memory` and `ints`: as long as `sizes` says, and kept for the same robot,
+    world and reaching link.
     """
     joints, links, shapes = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[SHAPES])
     objects, motors = np.int64(world[COUNT]), q.shape[1]
     most = shapes * (shapes + 1) // 2 + shapes * objects
-    o, n = joints, 12 * links
-    last, frames, then = memory[:o], memory[o : o + n], memory[o + n : o + 2 * n]
+    o, n = 2 * joints, 12 * links
+    last, angles0 = memory[:joints], memory[joints:o]
+    frames, then = memory[o : o + n], memory[o + n : o + 2 * n]
     o, n = o + 2 * n, shapes
     x, y, z = memory[o : o + n], memory[o + n : o + 2 * n], memory[o + 2 * n : o + 3 * n]
     x0, y0, z0 = memory[o + 3 * n : o + 4 * n], memory[o + 4 * n : o + 5 * n], memory[o + 5 * n : o + 6 * n]
@@ -219,6 +263,8 @@ def follow(
     kept_numbers, found_numbers = ints[o : o + n * NUMBERS], ints[o + n * NUMBERS : o + 2 * n * NUMBERS]
     angles, sines, cosines = np.empty(joints), np.empty(joints), np.empty(joints)
     moved, turn, balls = np.empty(links, dtype=np.bool_), np.empty(links), np.empty(4 * np.int64(integers[CLUSTERS]))
+    bend, sway, chain = np.empty(links), np.empty(links), np.empty(links)
+    spans, levers = wide[len(floats) : len(floats) + joints], wide[len(floats) + joints :]
     wrench, out = np.zeros(6 * links), np.empty(6)
     room, used = 16 + 4 * len(q), 0
     numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
@@ -236,7 +282,9 @@ def follow(
             farthest = _measure(integers, moved, frames, then, arm, x, y, z, x0, y0, z0, turn, way)
         mode = _choose(ints, 0.0 if fresh else farthest, skin)
         pairs = np.uint64(ints[LISTED])
-        if mode != _USE:
+        if mode == _USE:
+            _bend(integers, angles, angles0, spans, bend, sway, chain)
+        else:
             bound_clusters(integers, slots, x, y, z, balls)
             if mode == _BUILD:
                 for c in range(len(balls) // 4):
@@ -247,10 +295,11 @@ def follow(
             )
             if mode == _PLAIN:
                 pairs = sieve(slots, first, second, pairs)
-            then[:], x0[:], y0[:], z0[:] = frames, x, y, z
+            angles0[:], then[:], x0[:], y0[:], z0[:] = angles, frames, x, y, z
             way[:] = 0.0
         count, kept = _test(
-            integers, vertices, world, carried, own_shapes, reaching, skin, mode, slots, way, first, second, gap, row_of, pairs,
+            integers, vertices, world, carried, own_shapes, reaching, skin, mode, slots, way, common, levers, bend, sway,
+            chain, first, second, gap, row_of, pairs,
             kept_numbers, kept_reals, out, found_numbers, found_reals,
         )  # fmt: skip
         if mode != _USE:

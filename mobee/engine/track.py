@@ -12,9 +12,9 @@ from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
 from mobee.engine.engine import Engine
 from mobee.engine.evaluate import settle
-from mobee.engine.layout import ROW, ROW_BOUND, SLOT
+from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
 from mobee.engine.neighbours import EMPTY, HEADER, LIST, RENEW, SERVED, STATE, follow, sizes
-from mobee.engine.pack import F_REACH, F_ROW, JOINTS, LINKS, SHAPES, Packed, UInts
+from mobee.engine.pack import F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Packed, UInts
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene
 from mobee.robot.robot import Array, Ints
 
@@ -32,6 +32,7 @@ class Neighbours:
         self._packed: Packed | None = None
         self._wide = self._wide_places = self._floats = self._slots = np.empty(0)
         self._pairs: UInts = np.empty(0, dtype=np.uint64)
+        self._common: UInts = np.empty(0, dtype=np.uint64)
         self._ints: Ints = np.zeros(HEADER, dtype=np.int64)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
@@ -42,7 +43,7 @@ class Neighbours:
         packed, own = here.packed, len(self._engine.robot.shapes)
         numbers, reals, torque = follow(
             packed.integers, packed.floats, self._wide, packed.vertices, here.integers, here.floats, self._wide_places, here.carried,
-            own, reaching, self._skin, q, self._slots, self._floats, self._pairs, self._ints,
+            own, reaching, self._skin, q, self._slots, self._floats, self._pairs, self._ints, self._common,
         )  # fmt: skip
         return self._engine.table(snapshot, numbers, reals), torque
 
@@ -50,7 +51,7 @@ class Neighbours:
         """Forget the list; the world, what is carried, or who reaches, is another."""
         packed, header = here.packed, here.packed.integers
         if self._packed is not packed:
-            self._packed, self._wide = packed, _widened(packed, self._skin)
+            self._packed, self._wide, self._common = packed, _widened(packed, self._skin), _common(packed)
         objects, count = int(here.integers[COUNT]), len(packed.order)
         self._wide_places = here.floats.copy()
         self._wide_places[WIDEST] += self._skin
@@ -89,14 +90,50 @@ class Track:
 
 
 def _widened(packed: Packed, skin: float) -> Array:
-    """The floats of a packed robot, with pairs that reach farther by the skin."""
-    shapes = int(packed.integers[SHAPES])
-    row, reach = int(packed.integers[F_ROW]), int(packed.integers[F_REACH])
-    bound = packed.floats[row : row + shapes * ROW].reshape(shapes, ROW)[:, ROW_BOUND]
+    """The floats of a packed robot with pairs that reach farther by the skin, and behind them what `follow` says."""
+    shapes, joints = int(packed.integers[SHAPES]), int(packed.integers[JOINTS])
+    rows = _table(packed, F_ROW, shapes, ROW)
+    bound = rows[:, ROW_BOUND]
     wide = packed.floats.copy()
+    reach = int(packed.integers[F_REACH])
     tested = wide[reach : reach + shapes * shapes].reshape(shapes, shapes)
     tested[tested >= 0.0] = ((bound[:, None] + bound + skin) ** 2)[tested >= 0.0]
-    return wide
+    link, parent = _indices(packed, I_LINK, shapes), _indices(packed, I_PARENT, joints)
+    at = _joints_at(_table(packed, F_AXIS, joints, 3), _table(packed, F_POINT, joints, 3), parent)
+    spans = np.linalg.norm(at[1:] - at[parent], axis=1)
+    core = np.where(rows[:, ROW_KIND] <= CAPSULE, bound - rows[:, ROW_HALF], bound)
+    levers = np.linalg.norm(rows[:, ROW_POSITION : ROW_POSITION + 3] - at[link], axis=1) + core
+    return np.concatenate([wide, spans, levers])
+
+
+def _joints_at(axis: Array, point: Array, parent: Ints) -> Array:
+    """For every link a point on the axis of its joint, the nearest to the one before, (L, 3) at zero pose; the base's is its origin."""
+    at = np.zeros((len(axis) + 1, 3))
+    for j, before in enumerate(parent):
+        at[j + 1] = point[j] + ((at[before] - point[j]) @ axis[j]) * axis[j]
+    return at
+
+
+def _common(packed: Packed) -> UInts:
+    """The last link that carries both of two links, (L L,)."""
+    links = int(packed.integers[LINKS])
+    parent = _indices(packed, I_PARENT, links - 1)
+    carriers = [[0]]
+    for j, before in enumerate(parent):
+        carriers.append([*carriers[before], j + 1])
+    last = [[max(set(one).intersection(two)) for two in carriers] for one in carriers]
+    return np.array(last, dtype=np.uint64).ravel()
+
+
+def _table(packed: Packed, where: int, rows: int, columns: int) -> Array:
+    start = int(packed.integers[where])
+    return packed.floats[start : start + rows * columns].reshape(rows, columns)
+
+
+def _indices(packed: Packed, where: int, count: int) -> Ints:
+    start = int(packed.integers[where])
+    found: Ints = packed.integers[start : start + count].astype(np.intp)
+    return found
 
 
 def _at_least(room: NDArray[Any], length: int) -> NDArray[Any]:
