@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from experiments.bench.mujoco_peer import MujocoMissing
@@ -18,9 +19,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     benches = parser.add_subparsers(dest="bench", required=True, metavar="model")
     text = "The egocentric model beside MuJoCo and python-fcl, on one core, turn by turn: poses per second, and the same contacts."
     model = benches.add_parser("model", help="the egocentric model beside MuJoCo and python-fcl", description=text, epilog=_NOTES)
-    model.add_argument("--objects", type=_objects, nargs="+", default=[0, 10, 100, 1000], metavar="N", help="boxes, 0 to 1000 each")
+    model.add_argument(
+        "--objects",
+        type=_objects,
+        nargs="+",
+        default=[0, 10, 100, 1000],
+        metavar="N",
+        help="boxes, 0 to 1000 each (default: 0 10 100 1000)",
+    )
     model.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
-    model.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, and 50 poses to compare")
+    model.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, 50 poses to compare")
     model.add_argument("--figure", type=Path, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)")
     model.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -34,13 +42,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _model(arguments: argparse.Namespace) -> int:
-    from experiments.bench.model import Settings, measure
+    from experiments.bench.model import QUICK, Settings, measure
     from experiments.bench.model_report import report
 
-    amount = {"rounds": 5, "poses": 500, "compared_poses": 50} if arguments.quick else {}
-    if arguments.rounds:
-        amount["rounds"] = arguments.rounds
-    result = measure(Settings(boxes=tuple(sorted(set(arguments.objects))), **amount))
+    settings = QUICK if arguments.quick else Settings()
+    boxes = tuple(sorted(set(arguments.objects)))
+    compared = tuple(count for count in settings.compared_boxes if count in boxes)
+    result = measure(replace(settings, boxes=boxes, compared_boxes=compared, rounds=arguments.rounds or settings.rounds))
     print(json.dumps(result, indent=2) if arguments.json else report(result))
     return 0 if all(one["passed"] for one in result["requirements"] + result["agreement"]) else FAILED
 

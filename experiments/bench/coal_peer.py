@@ -28,7 +28,7 @@ class CoalPeer:
             import coal
             import pinocchio
         except ImportError:
-            raise CoalMissing("coal is not installed; from MoBeE's folder: pip install '.[dev]'") from None
+            raise CoalMissing("coal is not installed: pip install '.[dev]' in MoBeE's folder") from None
         self._pin, self._coupling = pinocchio, robot.coupling
         first, second, _ = tested_pairs(robot, snapshot, -1)
         self.pairs = np.stack([first, second], axis=1)

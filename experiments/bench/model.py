@@ -11,6 +11,7 @@ import importlib.util
 import itertools
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from mobee.robot.robot import Array, Robot
 
 BATCH, CALL, OBJECTS, KINEMATICS = "batch", "one call", "one call, Contact objects", "one call, kinematics only"
 MUJOCO, PAIRS, TREES = "MuJoCo", "python-fcl, pair by pair", "python-fcl, trees of boxes"
+_VERSIONS = {"numba": "numba", "numpy": "numpy", "mujoco": "mujoco", "python-fcl": "fcl", "coal": "coal"}  # package and its module
 _FCL_TESTS = 60_000  # of pairs in one round; a pose has up to 130 000
 
 
@@ -38,6 +40,9 @@ class Settings:
     poses: int = 2000
     compared_boxes: tuple[int, ...] = (0, 100)
     compared_poses: int = 500
+
+
+QUICK = Settings(rounds=5, poses=500, compared_poses=50)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,21 +67,21 @@ REQUIREMENTS = (
 
 def measure(settings: Settings) -> dict[str, Any]:
     """Everything that `mobee bench model --json` prints; raises MujocoMissing."""
-    robot = workload.robot()
-    with one_core() as core, Progress() as progress:
-        measured: dict[int, dict[str, Array]] = {}
-        for number, boxes in enumerate(settings.boxes):
-            steps = itertools.count(number * settings.rounds)
-
-            def show(boxes: int = boxes, steps: itertools.count[int] = steps) -> None:
-                progress.show(next(steps) / (settings.rounds * len(settings.boxes)), f"{boxes} boxes")
-
-            measured[boxes] = rates(contestants(robot, boxes, settings.poses), settings.rounds, show)
-    with_coal = importlib.util.find_spec("pinocchio") is not None
-    compared = [one for boxes in settings.compared_boxes for one in agreements(boxes, settings.compared_poses, with_coal)]
+    robot, with_coal = workload.robot(), importlib.util.find_spec("pinocchio") is not None
+    measured: dict[int, dict[str, Array]] = {}
+    with Progress() as progress:
+        with one_core() as core:
+            for done, boxes in enumerate(settings.boxes):
+                progress.show(0.7 * done / len(settings.boxes), f"timing among {boxes} boxes")
+                measured[boxes] = rates(contestants(robot, boxes, settings.poses), settings.rounds)
+        compared = []
+        for done, boxes in enumerate(settings.compared_boxes):
+            progress.show(0.7 + 0.3 * done / len(settings.compared_boxes), f"comparing contacts among {boxes} boxes")
+            compared += agreements(boxes, settings.compared_poses, with_coal)
     return {
         "workload": _about(robot, settings),
         "core": core,
+        "versions": {name: metadata.version(name) for name in _VERSIONS if importlib.util.find_spec(_VERSIONS[name])},
         "poses_per_second": {
             boxes: {name: float(np.median(values)) for name, values in found.items()} for boxes, found in measured.items()
         },

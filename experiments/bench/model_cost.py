@@ -53,6 +53,7 @@ def draw(curves: dict[str, Any], path: Path) -> None:
         axes.set_yscale("log")
         axes.grid(alpha=0.3)
     left.set_xscale("symlog", linthresh=3)
+    left.set_xlim(-0.5, 1400)
     left.set_xticks(BOXES, [str(count) for count in BOXES])
     right.set_xticks(PRIMITIVES, [str(count) for count in PRIMITIVES])
     left.set_ylabel("time a pose [us]")

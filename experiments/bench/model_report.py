@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 from experiments.bench.agreement import GRAZE
 from experiments.bench.model import KINEMATICS, MUJOCO, PAIRS, TREES
 
 _PEERS = (MUJOCO, PAIRS, TREES)
-_MUJOCO_NOTE = (
-    """MuJoCo's depths of boxes are of another kind: of each point of a contact along one normal, and of a capsule's end in a box."""
-)
+_WIDTH = 80
+_NOTE = "MuJoCo's depths are not judged: with a box they are per point of contact, of a capsule as of spheres on its axis."
 
 
 def report(result: dict[str, Any]) -> str:
     """The measurements as text."""
     about = result["workload"]
-    head = (
-        f"{about['motors']} motors, {about['joints']} joints, {about['primitives']} primitives, {about['pairs']} pairs of them, "
-        f"and N boxes\n{'not pinned' if result['core'] is None else 'one core'}, {about['rounds']} rounds, medians; the speed of the "
-        "machine drifts: compare ratios only"
+    head = _wrapped(
+        f"{about['motors']} motors, {about['joints']} joints, {about['primitives']} primitives, {about['pairs']} tested pairs; N boxes. "
+        f"Processor time {'of one core' if result['core'] is not None else '(not pinned to a core)'}, medians of {about['rounds']} rounds: "
+        "ratios can be compared, rates only within one run."
     )
-    return "\n\n".join([head, *_tables(result), _requirements(result), _agreement(result)])
+    return "\n\n".join([head, *_tables(result), _requirements(result), *([_agreement(result)] if result["agreement"] else [])])
 
 
 def _tables(result: dict[str, Any]) -> list[str]:
@@ -42,11 +42,11 @@ def _table(title: str, boxes: dict[int, Any], rows: dict[str, list[str]]) -> str
 
 
 def _requirements(result: dict[str, Any]) -> str:
-    lines = ["required"]
+    lines = ["required, at least"]
     for one in result["requirements"]:
         aim = f", aim {one['aim']:g}" if one["aim"] else ""
-        what = f"{one['name']}, N = {one['boxes']}: at least {one['least']:g} x {one['peer']}{aim}"
-        lines.append(f"  {what:<64} {one['ratio']:7.1f}  {'pass' if one['passed'] else 'SHORT'}")
+        what = f"{one['name']}, N = {one['boxes']}: {one['least']:g} x {one['peer']}{aim}"
+        lines.append(f"  {what:<60}{one['ratio']:9.1f}  {'pass' if one['passed'] else 'SHORT'}")
     return "\n".join(lines)
 
 
@@ -57,10 +57,14 @@ def _agreement(result: dict[str, Any]) -> str:
         depths = ", ".join(f"{kinds} {difference:.0e}" for kinds, difference in one["depth_difference"].items())
         verdict = "pass" if one["passed"] else "DIFFERS"
         lines.append(f"  {one['peer']}, N = {one['boxes']}, {one['poses']} poses: {one['contacts']} contacts, {differing}  {verdict}")
-        lines.append(f"    depths differ at most [m]: {depths}")
+        lines.append(_wrapped(f"depths differ at most [m]: {depths}", "    "))
     if not result["coal"]:
-        lines.append("  coal: not installed; from MoBeE's folder: pip install '.[dev]'")
-    return "\n".join([*lines, f"  {_MUJOCO_NOTE}"])
+        lines.append("  coal: not installed: pip install '.[dev]' in MoBeE's folder")
+    return "\n".join([*lines, _wrapped(_NOTE, "  ")])
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
 def _thousands(rate: float) -> str:

@@ -23,7 +23,7 @@ def load_mujoco() -> Any:
     try:
         import mujoco
     except ImportError:
-        raise MujocoMissing("MuJoCo is not installed; from MoBeE's folder: pip install '.[bench]'") from None
+        raise MujocoMissing("MuJoCo is not installed: pip install '.[bench]' in MoBeE's folder") from None
     return mujoco
 
 
@@ -62,10 +62,6 @@ class MujocoPeer:
         depths = np.zeros(len(unique))
         np.maximum.at(depths, which, -np.array(contact.dist))
         return unique, depths
-
-    def overflowed(self) -> bool:
-        """Whether contacts were left out for want of memory."""
-        return bool(self.data.warning[self._mujoco.mjtWarning.mjWARN_CONTACTFULL].number)
 
 
 def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:

@@ -1,4 +1,7 @@
-"""Rates of several programs in one run: on one core, turn by turn, medians, because the machine's speed drifts."""
+"""Rates of several programs in one run: on one core, turn by turn, medians, because the machine's speed drifts.
+
+Processor time of this process is counted, so that what else the machine does matters little.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ def _pin(cores: set[int]) -> None:
             os.sched_setaffinity(int(thread.name), cores)
 
 
-def rates(contestants: Mapping[str, Contestant], rounds: int, after_round: Callable[[], object] = lambda: None) -> dict[str, Array]:
+def rates(contestants: Mapping[str, Contestant], rounds: int) -> dict[str, Array]:
     """Poses per second of each contestant in each round, (rounds,); each round begins with another one."""
     names = list(contestants)
     measured: dict[str, list[float]] = {name: [] for name in names}
@@ -54,15 +57,14 @@ def rates(contestants: Mapping[str, Contestant], rounds: int, after_round: Calla
         turn = number % len(names)
         for name in names[turn:] + names[:turn]:
             measured[name].append(_rate(contestants[name]))
-        after_round()
     return {name: np.array(values) for name, values in measured.items()}
 
 
 def _rate(one: Contestant) -> float:
     gc.collect()
     gc.disable()
-    start = time.perf_counter()
+    start = time.process_time()
     one.run()
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     gc.enable()
     return one.poses / seconds

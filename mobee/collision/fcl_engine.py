@@ -137,25 +137,35 @@ def _found(volumes: tuple[Shape | WorldObject, ...], objects: list[Any], centers
 
 def _overlap(first: Any, second: Any) -> tuple[float, ...] | None:
     """Depth, the way the first must move and the point, midway between the two deepest points; None: apart."""
-    result = fcl.DistanceResult()
-    depth = -fcl.distance(first, second, _DISTANCE, result)
-    if not depth > 0.0:
+    if not fcl.collide(first, second):
         return None
-    deepest, surface = (np.array(point) for point in result.nearest_points)  # the first's, inside the second, and where it must go
-    way = surface - deepest
-    return depth, *(way / np.linalg.norm(way)), *(deepest + surface) / 2.0
+    # One in some thousand shallow overlaps counts as a small distance, but not if the two are asked for in the other order.
+    for one, other in ((first, second), (second, first)):
+        result = fcl.DistanceResult()
+        depth = -fcl.distance(one, other, _DISTANCE, result)
+        if depth > 0.0:
+            deepest, surface = (np.array(point) for point in result.nearest_points)  # the one's, inside the other, and where it must go
+            way = (surface - deepest) / np.linalg.norm(surface - deepest)
+            return depth, *(way if one is first else -way), *(deepest + surface) / 2.0
+    return _contact(first, second)  # they graze
+
+
+def _contact(first: Any, second: Any) -> tuple[float, ...] | None:
+    """The same by fcl.collide; the point is any that both share."""
+    result = fcl.CollisionResult()
+    fcl.collide(first, second, _COLLISION, result)
+    if not result.contacts or not result.contacts[0].penetration_depth > 0.0:
+        return None
+    contact = result.contacts[0]
+    return contact.penetration_depth, *(-contact.normal), *contact.pos  # fcl's normal points from the first to the second
 
 
 def _ball_overlap(first: Any, second: Any, ball: Array, radius: float, sign: float) -> tuple[float, ...] | None:
     """The same where one is a ball, for which fcl has closed forms; `sign`: 1.0 if it is the first, -1.0 if the second."""
-    result = fcl.CollisionResult()
-    fcl.collide(first, second, _COLLISION, result)
-    if not result.contacts:
+    found = _contact(first, second)
+    if found is None:
         return None
-    contact = result.contacts[0]
-    depth, normal = contact.penetration_depth, -contact.normal  # fcl's normal points from the first to the second
-    if not depth > 0.0:
-        return None
+    depth, normal = found[0], np.array(found[1:4])
     return depth, *normal, *(ball - sign * (radius - depth / 2.0) * normal)
 
 
