@@ -21,8 +21,12 @@ def collision_forces(robot: Robot, projection: Array, gains: Gains) -> Array:
     in degrees.
     """
     force = gains.contact_gain * projection
+    if not force.any():
+        return force
     for part in robot.parts.values():
         f = force[part.slice]
+        if not f.any():
+            continue
         if gains.law == "published_2014":
             f = np.deg2rad(np.sqrt(f @ f) * f)
         force[part.slice] = squash_norm(f, gains.max_contact, gains.contact_slope)

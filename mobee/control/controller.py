@@ -137,9 +137,9 @@ class Controller:
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
         a = acceleration(q, self.velocity, self._attractor, forces.total + self._client_forces(q), self.gains)
-        wanted = np.clip(self.weight * (self.velocity + a * dt), -self._max_velocity, self._max_velocity)
+        wanted = (self.weight * (self.velocity + a * dt)).clip(-self._max_velocity, self._max_velocity)
         change = self._max_acceleration * dt
-        velocity = self._sent + np.clip(wanted - self._sent, -change, change)
+        velocity = self._sent + (wanted - self._sent).clip(-change, change)
         self.acceleration = (velocity - self.velocity) / dt
         self.velocity = velocity
         self._sent = velocity
@@ -150,8 +150,8 @@ class Controller:
         lead = self._reference - q
         blocked = (np.abs(lead) > LEASH * self._max_velocity) & (lead * self.velocity > 0)
         reference = self._reference + np.where(blocked, 0.0, self.velocity * dt)
-        self._reference = np.clip(reference, self.robot.limits[:, 0], self.robot.limits[:, 1])
-        limited = np.clip(torque(self.velocity, self.acceleration), -self._max_torque, self._max_torque)
+        self._reference = reference.clip(self.robot.limits[:, 0], self.robot.limits[:, 1])
+        limited = torque(self.velocity, self.acceleration).clip(-self._max_torque, self._max_torque)
         return Command(self._reference, self.velocity, limited)
 
     def _client_forces(self, q: Array) -> Array:
@@ -171,6 +171,6 @@ class Controller:
     @staticmethod
     def _checked(what: str, value: Array, length: int) -> Array:
         array = np.array(value, dtype=float)
-        if array.shape != (length,) or not np.all(np.isfinite(array)):
+        if array.shape != (length,) or not np.isfinite(array).all():
             raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
         return array

@@ -17,6 +17,6 @@ def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
 
 def squash_norm(v: Array, maximum: float, slope: float) -> Array:
     """Bound the Euclidean norm of v (..., n) over its last axis and keep its direction."""
-    norm = np.sqrt(np.sum(v * v, axis=-1, keepdims=True))
+    norm = np.sqrt((v * v).sum(axis=-1, keepdims=True))
     squashed: Array = maximum * v / (maximum / slope + norm)
     return squashed

@@ -89,7 +89,7 @@ class Motors:
         """
         if reference is not None:
             self._reference[where] = reference
-        if np.all(self._mode[where] == mode):
+        if (self._mode[where] == mode).all():
             return
         entering = np.zeros(len(self.q), dtype=bool)
         entering[where] = self._mode[where] != mode
@@ -111,14 +111,14 @@ class Motors:
         self.efforts = INERTIA * (self._motor_v - before) / dt + FRICTION * self._motor_v
         self._motor_q = self._motor_q + self._motor_v * dt
         play = self.parameters.backlash / 2.0
-        self._dragged = np.clip(self.q, self._motor_q - play, self._motor_q + play)
+        self._dragged = self.q.clip(self._motor_q - play, self._motor_q + play)
         self._dt = dt
         velocity: Array = (self._dragged - self.q) / dt
         return velocity
 
     def integrate(self) -> None:
         """Kinematic joint side: go where `drive` asked, as far as the hard stops."""
-        self.adopt(np.clip(self._dragged, self._limits[:, 0], self._limits[:, 1]))
+        self.adopt(self._dragged.clip(self._limits[:, 0], self._limits[:, 1]))
 
     def adopt(self, q: Array) -> None:
         """Take the joint side (n,) rad at the end of the substep, as a physics engine says.
@@ -128,7 +128,7 @@ class Motors:
         self.velocities = (q - self.q) / self._dt
         self.q = np.array(q)
         play = self.parameters.backlash / 2.0
-        self._motor_q = np.clip(self._motor_q, self.q - play, self.q + play)
+        self._motor_q = self._motor_q.clip(self.q - play, self.q + play)
 
     def encoders(self, dt: float, where: slice = slice(None)) -> Array:
         """The joint positions [rad] with white noise whose strength does not depend on the tick dt [s]."""
@@ -149,15 +149,15 @@ class Motors:
 
     def _input(self) -> Array:
         """What enters the delay line: a torque [N m] in torque mode, else a velocity [rad/s]."""
-        wanted = np.clip(self._reference, -self._max_velocity, self._max_velocity)
+        wanted: Array = self._reference.clip(-self._max_velocity, self._max_velocity)
         if self._any_position:
             wanted = np.where(self._is_position, self._servo(self._reference), wanted)
         if self._any_torque:
-            wanted = np.where(self._is_torque, np.clip(self._reference, -self._max_torque, self._max_torque), wanted)
+            wanted = np.where(self._is_torque, self._reference.clip(-self._max_torque, self._max_torque), wanted)
         return wanted
 
     def _servo(self, position: Array) -> Array:
-        velocity: Array = np.clip(SERVO_GAIN * (position - self._motor_q), -self._max_velocity, self._max_velocity)
+        velocity: Array = (SERVO_GAIN * (position - self._motor_q)).clip(-self._max_velocity, self._max_velocity)
         return velocity
 
     def _delayed(self, wanted: Array, dt: float) -> Array:
@@ -176,8 +176,8 @@ class Motors:
         velocity = self._motor_v + share * (delayed - self._motor_v)
         if self._any_torque:
             push = (delayed - FRICTION * self._motor_v) / INERTIA
-            push = np.clip(push, -self._max_acceleration, self._max_acceleration)
-            driven = np.clip(self._motor_v + push * dt, -self._max_velocity, self._max_velocity)
+            push = push.clip(-self._max_acceleration, self._max_acceleration)
+            driven = (self._motor_v + push * dt).clip(-self._max_velocity, self._max_velocity)
             velocity = np.where(self._is_torque, driven, velocity)
         return velocity
 
@@ -187,5 +187,5 @@ class Motors:
         arrived = ~self._resting & (np.abs(before) <= change)
         self._rest = np.where(arrived, self._motor_q, self._rest)
         self._resting = self._resting | arrived
-        braking = before - np.clip(before, -change, change)
+        braking = before - before.clip(-change, change)
         return np.where(self._resting, self._servo(self._rest), braking)

@@ -109,7 +109,7 @@ class OfflinePlant:
         if self._command is not None:
             self.motors.command(slice(None), self.controller.modality, getattr(self._command, self.controller.modality))
         self._q = self.motors.encoders(self.dt)
-        if not np.all(np.isfinite(self._q)):
+        if not np.isfinite(self._q).all():
             self._actions.clear()
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
         self.pose = self._track.evaluate(self._q)
