@@ -45,8 +45,8 @@ print(stand_in.twice(21.0), sum(each.is_end for _, each in recorder.buffer))
 class Start:
     """A process that loads the stand-in with its cache in a folder; `code` runs first."""
 
-    def __init__(self, folder: Path, cache: Path | None = None, code: str = "", **environment: str) -> None:
-        (folder / "stand_in.py").write_text(STAND_IN)
+    def __init__(self, folder: Path, cache: Path | None = None, code: str = "", source: str = STAND_IN, **environment: str) -> None:
+        (folder / "stand_in.py").write_text(source)
         settings = {**os.environ, "MOBEE_CACHE": str(cache or folder / "cache"), **environment}
         self.process = subprocess.Popen(
             [sys.executable, "-c", code + USE.format(folder=str(folder))],
@@ -77,6 +77,12 @@ def test_the_first_start_compiles_and_says_so_the_next_does_neither(tmp_path: Pa
     assert lines[0].startswith(f"mobee: compiling the engine into {tmp_path}/cache/engine-")
     assert lines[-1].startswith("mobee: the engine is compiled")
     assert Start(tmp_path).end() == (0, "")
+
+
+def test_an_edit_of_a_file_elsewhere_compiles_what_is_in_it_anew(tmp_path: Path) -> None:
+    Start(tmp_path, source=STAND_IN.replace("0.5 * x", "0.25 * x").replace("4.0 *", "8.0 *")).end()
+    assert Start(tmp_path).end()[0] == 2
+    assert Start(tmp_path).end()[0] == 0
 
 
 def test_of_two_starts_at_once_one_compiles_and_the_other_waits_for_it(tmp_path: Path) -> None:
