@@ -11,6 +11,7 @@ from experiments.bench.mujoco_peer import MujocoMissing
 from experiments.options import positive_whole
 from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
 
+_PICTURES = (".png", ".svg", ".pdf")
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
 
 
@@ -29,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     model.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
     model.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, 50 poses to compare")
-    model.add_argument("--figure", type=Path, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)")
+    model.add_argument(
+        "--figure", type=_picture, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)"
+    )
     model.add_argument("--json", action="store_true", help="print as JSON")
 
 
@@ -54,16 +57,26 @@ def _model(arguments: argparse.Namespace) -> int:
 
 
 def _figure(arguments: argparse.Namespace) -> int:
-    from experiments.bench.model_cost import draw, measure
+    from experiments.bench.model_cost import draw, empty_figure, measure
     from experiments.matplotlib_figure import MatplotlibMissing
 
     try:
-        curves = measure(arguments.rounds or (3 if arguments.quick else 9))
-        draw(curves, arguments.figure)
+        figure = empty_figure()  # before minutes of measuring
     except MatplotlibMissing as error:
         raise UserError(str(error), ENVIRONMENT) from None
+    curves = measure(arguments.rounds or (3 if arguments.quick else 9))
+    draw(figure, curves, arguments.figure)
     print(json.dumps(curves, indent=2) if arguments.json else arguments.figure)
     return 0
+
+
+def _picture(text: str) -> Path:
+    path = Path(text)
+    if path.suffix not in _PICTURES:
+        raise argparse.ArgumentTypeError(f"{text!r} is no picture; valid endings: {', '.join(_PICTURES)}")
+    if not path.absolute().parent.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r}: there is no folder {str(path.parent)!r}; make it first")
+    return path
 
 
 def _objects(text: str) -> int:

@@ -39,9 +39,13 @@ def measure(rounds: int, poses: int = 500) -> dict[str, Any]:
     return curves
 
 
-def draw(curves: dict[str, Any], path: Path) -> None:
-    """Write the figure, two panels; raises MatplotlibMissing."""
-    figure = new_figure(9.0, 3.8)
+def empty_figure() -> Any:
+    """A matplotlib Figure to draw into; raises MatplotlibMissing."""
+    return new_figure(9.0, 3.8)
+
+
+def draw(figure: Any, curves: dict[str, Any], path: Path) -> None:
+    """Write the figure, two panels."""
     left, right = figure.subplots(1, 2, sharey=True)
     titles = {"boxes": "objects around 129 primitives", "primitives": f"primitives among {AMONG} objects"}
     for axes, (curve, title) in zip((left, right), titles.items(), strict=True):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.bench.model_cost import draw, measure
+from experiments.bench.model_cost import draw, empty_figure, measure
 
 FIGURE = Path(__file__).parents[2] / "docs" / "figures" / "model_cost.png"
 
 
 def main() -> None:
-    draw(measure(rounds=9), FIGURE)
+    draw(empty_figure(), measure(rounds=9), FIGURE)
     print(FIGURE)
 
 
