@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
+from mobee.engine.narrow.inlined import inlined
 from mobee.engine.narrow.slots import (
     CENTER,
     CORE,
@@ -86,7 +87,7 @@ def capsule_capsule(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     return reach - distance
 
 
-@inner
+@inlined
 def closest_parameters(
     x: float, y: float, z: float, ux: float, uy: float, uz: float, vx: float, vy: float, vz: float
 ) -> tuple[float, float]:
@@ -106,7 +107,7 @@ def closest_parameters(
     return unit((b * t - c) / max(a, _SHORT)), t
 
 
-@inner
+@inlined
 def _store(P: Array, i: Offset, j: Offset, normal: Vector, s: float, t: float, out: Array) -> None:
     """Write the contact of two rounded volumes whose cores come closest at s and t."""
     ax, ay, az = vector(P, i + CENTER)
@@ -120,7 +121,7 @@ def _store(P: Array, i: Offset, j: Offset, normal: Vector, s: float, t: float, o
     store(out, normal, (x, y, z))
 
 
-@inner
+@inlined
 def _across(P: Array, i: Offset, j: Offset) -> Vector:
     """A unit vector perpendicular to both of two crossing segments (along one line: the longer one's own x axis)."""
     ux, uy, uz = vector(P, i + CORE)

@@ -7,6 +7,8 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
+from mobee.engine.narrow.inlined import inlined
+from mobee.engine.narrow.segment_box import closest_to_box, distance_bound, span_within
 from mobee.engine.narrow.slots import (
     CENTER,
     CORE,
@@ -26,8 +28,6 @@ from mobee.engine.narrow.slots import (
     vector,
 )
 from mobee.robot.robot import Array
-
-_FAR = 2.0  # a parameter beyond every segment's end
 
 
 @inner
@@ -57,21 +57,9 @@ def capsule_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     hx, hy, hz = into(P, j, hx, hy, hz)
     kx, ky, kz = vector(P, j + HALF)
     radius = P[i + RADIUS]
-    ax, ay, az = abs(hx), abs(hy), abs(hz)
-    dx, dy, dz = max(abs(x) - ax - kx, 0.0), max(abs(y) - ay - ky, 0.0), max(abs(z) - az - kz, 0.0)
-    squared = dx * dx + dy * dy + dz * dz
-    if squared >= radius * radius:
-        return radius - math.sqrt(squared)
-    # The directions across the axis and one of the box's edges.
-    gap, length = abs(y * hz - z * hy) - ky * az - kz * ay, ay * ay + az * az
-    if gap > 0.0 and gap * gap >= radius * radius * length:
-        return radius - gap / math.sqrt(length)
-    gap, length = abs(z * hx - x * hz) - kz * ax - kx * az, az * az + ax * ax
-    if gap > 0.0 and gap * gap >= radius * radius * length:
-        return radius - gap / math.sqrt(length)
-    gap, length = abs(x * hy - y * hx) - kx * ay - ky * ax, ax * ax + ay * ay
-    if gap > 0.0 and gap * gap >= radius * radius * length:
-        return radius - gap / math.sqrt(length)
+    bound = distance_bound(x, y, z, hx, hy, hz, kx, ky, kz)
+    if bound >= radius:
+        return radius - bound
     s = closest_to_box(x, y, z, hx, hy, hz, kx, ky, kz)
     px, py, pz = x + s * hx, y + s * hy, z + s * hz
     dx, dy, dz = _beyond(px, kx), _beyond(py, ky), _beyond(pz, kz)
@@ -79,8 +67,10 @@ def capsule_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     if squared >= radius * radius:
         return radius - math.sqrt(squared)
     if squared > TOUCHING * TOUCHING:
-        return _outside(P, i, j, (px, py, pz), (dx, dy, dz), math.sqrt(squared), out)
-    return _pierced(P, i, j, (x, y, z), (hx, hy, hz), out)
+        depth = _outside(P, i, j, (px, py, pz), (dx, dy, dz), math.sqrt(squared), out)
+    else:
+        depth = _pierced(P, i, j, (x, y, z), (hx, hy, hz), out)
+    return depth
 
 
 @inner
@@ -97,51 +87,12 @@ def capsule_box_distance(P: Array, a: int, b: int) -> float:
     return max(math.sqrt(dx * dx + dy * dy + dz * dz) - P[i + RADIUS], 0.0)
 
 
-@inner
-def closest_to_box(x: float, y: float, z: float, hx: float, hy: float, hz: float, kx: float, ky: float, kz: float) -> float:
-    """The s in [-1, 1] that brings c + s h closest to the box of half edges k, c = (x, y, z): the middle of all such s."""
-    least = FLAT * FLAT * (hx * hx + hy * hy + hz * hz)
-    x0, x1 = _span(x, hx, kx, least)
-    y0, y1 = _span(y, hy, ky, least)
-    z0, z1 = _span(z, hz, kz, least)
-    low, high = max(x0, y0, z0, -1.0), min(x1, y1, z1, 1.0)
-    if low <= high:
-        return (low + high) / 2.0
-    # Half the derivative of the squared distance never falls, and is linear between these knots; its zero is here unique.
-    wx, wy, wz = hx * hx, hy * hy, hz * hz
-    left, right, under, over = -1.0, 1.0, -1.0, 1.0
-    for knot in (-1.0, x0, y0, z0, x1, y1, z1, 1.0):
-        s = unit(knot)
-        slope = wx * _outer(s, x0, x1) + wy * _outer(s, y0, y1) + wz * _outer(s, z0, z1)
-        if slope <= 0.0 and s >= left:
-            left, under = s, slope
-        if slope >= 0.0 and s <= right:
-            right, over = s, slope
-    if left >= right:
-        return right
-    return left + (right - left) * (under / (under - over))
-
-
-@inner
-def _span(x: float, h: float, k: float, least: float) -> tuple[float, float]:
-    """Between which s the coordinate x + s h is within [-k, k]; all if the line is parallel to these faces."""
-    if h * h <= least:
-        return -_FAR, _FAR
-    middle, reach = -x / h, abs(k / h)
-    return middle - reach, middle + reach
-
-
-@inner
-def _outer(s: float, low: float, high: float) -> float:
-    return max(s - high, 0.0) - max(low - s, 0.0)
-
-
-@inner
+@inlined
 def _beyond(x: float, k: float) -> float:
     return x - min(max(x, -k), k)
 
 
-@inner
+@inlined
 def _outside(P: Array, i: Offset, j: Offset, p: Vector, d: Vector, distance: float, out: Array) -> float:
     """The contact of a point p of the core that is outside the box, at d from the nearest point of it."""
     back = (P[i + RADIUS] + distance) / 2.0
@@ -150,7 +101,7 @@ def _outside(P: Array, i: Offset, j: Offset, p: Vector, d: Vector, distance: flo
     return P[i + RADIUS] - distance
 
 
-@inner
+@inlined
 def _pierced(P: Array, i: Offset, j: Offset, c: Vector, h: Vector, out: Array) -> float:
     """The contact of a core c + s h that meets the box: out through a face of the box, or of the box swept along the core."""
     (x, y, z), (hx, hy, hz), (kx, ky, kz) = c, h, vector(P, j + HALF)
@@ -193,29 +144,28 @@ def _pierced(P: Array, i: Offset, j: Offset, c: Vector, h: Vector, out: Array) -
     return P[i + RADIUS] + sink
 
 
-@inner
+@inlined
 def _deepest(c: Vector, h: Vector, k: Vector, n: Vector, sink: float, edge: int, least: float) -> float:
     """Where on the core c + s h the deepest point is, on the way n out of the box: an end, or above the middle of what meets."""
     if edge >= 0:
         # Moved out by n * sink, the core crosses the box's edge.
-        along = 0.0
-        length = 0.0
-        for axis in range(3):
-            if axis != edge:
-                corner = k[axis] if n[axis] > 0.0 else -k[axis]
-                along += (corner - c[axis] - sink * n[axis]) * h[axis]
-                length += h[axis] * h[axis]
-        return unit(along / length)
+        x = h[0] if edge != 0 else 0.0
+        y = h[1] if edge != 1 else 0.0
+        z = h[2] if edge != 2 else 0.0
+        along = x * (math.copysign(k[0], n[0]) - c[0] - sink * n[0])
+        along += y * (math.copysign(k[1], n[1]) - c[1] - sink * n[1])
+        along += z * (math.copysign(k[2], n[2]) - c[2] - sink * n[2])
+        return unit(along / (x * x + y * y + z * z))
     slope = n[0] * h[0] + n[1] * h[1] + n[2] * h[2]
     if slope * slope > least:
         return -1.0 if slope > 0.0 else 1.0
-    x0, x1 = _span(c[0], h[0], k[0], least)
-    y0, y1 = _span(c[1], h[1], k[1], least)
-    z0, z1 = _span(c[2], h[2], k[2], least)
+    x0, x1 = span_within(c[0], h[0], k[0], least)
+    y0, y1 = span_within(c[1], h[1], k[1], least)
+    z0, z1 = span_within(c[2], h[2], k[2], least)
     return unit((max(x0, y0, z0, -1.0) + min(x1, y1, z1, 1.0)) / 2.0)
 
 
-@inner
+@inlined
 def _store(P: Array, j: Offset, normal: Vector, point: Vector, out: Array) -> None:
     """Write a contact given in the box's own axes."""
     x, y, z = out_of(P, j, point[0], point[1], point[2])
