@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import sys
 from pathlib import Path
@@ -15,11 +17,9 @@ SHORT = ("--quick", "--objects", "0", "--rounds", "1")
 def told() -> tuple[int, dict]:
     """What one short run prints as JSON, and its exit code."""
     pytest.importorskip("mujoco")
-    with pytest.MonkeyPatch.context() as patch:
-        lines: list[str] = []
-        patch.setattr("builtins.print", lambda text: lines.append(text))
+    with contextlib.redirect_stdout(io.StringIO()) as said:
         code = main(["bench", "model", *SHORT, "--json"])
-    return code, json.loads("\n".join(lines))
+    return code, json.loads(said.getvalue())
 
 
 def test_json_tells_rates_ratios_requirements_and_agreement(told: tuple[int, dict]) -> None:
