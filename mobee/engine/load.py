@@ -22,27 +22,29 @@ def load() -> None:
     from mobee.engine.compiled import FOLDER
 
     if is_ready(FOLDER):
-        _import()
+        _import(FOLDER)
         mark_used(FOLDER)
         return
     with _turn(FOLDER) as writable:
         if is_ready(FOLDER):
-            _import()
+            _import(FOLDER)
         else:
             _compile(FOLDER, writable)
 
 
-def _import() -> None:
-    for module in MODULES:
-        importlib.import_module(module)
+def _import(folder: Path) -> None:
+    from mobee.engine.progress import Progress
+
+    with Progress(folder):
+        for module in MODULES:
+            importlib.import_module(module)
 
 
 def _compile(folder: Path, writable: bool) -> None:
-    from mobee.engine.progress import Progress, say
+    from mobee.engine.progress import say
     from mobee.engine.shelf import Shelf
 
-    with Progress(folder):
-        _import()
+    _import(folder)
     if writable and Shelf.unwritten is not None:
         say(f"could not keep the engine's machine code: {Shelf.unwritten}. The next start compiles again.")
     elif writable and cache_folder() == folder:  # else a source was edited meanwhile, and nobody knows which version was read

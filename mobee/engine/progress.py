@@ -14,29 +14,26 @@ from numba.core import event
 PERIOD = 10.0  # s between lines where they stay
 
 _DECORATED = re.compile(r"^@(?:inner|entry)", re.MULTILINE)
-
-
 _events: Any = event  # Numba's type information ends here
 
 
 class Progress(event.Listener):
-    """Counts what Numba compiles between `with` and its end."""
+    """Counts what Numba compiles between `with` and its end; says nothing where that is nothing."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        own = sum(len(_DECORATED.findall(file.read_text())) for file in Path(__file__).parent.rglob("*.py"))
-        self._total = own * 6 // 5  # some are compiled for signed and for unsigned integers
-        self._done = 0
+        self._total = self._done = 0
         self._on_terminal = sys.stderr.isatty()
         self._begin = self._said = time.perf_counter()
 
     def __enter__(self) -> Progress:
-        say(f"compiling the engine into {self._folder}, once after an install or an edit: about half a minute ...")
         _events.register("numba:compile", self)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         _events.unregister("numba:compile", self)
+        if self._total == 0:
+            return
         if self._on_terminal:
             sys.stderr.write("\r\033[K")
         if kind is None:
@@ -44,6 +41,11 @@ class Progress(event.Listener):
 
     def on_start(self, event: Any) -> None:
         """A function begins."""
+        if self._total > 0:
+            return
+        own = sum(len(_DECORATED.findall(file.read_text())) for file in Path(__file__).parent.rglob("*.py"))
+        self._total = own * 6 // 5  # some are compiled for signed and for unsigned integers
+        say(f"compiling the engine into {self._folder}, once after an install or an edit: about half a minute ...")
 
     def on_end(self, event: Any) -> None:
         """A function is compiled."""

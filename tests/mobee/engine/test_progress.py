@@ -39,6 +39,10 @@ def test_on_a_terminal_one_line_counts_the_engines_functions_and_goes_away(monke
     assert last == "mobee: the engine is compiled, 0 s.\n"
 
 
+def test_nothing_is_said_where_nothing_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert shown(True, 0, monkeypatch) == ""
+
+
 def test_in_a_file_lines_come_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(shown(False, 30, monkeypatch).splitlines()) == 2
     monkeypatch.setattr(progress, "PERIOD", 0.0)
