@@ -10,17 +10,16 @@ What is remembered stands in three flat arrays, see `sizes`; nothing is allocate
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from mobee.engine.broad import own_pairs, world_pairs
 from mobee.engine.compiled import entry, inner
 from mobee.engine.forces import project
 from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
-from mobee.engine.layout import BOUND, CAPSULE, KIND, RADIUS, SLOT
+from mobee.engine.layout import SLOT
+from mobee.engine.motion import bend_links, find_moved, measure, reach_out, swung
 from mobee.engine.narrow.dispatch import overlap
-from mobee.engine.pack import CLUSTERS, I_KIND, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, UInts
+from mobee.engine.pack import CLUSTERS, I_LINK, JOINTS, LINKS, SHAPES, UInts
 from mobee.engine.place import bound_clusters, place_shapes
 from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows, write_contact
 from mobee.engine.scene import COUNT
@@ -36,8 +35,7 @@ _PLAIN, _BUILD, _USE = range(3)
 MARGIN = 1e-9  # m: above the rounding of distances and of what was moved
 SHORT = 4.0  # steps of the present length that a new list must last to be worth making
 
-_0, _1, _12 = np.uint64(0), np.uint64(1), np.uint64(12)
-_BOUND, _KIND, _RADIUS = np.uint64(BOUND), np.uint64(KIND), np.uint64(RADIUS)
+_0, _1 = np.uint64(0), np.uint64(1)
 _SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
 
 
@@ -46,84 +44,53 @@ def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int,
     most = shapes * (shapes + 1) // 2 + shapes * objects
     return (
         2 * joints + 24 * links + 8 * shapes + 5 * objects + most * (1 + 2 * REALS),
-        2 * most + objects,
+        4 * most + objects,
         HEADER + most * (3 + 2 * NUMBERS),
     )
 
 
 @inner
-def _find_moved(integers: UInts, angles: Array, last: Array, fresh: bool, moved: Flags) -> None:
-    """Mark the links (L,) that are carried by a joint whose angle differs from the last, and remember the angles."""
-    moved[0] = fresh
-    for j in range(integers[JOINTS]):
-        moved[j + _1] = moved[integers[integers[I_PARENT] + j]] or angles[j] != last[j]
-        last[j] = angles[j]
-
-
-@inner
-def _reach_out(integers: UInts, slots: Array, arm: Array) -> None:
-    """Fill how far from a shape's centre its points are that turn with it, (S,) [m]: of a ball none, of a capsule its axis."""
-    for i in range(integers[SHAPES]):
-        at = i * _SLOT
-        arm[i] = slots[at + _BOUND] - (slots[at + _RADIUS] if slots[at + _KIND] <= CAPSULE else 0.0)
-
-
-@inner
-def _measure(
+def _gather(
     integers: UInts,
-    moved: Flags,
-    frames: Array,
-    then: Array,
-    arm: Array,
-    x: Array,
-    y: Array,
-    z: Array,
-    x0: Array,
-    y0: Array,
-    z0: Array,
-    turn: Array,
     way: Array,
-) -> float:
-    """Fill what every shape that moved may be away from where it was, `way` (S,) [m]; returns the most of all."""
-    for link in range(integers[LINKS]):
-        if not moved[link]:
+    common: UInts,
+    levers: Array,
+    bend: Array,
+    sway: Array,
+    chain: Array,
+    first: UInts,
+    second: UInts,
+    gap: Array,
+    row_of: Ints,
+    listed: np.uint64,
+    near_first: UInts,
+    near_second: UInts,
+    kept_numbers: Ints,
+    kept_reals: Array,
+    numbers: Ints,
+    reals: Array,
+) -> tuple[np.uint64, np.uint64]:
+    """Collect the listed pairs that may have met; returns how many, and how many rows are written of those that have not moved."""
+    near, found, shapes, links, link = _0, _0, integers[SHAPES], integers[LINKS], integers[I_LINK]
+    for p in range(listed):
+        a, b = first[p], second[p]
+        i, j = a // _SLOT, b // _SLOT
+        between = way[i] + way[j]
+        if between < gap[p]:
             continue
-        o, squared = link * _12, 0.0
-        for k in (0, 1, 2, 4, 5, 6, 8, 9, 10):
-            d = frames[o + np.uint64(k)] - then[o + np.uint64(k)]
-            squared += d * d
-        turn[link] = math.sqrt(0.5 * squared)  # by which a point 1 m from the centre is turned away: 2 sin(angle / 2)
-    most, start = 0.0, integers[I_LINK]
-    for i in range(integers[SHAPES]):
-        if moved[integers[start + i]]:
-            d, e, f = x[i] - x0[i], y[i] - y0[i], z[i] - z0[i]
-            way[i] = math.sqrt(d * d + e * e + f * f) + turn[integers[start + i]] * arm[i]
-        most = max(most, way[i])
-    return most
-
-
-@inner
-def _bend(integers: UInts, angles: Array, then: Array, spans: Array, bend: Array, sway: Array, chain: Array) -> None:
-    """Fill for every link three sums over the joints that carry it, from the base on.
-
-    `bend` [rad]: what they have turned since then; `sway` [m]: how far that may have moved the joint of the link;
-    `chain` [m]: how far the base is along the joints.  See `_swung`.
-    """
-    bend[0], sway[0], chain[0] = 0.0, 0.0, 0.0
-    for j in range(integers[JOINTS]):
-        link, parent, change, span = j + _1, integers[integers[I_PARENT] + j], abs(angles[j] - then[j]), spans[j]
-        slides = integers[integers[I_KIND] + j] == _1
-        span += abs(angles[j]) if slides else 0.0
-        bend[link] = bend[parent] + (0.0 if slides else change)
-        sway[link] = sway[parent] + bend[parent] * span + (change if slides else 0.0)
-        chain[link] = chain[parent] + span
-
-
-@inner
-def _swung(link: np.uint64, base: np.uint64, lever: float, bend: Array, sway: Array, chain: Array) -> float:
-    """How far a point may have moved that is `lever` from the joint of its link, as seen from a link that carries it [m]."""
-    turned = bend[base]
-    return sway[link] - sway[base] - turned * (chain[link] - chain[base]) + (bend[link] - turned) * lever
+        if between == 0.0:  # both are where they were when the list was made
+            if row_of[p] >= 0:
+                _copy(kept_numbers, kept_reals, np.uint64(row_of[p]), numbers, reals, found)
+                found += _1
+            continue
+        if gap[p] > 0.0 and j < shapes:
+            one, two = integers[link + i], integers[link + j]
+            base = common[one * links + two]
+            if swung(one, base, levers[i], bend, sway, chain) + swung(two, base, levers[j], bend, sway, chain) < gap[p]:
+                continue
+        near_first[near], near_second[near] = a, b
+        near += _1
+    return near, found
 
 
 @inner
@@ -135,14 +102,8 @@ def _test(
     own_shapes: int,
     reaching: int,
     skin: float,
-    mode: int,
+    building: bool,
     slots: Array,
-    way: Array,
-    common: UInts,
-    levers: Array,
-    bend: Array,
-    sway: Array,
-    chain: Array,
     first: UInts,
     second: UInts,
     gap: Array,
@@ -153,39 +114,28 @@ def _test(
     out: Array,
     numbers: Ints,
     reals: Array,
+    found: np.uint64,
 ) -> tuple[np.uint64, np.uint64]:
-    """Write the contacts among the pairs; returns how many, and how many of the pairs are neighbours, which then come first."""
-    found, kept, shapes, links, link = _0, _0, integers[SHAPES], integers[LINKS], integers[I_LINK]
+    """Write the contacts among the pairs behind `found` rows; returns how many rows there are now, and how many pairs are listed.
+
+    If a list is being built, neighbours stay in the arrays, with what is between them and the row of their contact.
+    """
+    listed = _0
     for p in range(pairs):
         a, b = first[p], second[p]
-        if mode == _USE:
-            between = way[a // _SLOT] + way[b // _SLOT]
-            if between < gap[p]:
-                continue
-            if between == 0.0:  # both are where they were when the list was made
-                if row_of[p] >= 0:
-                    _copy(kept_numbers, kept_reals, np.uint64(row_of[p]), numbers, reals, found)
-                    found += _1
-                continue
-            i, j = a // _SLOT, b // _SLOT
-            if gap[p] > 0.0 and j < shapes:
-                one, two = integers[link + i], integers[link + j]
-                base = common[one * links + two]
-                if _swung(one, base, levers[i], bend, sway, chain) + _swung(two, base, levers[j], bend, sway, chain) < gap[p]:
-                    continue
         depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
-        if mode == _BUILD:
+        if building:
             if -depth >= skin:
                 continue
-            first[kept], second[kept], gap[kept], row_of[kept] = a, b, -depth - MARGIN, -1
-            kept += _1
+            first[listed], second[listed], gap[listed], row_of[listed] = a, b, -depth - MARGIN, -1
+            listed += _1
         if depth > 0.0:
             written = write_contact(integers, world, carried, own_shapes, reaching, a, b, depth, out, numbers, reals, found)
-            if mode == _BUILD and written == _1:
+            if building and written == _1:
                 _copy(numbers, reals, found, kept_numbers, kept_reals, found)
-                row_of[kept - _1] = np.int64(found)
+                row_of[listed - _1] = np.int64(found)
             found += written
-    return found, kept
+    return found, listed
 
 
 @inner
@@ -256,7 +206,8 @@ def follow(
     near, gap = memory[o : o + 4 * objects], memory[o + 4 * objects : o + 4 * objects + n]
     o = o + 4 * objects + n
     kept_reals, found_reals = memory[o : o + n * REALS], memory[o + n * REALS : o + 2 * n * REALS]
-    first, second, near_slot = pairs_memory[:n], pairs_memory[n : 2 * n], pairs_memory[2 * n :]
+    first, second, near_slot = pairs_memory[:n], pairs_memory[n : 2 * n], pairs_memory[4 * n :]
+    near_first, near_second = pairs_memory[2 * n : 3 * n], pairs_memory[3 * n : 4 * n]
     o = HEADER
     row_of, keys, order = ints[o : o + n], ints[o + n : o + 2 * n], ints[o + 2 * n : o + 3 * n]
     o = o + 3 * n
@@ -273,37 +224,41 @@ def follow(
         fresh = ints[STATE] == EMPTY or ints[STATE] == RENEW
         joint_angles(integers, floats, given, b * motors, angles)
         sines_cosines(angles, sines, cosines)
-        _find_moved(integers, angles, last, fresh, moved)
+        find_moved(integers, angles, last, fresh, moved)
         place_links(integers, floats, angles, sines, cosines, moved, frames)
         place_shapes(integers, floats, frames, moved, slots, x, y, z)
+        farthest = 0.0
         if fresh:
-            _reach_out(integers, slots, arm)
+            reach_out(integers, slots, arm)
         else:
-            farthest = _measure(integers, moved, frames, then, arm, x, y, z, x0, y0, z0, turn, way)
-        mode = _choose(ints, 0.0 if fresh else farthest, skin)
-        pairs = np.uint64(ints[LISTED])
+            farthest = measure(integers, moved, frames, then, arm, x, y, z, x0, y0, z0, 0.5 * skin, turn, way)
+        mode, found, building = _choose(ints, farthest, skin), _0, False
+        one, two = first, second
         if mode == _USE:
-            _bend(integers, angles, angles0, spans, bend, sway, chain)
+            bend_links(integers, angles, angles0, spans, bend, sway, chain)
+            one, two = near_first, near_second
+            pairs, found = _gather(
+                integers, way, common, levers, bend, sway, chain, first, second, gap, row_of, np.uint64(ints[LISTED]), one, two,
+                kept_numbers, kept_reals, found_numbers, found_reals,
+            )  # fmt: skip
         else:
+            building = mode == _BUILD
             bound_clusters(integers, slots, x, y, z, balls)
-            if mode == _BUILD:
+            if building:
                 for c in range(len(balls) // 4):
                     balls[4 * c + 3] += skin
-            pairs = own_pairs(integers, wide if mode == _BUILD else floats, slots, x, y, z, balls, first, second)
-            pairs = world_pairs(
-                integers, slots, balls, world, wide_places if mode == _BUILD else places, near, near_slot, first, second, pairs
-            )
-            if mode == _PLAIN:
-                pairs = sieve(slots, first, second, pairs)
+            pairs = own_pairs(integers, wide if building else floats, slots, x, y, z, balls, first, second)
+            pairs = world_pairs(integers, slots, balls, world, wide_places if building else places, near, near_slot, first, second, pairs)
             angles0[:], then[:], x0[:], y0[:], z0[:] = angles, frames, x, y, z
             way[:] = 0.0
-        count, kept = _test(
-            integers, vertices, world, carried, own_shapes, reaching, skin, mode, slots, way, common, levers, bend, sway,
-            chain, first, second, gap, row_of, pairs,
-            kept_numbers, kept_reals, out, found_numbers, found_reals,
+        if not building:
+            pairs = sieve(slots, one, two, pairs)
+        count, listed = _test(
+            integers, vertices, world, carried, own_shapes, reaching, skin, building, slots, one, two, gap, row_of, pairs,
+            kept_numbers, kept_reals, out, found_numbers, found_reals, found,
         )  # fmt: skip
         if mode != _USE:
-            ints[STATE], ints[LISTED], ints[SERVED] = (LIST if mode == _BUILD else PLACED), np.int64(kept), 0
+            ints[STATE], ints[LISTED], ints[SERVED] = (LIST if building else PLACED), np.int64(listed), 0
         if count == _0:
             continue
         rows = np.int64(count)

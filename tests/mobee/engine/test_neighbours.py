@@ -1,0 +1,76 @@
+"""That the list is used and thrown away when it should be; that its results are right, test_track.py says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.engine.neighbours import LIST, LISTED, PLACED, SERVED, STATE
+from mobee.engine.track import Track
+from mobee.robot.robot import Array
+from tests.mobee.engine.random_scenes import loaded, posed
+
+
+@pytest.fixture
+def model() -> mobee.Model:
+    return mobee.Model(loaded("icub"), mobee.load_world("table"))
+
+
+def state(track: Track) -> Array:
+    assert track._neighbours is not None
+    return track._neighbours._ints
+
+
+def creep(model: mobee.Model, track: Track, steps: int, step: float) -> None:
+    for k in range(steps):
+        track.evaluate(model.robot.home + k * step)
+
+
+def test_one_list_serves_many_small_steps(model: mobee.Model) -> None:
+    track = model.track()
+    creep(model, track, 50, 1e-5)
+    assert state(track)[STATE] == LIST
+    assert state(track)[SERVED] == 48  # the first pose stands alone, the second makes the list
+
+
+def test_a_list_is_made_anew_when_its_skin_is_used_up(model: mobee.Model) -> None:
+    track = model.track()
+    creep(model, track, 200, 1e-3)
+    assert state(track)[STATE] == LIST
+    assert 0 <= state(track)[SERVED] < 30
+
+
+def test_no_list_is_made_while_the_steps_are_large(model: mobee.Model, rng: np.random.Generator) -> None:
+    track = model.track()
+    for q in posed(rng, model.robot, 20):
+        track.evaluate(q)
+        assert state(track)[STATE] == PLACED
+
+
+def test_a_jump_costs_no_list_and_rest_brings_one_back(model: mobee.Model, rng: np.random.Generator) -> None:
+    track = model.track()
+    creep(model, track, 3, 1e-5)
+    elsewhere = posed(rng, model.robot)
+    found = []
+    for q in (elsewhere, model.robot.home, elsewhere, elsewhere, elsewhere):
+        track.evaluate(q)
+        found.append(int(state(track)[STATE]))
+    assert found == [PLACED, PLACED, PLACED, LIST, LIST]
+
+
+def test_a_list_of_use_is_made_again_at_once_when_the_world_has_changed(model: mobee.Model) -> None:
+    track = model.track()
+    creep(model, track, 10, 1e-5)
+    model.world.add("far away", mobee.sphere(0.05), position=(0.0, 0.0, 5.0))
+    track.evaluate(model.robot.home)
+    assert (state(track)[STATE], state(track)[SERVED]) == (LIST, 0)
+
+
+def test_a_larger_skin_lists_more_pairs(model: mobee.Model) -> None:
+    listed = []
+    for skin in (0.001, 0.02, 0.2):
+        track = model.track(skin)
+        creep(model, track, 3, 1e-6)
+        listed.append(int(state(track)[LISTED]))
+    assert listed == sorted(set(listed))
