@@ -17,7 +17,8 @@ from mobee.errors import RobotFileError
 LARGEST = 8_000_000  # bytes; the largest shipped file has 40 thousand
 REMEDIES = {
     "encoding": "Save the file as UTF-8",
-    "invalid token": 'Save the file as UTF-8 and write &lt; and &amp; for "<" and "&"',
+    "invalid token": 'Save the file as UTF-8 without zero bytes, and write &lt; and &amp; for "<" and "&"',
+    "declaration not at start": "Remove what stands before <?xml, blank lines too",
     "no element found": "The file ends too early: close every tag, or restore it from where it came from",
     "duplicate attribute": "Remove one of the two",
     "junk after": "Put everything inside one root element",

@@ -57,7 +57,8 @@ class Node:
         except ValueError:
             value = None
         if value is None or "_" in text or not text.isascii():  # both are numbers to Python only
-            self.fail(name, f"{shown(text)!r} is not a number", "Write a decimal number such as -0.25")
+            remedy = "Run xacro first, which puts values in its place" if "$" in text else "Write a decimal number such as -0.25"
+            self.fail(name, f"{shown(text)!r} is not a number", remedy)
         if not abs(value) <= FARTHEST:
             problem = "is too large" if math.isfinite(value) else "is not finite"
             self.fail(name, f"{shown(text)!r} {problem}", "Write a decimal number such as -0.25")

@@ -85,8 +85,6 @@ def _enclosing(vertices: Array, planes: Array) -> Array:
 
 def _merged(points: Array, near: float) -> Array:
     """The points without those that repeat another up to rounding."""
-    kept: list[Array] = []
-    for point in points:
-        if not kept or float(np.abs(np.array(kept) - point).max(axis=1).min()) > near:
-            kept.append(point)
-    return np.array(kept)
+    close = np.abs(points[:, None] - points).max(axis=2) <= near
+    kept: Array = points[~np.tril(close, -1).any(axis=1)]
+    return kept
