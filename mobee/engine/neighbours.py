@@ -26,13 +26,14 @@ from mobee.engine.scene import COUNT
 from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
 
-# Header of `ints`: what there is, how many pairs are listed, how many poses the list has served.
-STATE, LISTED, SERVED = range(3)
-HEADER = 3
+# Header of `ints`: what there is, how many pairs are listed, how many poses the list has served, how many no list is made for.
+STATE, LISTED, SERVED, PAUSE = range(4)
+HEADER = 4
 EMPTY, PLACED, LIST, RENEW = range(4)  # nothing; the last pose; a list; the last pose, in a world that has changed under a useful list
 _PLAIN, _BUILD, _USE = range(3)
 
 MARGIN = 1e-9  # m: above the rounding of distances and of what was moved
+WORTH = 4  # poses that a list must have served before an edit of the world to be made again at once, else so many go without
 SHORT = 4.0  # steps of the present length that a new list must last to be worth making
 
 _0, _1 = np.uint64(0), np.uint64(1)
@@ -156,6 +157,9 @@ def _choose(ints: Ints, most: float, skin: float) -> int:
             ints[SERVED] += 1
             return _USE
         return _BUILD if ints[SERVED] > 1 else _PLAIN
+    if ints[PAUSE] > 0:
+        ints[PAUSE] -= 1
+        return _PLAIN
     if state == RENEW or state == PLACED and SHORT * 2.0 * most < skin:
         return _BUILD
     return _PLAIN

@@ -13,7 +13,7 @@ from mobee.collision.snapshot import Snapshot
 from mobee.engine.engine import Engine
 from mobee.engine.evaluate import settle
 from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
-from mobee.engine.neighbours import EMPTY, HEADER, LIST, RENEW, SERVED, STATE, follow, sizes
+from mobee.engine.neighbours import EMPTY, HEADER, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, follow, sizes
 from mobee.engine.pack import F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Packed, UInts
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene
 from mobee.robot.robot import Array, Ints
@@ -56,7 +56,7 @@ class Neighbours:
         self._wide_places = here.floats.copy()
         self._wide_places[WIDEST] += self._skin
         self._wide_places[W_COLUMNS + 3 * objects :] += self._skin
-        was_of_use = self._ints[STATE] == LIST and self._ints[SERVED] > 1
+        was_of_use = self._ints[STATE] == LIST and self._ints[SERVED] >= WORTH
         floats, pairs, ints = sizes(int(header[JOINTS]), int(header[LINKS]), count, objects)
         self._floats = _at_least(self._floats, floats)
         self._pairs = _at_least(self._pairs, pairs)
@@ -64,6 +64,7 @@ class Neighbours:
         self._slots = _at_least(self._slots, (count + objects) * SLOT)
         settle(header, packed.floats, here.integers, here.snapshot.rows.reshape(-1), self._slots)
         self._ints[STATE] = RENEW if was_of_use else EMPTY
+        self._ints[PAUSE] = 0 if was_of_use or self._known[0] is None else WORTH  # a world in motion outdates its lists
         self._known = here, reaching
 
 

@@ -67,6 +67,18 @@ def test_a_list_of_use_is_made_again_at_once_when_the_world_has_changed(model: m
     assert (state(track)[STATE], state(track)[SERVED]) == (LIST, 0)
 
 
+def test_a_world_in_motion_gets_no_lists_until_it_rests(model: mobee.Model) -> None:
+    track, made = model.track(), 0
+    for k in range(30):
+        if k % 3 == 0:
+            model.world.move("ball", position=(0.0, 0.0, 5.0 + k))
+        track.evaluate(model.robot.home + k * 1e-5)
+        made += state(track)[STATE] == LIST and state(track)[SERVED] == 0
+    assert made == 1
+    creep(model, track, 6, 1e-5)
+    assert state(track)[STATE] == LIST
+
+
 def test_a_larger_skin_lists_more_pairs(model: mobee.Model) -> None:
     listed = []
     for skin in (0.001, 0.02, 0.2):
