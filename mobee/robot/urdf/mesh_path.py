@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from mobee.robot.xml_file import is_file
 from mobee.robot.xml_node import Node
 
 PACKAGES = ("package", "model")
@@ -36,7 +37,7 @@ def find_mesh(node: Node) -> Path:
     else:
         node.fail("filename", f"{given!r} cannot be followed", "Write package://, file:// or a path")
     for path in candidates:
-        if _is_file(path):
+        if is_file(path):
             return path
     looked = ", ".join(str(path) for path in candidates[:6]) + (f" and {len(candidates) - 6} more" if len(candidates) > 6 else "")
     node.fail("filename", f"no mesh {given!r} (looked at {looked})", remedy)
@@ -53,10 +54,3 @@ def _in_packages(urdf: Path, package: str, inner: str) -> Iterator[Path]:
             yield Path(entry) / inner
     for entry in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         yield Path(entry) / "share" / package / inner
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name too long for the system
-        return False

@@ -4,7 +4,7 @@ Every two shapes on different links are, save
 - those of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
   links between them that have no solid, as in a wrist that is written as three joints;
 - those whose links (of the URDF, before fixed joints are merged) the SRDF disables;
-- fields of one part, as in a zero-position file.
+- fields of one part, as in a zero-position file; where the SRDF makes no parts, see own_fields.py.
 
 So without an SRDF nothing else is left out: what overlaps in every pose is for `mobee check` to report.
 """
@@ -13,25 +13,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee.robot.pairs import CLUSTER
 from mobee.robot.robot import Ints, Joint, LinkPair, Shape
+from mobee.robot.urdf.own_fields import far_apart
 from mobee.robot.urdf.srdf import NamePair, Srdf
 
 MOST_BETWEEN = 6  # joints at one place: there are no more ways to move
+OwnFields = Literal["none", "far apart", "all"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRules:
-    """What is left out, by links and by links of the URDF."""
+    """What is left out, by links and by links of the URDF; and which fields of one part are tested against each other."""
 
     links: dict[str, int]  # URDF link -> link of the robot
     adjacent: dict[LinkPair, str]
     srdf: Srdf
-    own: bool = False  # fields of one part are tested against each other too
+    own: OwnFields = "none"
 
 
 def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
@@ -53,7 +56,7 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
     return found
 
 
-def shape_pairs(shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
+def shape_pairs(joints: Sequence[Joint], shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
     """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `owners`: the URDF link of each."""
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     names = {name: k for k, name in enumerate(rules.links)}
@@ -65,10 +68,11 @@ def shape_pairs(shapes: Sequence[Shape], owners: Sequence[str], role: str, rules
         near[a, b] = near[b, a] = True
     tested = (link[:, None] != link) & ~disabled[owner[:, None], owner]
     tested &= ~near[link[:, None], link] | _matrix(rules.srdf.enabled, names)[owner[:, None], owner]
-    if role == "field" and not rules.own:
+    if role == "field" and rules.own != "all":
         parts = {shape.part: k for k, shape in enumerate(shapes)}
         part = np.array([parts[shapes[index].part] for index in chosen], dtype=np.intp)
-        tested &= part[:, None] != part
+        others = part[:, None] != part
+        tested &= others if rules.own == "none" else others | far_apart(joints, [shapes[index] for index in chosen])
     return chosen[np.argwhere(np.triu(tested, 1))]
 
 

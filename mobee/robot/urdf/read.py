@@ -12,7 +12,7 @@ from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
 from mobee.robot.urdf.layout import Skeleton, lay_out, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
-from mobee.robot.urdf.pairs import PairRules, adjacent_links, shape_pairs, untested_links
+from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
 from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown
 from mobee.robot.urdf.srdf import Srdf, read_parts, read_srdf
 from mobee.robot.urdf.tree import Tree, UrdfJoint, read_tree
@@ -75,9 +75,8 @@ def _finish(root: Node, path: Path, tree: Tree, skeleton: Skeleton, srdf: Srdf, 
         where["motor", motor.name] = _place(tree.joints[master].node)
     body = _read_body(tree, skeleton, motors, options, where)
     notes = [node for node in root if node.tag == "mobee"]
-    own = any(note.flag("ownFields") for note in notes)
-    rules = PairRules(skeleton.index, adjacent_links(skeleton.joints, body.shapes), srdf, own)
-    solid_pairs = shape_pairs(body.shapes, body.owners, "solid", rules)
+    rules = PairRules(skeleton.index, adjacent_links(skeleton.joints, body.shapes), srdf, _own_fields(notes, parts, srdf))
+    solid_pairs, field_pairs = (shape_pairs(skeleton.joints, body.shapes, body.owners, role, rules) for role in ("solid", "field"))
     robot = Robot(
         name=name,
         links=tuple(skeleton.links),
@@ -87,13 +86,19 @@ def _finish(root: Node, path: Path, tree: Tree, skeleton: Skeleton, srdf: Srdf, 
         markers={marker.name: marker for marker in read_markers(tree, skeleton, where)},
         shapes=tuple(body.shapes),
         clauses=(),
-        field_pairs=shape_pairs(body.shapes, body.owners, "field", rules),
+        field_pairs=field_pairs,
         solid_pairs=solid_pairs,
         base_shapes=frozenset(body.base),
         untested=untested_links(body.shapes, solid_pairs, rules),
         where=where,
     )
     return without_ignored(robot, [node for note in notes for node in note if node.tag == "ignore"])
+
+
+def _own_fields(notes: list[Node], parts: dict[str, Part], srdf: Srdf) -> OwnFields:
+    if any(note.flag("ownFields") for note in notes):
+        return "all"  # write_urdf names those that are not tested
+    return "none" if set(parts) <= set(srdf.groups) else "far apart"
 
 
 def _where(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, parts: dict[str, Part]) -> dict[tuple[str, str], str]:
