@@ -18,6 +18,7 @@ from mobee.robot.check.words import count
 from mobee.robot.load import load_world
 from mobee.robot.robot import Robot
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
 _NOTES = "Exit code: 0 nothing but notes, 1 at least one warning or error, 2 the file cannot be read."
 
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _NOTES
     parser.add_argument("file", help="shipped robot or world, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="also what the robot touches at home in this world")
+    add_urdf_options(parser)
     parser.add_argument("--pairs", action="store_true", help="list every pair of links that is never tested, and why")
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -34,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Check and print."""
     try:
-        checked = check_file(arguments.file, load_world(arguments.world) if arguments.world else None)
+        world = load_world(arguments.world) if arguments.world else None
+        checked = check_file(arguments.file, world, **urdf_options(arguments))
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     content = checked.content

@@ -11,6 +11,7 @@ from mobee.robot.robot import Robot
 from mobee.robot.write_urdf import write_urdf
 from mobee.robot.write_xml import write_xml
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
 WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
@@ -19,9 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The two files and how a URDF is read."""
     parser.add_argument("source", metavar="IN", help="a shipped robot, or a .xml or .urdf file")
     parser.add_argument("target", metavar="OUT", type=Path, help="the .xml or .urdf file to write")
-    parser.add_argument("--field", type=float, metavar="M", help="give every solid of a URDF a field that reaches so much farther [m]")
-    parser.add_argument("--meshes", choices=("hull", "bounding"), help="meshes of a URDF: convex hulls, or bounding primitives")
-    parser.add_argument("--srdf", type=Path, metavar="FILE", help="the SRDF of a URDF, when it does not lie beside it")
+    add_urdf_options(parser)
     parser.add_argument("--force", action="store_true", help="write over files that are there")
 
 
@@ -34,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     if taken and not arguments.force:
         raise UserError(f"{taken[0]} is there already. Choose another name, or write over it with --force", BAD_INPUT)
     try:
-        robot = load_robot(arguments.source, field=arguments.field, meshes=arguments.meshes, srdf=arguments.srdf)
+        robot = load_robot(arguments.source, **urdf_options(arguments))
         WRITERS[target.suffix.lower()](robot, target)
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from error

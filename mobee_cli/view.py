@@ -8,6 +8,7 @@ from pathlib import Path
 from mobee.errors import MobeeError
 from mobee.robot.load import load_robot, load_world
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
+from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
 _NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.
 Prints the address of a page and shows it until Ctrl-C; with --save it writes a file instead, for `rerun FILE`."""
@@ -18,6 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _NOTES
     parser.add_argument("file", help="shipped robot, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="shipped world, or path of a .xml file, to show around it")
+    add_urdf_options(parser)
     parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a recording and end")
 
 
@@ -33,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     if save is not None and not save.resolve().parent.is_dir():
         raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
     try:
-        robot = load_robot(arguments.file)
+        robot = load_robot(arguments.file, **urdf_options(arguments))
         world = load_world(arguments.world) if arguments.world else None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None

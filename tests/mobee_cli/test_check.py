@@ -51,7 +51,7 @@ def test_as_json(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_pairs_are_counted_and_on_request_named(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main(["check", str(good)])
     brief = capsys.readouterr().out
-    assert "fields of the same part: 1 pair of links (0 of solids, 1 of fields)" in " ".join(brief.split())
+    assert "fields of the same part, which overlap wherever it bends: 1 pair of links (0 of solids, 1 of fields)" in " ".join(brief.split())
     assert "base - bend" not in brief
     main(["check", str(good), "--pairs"])
     assert "base - bend" in capsys.readouterr().out

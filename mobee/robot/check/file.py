@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mobee.collision.world import World
+from mobee.errors import InvalidValue
 from mobee.robot.check.finding import SEVERITIES, Finding
 from mobee.robot.check.robot import check_robot
 from mobee.robot.check.world import check_world
 from mobee.robot.load import WORLDS, load_robot, load_world, shipped_robots, shipped_worlds
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml_node import read_xml
 
 
@@ -26,18 +28,28 @@ class Checked:
     findings: tuple[Finding, ...]
 
 
-def check_file(name_or_path: str | Path, world: World | None = None) -> Checked:
+def check_file(
+    name_or_path: str | Path,
+    world: World | None = None,
+    *,
+    field: float | None = None,
+    meshes: Meshes | None = None,
+    srdf: str | Path | None = None,
+) -> Checked:
     """Everything that is wrong with a shipped robot or world, or with a file of one; errors first.
 
-    `world`: what a robot is also checked against, at home.  Raises RobotFileError or UnknownName when it cannot be read at all.
+    `world`: what a robot is also checked against, at home; `field`, `meshes`, `srdf`: of a URDF, as in load_robot.
+    Raises RobotFileError, UnknownName or InvalidValue when it cannot be read at all, or not with these options.
     """
     path = world_file(name_or_path)
     said: list[Finding] = []
     content: Robot | World
     if path is None:
         with _listening(said):
-            content = load_robot(name_or_path)
+            content = load_robot(name_or_path, field=field, meshes=meshes, srdf=srdf)
         found = check_robot(content, world)
+    elif world is not None or (field, meshes, srdf) != (None, None, None):
+        raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it, fields, meshes or an SRDF.")
     else:
         with _listening(said):
             content = load_world(path)

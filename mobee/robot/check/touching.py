@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from mobee.collision.contact import Contact
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
 from mobee.robot.check.words import length
@@ -46,9 +47,7 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 subject.where("shape", contact.first),
                 f"at home {pair} collide, {length(contact.depth)} deep",
                 "the robot starts in a collision that it could not have moved into",
-                'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
-                if subject.is_urdf
-                else "move the home, make a shape smaller, or correct where one is placed",
+                _parting(subject, contact),
             )
         else:
             yield Finding(
@@ -61,6 +60,17 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 "the force pushes the robot away from its home before anything has happened",
                 "make a field smaller, or move the home",
             )
+
+
+def _parting(subject: Subject, contact: Contact) -> str:
+    """What to do about two solids that collide at home."""
+    if not subject.is_urdf:
+        return "move the home, make a shape smaller, or correct where one is placed"
+    remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
+    if contact.second_link < 0:
+        return remedy
+    links = subject.robot.links
+    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, links[contact.first_link], links[contact.second_link])}"
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:

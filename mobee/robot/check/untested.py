@@ -11,7 +11,7 @@ from itertools import combinations
 from mobee.robot.robot import Ints, LinkPair, Robot
 
 SAME_LINK = "on the same link, which is rigid"
-SAME_PART = "fields of the same part"
+SAME_PART = "fields of the same part, which overlap wherever it bends"
 SINGLE = "left out singly: other shapes of these links are tested"
 OTHER_ROLE = {
     "solid": "solids that an <ignore> or the rule of 2014 leaves out, while fields of these links are tested",

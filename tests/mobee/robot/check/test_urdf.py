@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from mobee.errors import InvalidValue
 from mobee.robot.check import Finding, check_file
+from mobee.robot.robot import Robot
 
 URDF = """\
 <robot name="toy">
@@ -56,3 +58,24 @@ def test_frames_of_the_base_are_a_note(file: Path) -> None:
 def test_small_ranges_are_no_slip_for_a_urdf_is_read_in_radians(file: Path) -> None:
     file.write_text(URDF.format("").replace('"-90" upper="90"', '"-0.1" upper="0.1"').replace('"-2" upper="2"', '"-0.05" upper="0.05"'))
     assert of(file, "unit") == []
+
+
+def test_a_collision_at_home_may_be_left_out_in_the_srdf(file: Path) -> None:
+    file.write_text(URDF.format("").replace('"fore"><collision>', '"fore"><collision><origin xyz="0 0 -0.1"/>'))
+    (finding,) = of(file, "home-collision")
+    assert '<disable_collisions link1="base" link2="fore"' in finding.remedy
+
+
+def test_fields_and_srdf_are_given_as_to_load_robot(file: Path, tmp_path: Path) -> None:
+    file.write_text(URDF.format(""))
+    assert [finding.what for finding in check_file(file).findings if finding.check == "field"] == ["the robot has no field"]
+    assert not [finding for finding in check_file(file, field=0.03).findings if finding.check == "field"]
+    other = tmp_path / "other.srdf"
+    other.write_text('<robot name="toy"><group name="arm"><joint name="pan"/><joint name="bend"/></group></robot>')
+    content = check_file(file, srdf=other).content
+    assert isinstance(content, Robot) and list(content.parts) == ["arm"]
+
+
+def test_a_world_has_no_fields_to_grow() -> None:
+    with pytest.raises(InvalidValue, match=r"table.xml is a world: it is checked by itself"):
+        check_file("table", field=0.03)
