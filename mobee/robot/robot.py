@@ -35,13 +35,16 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motor:
-    """What is commanded: drives one or more joints affinely, joint = scale * motor + offset."""
+    """What is commanded: drives one or more joints affinely, joint = scale * motor + offset.
+
+    A motor counts in rad. That of a prismatic joint counts in m where the scale is 1, as from a URDF: read m for rad and N for N m then.
+    """
 
     name: str
     part: str
     limits: Array  # (2,) rad
     home: float  # rad
-    joints: tuple[tuple[int, float, float], ...]  # (joint index, scale, offset rad)
+    joints: tuple[tuple[int, float, float], ...]  # (joint index, scale, offset in the joint's unit)
     max_velocity: float = np.deg2rad(60.0)  # rad/s, the last resort that the gate enforces
     max_acceleration: float = np.deg2rad(600.0)  # rad/s^2
     max_torque: float = 40.0  # N m
@@ -137,17 +140,17 @@ class Robot:
 
     @cached_property
     def limits(self) -> Array:
-        """Motor limits, shape (n, 2), in [rad]."""
+        """Motor limits, shape (n, 2), in [rad], or [m] of a prismatic joint."""
         return np.array([m.limits for m in self.motor_table])
 
     @cached_property
     def home(self) -> Array:
-        """Motor positions at home, shape (n,), in [rad]."""
+        """Motor positions at home, shape (n,), in [rad], or [m] of a prismatic joint."""
         return np.array([m.home for m in self.motor_table])
 
     @cached_property
     def coupling(self) -> tuple[Array, Array]:
-        """Joint angles as coupling @ q + offset: shapes (joints, n) and (joints,)."""
+        """Joint positions (rad or m) as coupling @ q + offset: shapes (joints, n) and (joints,)."""
         matrix = np.zeros((len(self.joints), len(self.motor_table)))
         offset = np.zeros(len(self.joints))
         for column, motor in enumerate(self.motor_table):
