@@ -10,6 +10,7 @@ from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
+from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
 from mobee.simulation import MotorParameters, OfflinePlant
@@ -42,6 +43,7 @@ __all__ = [
     "capsule",
     "constraint_forces",
     "cylinder",
+    "join_robots",
     "load_robot",
     "load_world",
     "run",
