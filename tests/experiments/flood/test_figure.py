@@ -42,5 +42,5 @@ def test_without_matplotlib_it_is_said_what_to_install(tmp_path, monkeypatch):
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(MatplotlibMissing, match=r"pip install 'mobee\[figures\]'"):
+    with pytest.raises(MatplotlibMissing, match=r"pip install '\.\[figures\]'"):
         flood.figure(tmp_path)
