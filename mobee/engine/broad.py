@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inlined, inner
 from mobee.engine.layout import BOUND, SLOT
 from mobee.engine.pack import CLUSTER_PAIRS, CLUSTERS, F_REACH, I_PAIR, I_START, I_WORLD, SHAPES, UInts
 from mobee.engine.scene import CELLS, CORNER, COUNT, LARGE, PER_METRE, W_COLUMNS, W_START, WIDEST
@@ -89,7 +89,7 @@ def world_pairs(
     return found
 
 
-@inner
+@inlined
 def _near_cluster(balls: Array, c: np.uint64, world: UInts, places: Array, shapes: np.uint64, near: Array, near_slot: UInts) -> np.uint64:
     """Gather the objects that touch a cluster's ball: the large ones, then cell by cell; returns how many."""
     u, v, w, radius = balls[c * _4], balls[c * _4 + _1], balls[c * _4 + _2], balls[c * _4 + _3]
@@ -106,7 +106,7 @@ def _near_cluster(balls: Array, c: np.uint64, world: UInts, places: Array, shape
     return found
 
 
-@inner
+@inlined
 def _span(offset: float, along: float, per_metre: float, cells: np.uint64) -> tuple[np.uint64, np.uint64]:
     """First and one past the last cell that [offset - along, offset + along] reaches; what lies outside counts to the edge cells."""
     last = float(cells) - 1.0
@@ -115,7 +115,7 @@ def _span(offset: float, along: float, per_metre: float, cells: np.uint64) -> tu
     return np.uint64(low), np.uint64(high) + _1
 
 
-@inner
+@inlined
 def _scan(
     u: float,
     v: float,

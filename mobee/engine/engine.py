@@ -7,10 +7,10 @@ import numpy as np
 from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import ATTACHED, Snapshot
 from mobee.engine import evaluate
-from mobee.engine.layout import SLOT
 from mobee.engine.pack import Carried, Packed, pack
+from mobee.engine.room import Room
 from mobee.engine.rows import NUMBERS, REALS
-from mobee.engine.scene import COUNT, Scene, scene
+from mobee.engine.scene import Scene, scene
 from mobee.errors import UnknownName
 from mobee.robot.robot import Array, Ints, Robot
 
@@ -23,7 +23,7 @@ class Engine:
         self._shapes = tuple(shape.name for shape in robot.shapes)
         self._packed: tuple[tuple[bytes, ...], Packed] = (), pack(robot)
         self._scene: Scene | None = None
-        self._rooms: list[tuple[Scene | None, Array]] = []  # slots of evaluations that have ended, with the scene they are settled for
+        self._rooms: list[Room] = []  # of evaluations that have ended
 
     def transforms(self, q: Array) -> Array:
         """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
@@ -41,31 +41,32 @@ class Engine:
         `reaching`: link that spares the targets, -1 for none; `cut`: see `project`.
         """
         here = self.scene_of(snapshot)
-        packed = here.packed
-        room = self._take_room(here)
-        own = len(self.robot.shapes)
-        numbers, reals, torque = evaluate.contacts(
-            packed.integers, packed.floats, packed.vertices, here.integers, here.floats, here.carried, own, reaching, cut, q, room
-        )
-        self._rooms.append((here, room))
+        packed, own = here.packed, len(self.robot.shapes)
+        try:
+            room = self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            room = Room()
+        room.settle(here)
+        torque = np.zeros(q.shape)
+        written: list[tuple[Ints, Array]] = []
+        done, used = 0, 0
+        while done < len(q):
+            if used:
+                written.append((room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()))
+            done, used = evaluate.contacts(
+                packed.integers, packed.floats, packed.vertices, here.integers, here.floats, here.carried, own, reaching, cut, q, done,
+                room.most, room.slots, room.work, room.lists, room.spare, room.numbers, room.reals, torque,
+            )  # fmt: skip
+        numbers, reals = room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()
+        self._rooms.append(room)
+        if written:
+            numbers = np.concatenate([*(one for one, _ in written), numbers])
+            reals = np.concatenate([*(one for _, one in written), reals])
         return self.table(snapshot, numbers, reals), torque
 
     def table(self, snapshot: Snapshot, numbers: Ints, reals: Array) -> ContactTable:
         """The table of what compiled code has written."""
         return ContactTable(self._shapes, snapshot.names, numbers.reshape(-1, NUMBERS), reals.reshape(-1, REALS))
-
-    def _take_room(self, here: Scene) -> Array:
-        packed, size = here.packed, (len(here.packed.order) + int(here.integers[COUNT])) * SLOT
-        try:
-            settled_for, room = self._rooms.pop()
-        except IndexError:
-            settled_for, room = None, np.empty(0)
-        if settled_for is here:
-            return room
-        if len(room) < size:
-            room = np.zeros(2 * size)
-        evaluate.settle(packed.integers, packed.floats, here.integers, here.snapshot.rows.reshape(-1), room)
-        return room
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
         """The robot among the free objects of a snapshot; the same as before for the same snapshot."""

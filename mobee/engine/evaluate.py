@@ -57,8 +57,9 @@ def link_poses(integers: UInts, floats: Array, q: Array) -> Array:
 
 
 @entry(
-    "Tuple((int64[::1], float64[::1], float64[:,::1]))("
-    "uint64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], int64[::1], int64, int64, boolean, float64[:,::1], float64[::1])"
+    "UniTuple(int64, 2)("
+    "uint64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], int64[::1], int64, int64, boolean, float64[:,::1], int64, int64, "
+    "float64[::1], float64[::1], uint64[::1], int64[::1], int64[::1], float64[::1], float64[:,::1])"
 )
 def contacts(
     integers: UInts,
@@ -71,26 +72,35 @@ def contacts(
     reaching: int,
     cut: bool,
     q: Array,
+    begin: int,
+    most: int,
     slots: Array,
-) -> tuple[Ints, Array, Array]:
-    """Every contact in every pose q (B, n), as rows of `NUMBERS` and `REALS`, and the projected forces (B, n).
+    work: Array,
+    lists: UInts,
+    spare: Ints,
+    numbers: Ints,
+    reals: Array,
+    torque: Array,
+) -> tuple[int, int]:
+    """Write every contact in the poses q[begin], q[begin + 1], ... to the rows of `numbers` and `reals`, its forces to `torque` (B, n).
 
-    `slots`: room for every shape's and every free object's slot, settled by `settle`.
+    Returns the pose that found no room for its rows, len(q) if all did, and how many rows are written.  `most`, `slots`
+    ... `reals`: a Room settled for the scene.
     """
     joints, links, shapes = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[SHAPES])
     objects = np.int64(world[COUNT])
-    angles, sines, cosines, frames = np.empty(joints), np.empty(joints), np.empty(joints), np.empty(12 * links)
-    x, y, z, balls = np.empty(shapes), np.empty(shapes), np.empty(shapes), np.empty(4 * np.int64(integers[CLUSTERS]))
-    near, near_slot = np.empty(4 * objects), np.empty(objects, dtype=np.uint64)
-    most = shapes * (shapes + 1) // 2 + shapes * objects
-    first, second = np.empty(most, dtype=np.uint64), np.empty(most, dtype=np.uint64)
-    found_numbers, found_reals = np.empty(most * NUMBERS, dtype=np.int64), np.empty(most * REALS)
-    keys, order = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
-    wrench, out, moved = np.zeros(6 * links), np.empty(6), np.ones(links, dtype=np.bool_)
-    room, used = 16 + 4 * len(q), 0
-    numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
-    motors, torques = q.ravel(), torque.ravel()
-    for b in range(len(q)):
+    angles, sines, cosines = work[:joints], work[joints : 2 * joints], work[2 * joints : 3 * joints]
+    frames, at = work[3 * joints : 3 * joints + 12 * links], 3 * joints + 12 * links
+    wrench, at = work[at : at + 6 * links], at + 6 * links
+    x, y, z, at = work[at : at + shapes], work[at + shapes : at + 2 * shapes], work[at + 2 * shapes : at + 3 * shapes], at + 3 * shapes
+    balls, at = work[at : at + 4 * np.int64(integers[CLUSTERS])], at + 4 * np.int64(integers[CLUSTERS])
+    near, out, found_reals = work[at : at + 4 * objects], work[at + 4 * objects : at + 4 * objects + 6], work[at + 4 * objects + 6 :]
+    near_slot, first, second = lists[:objects], lists[objects : objects + most], lists[objects + most :]
+    found_numbers, keys, order = spare[: most * NUMBERS], spare[most * NUMBERS : most * (NUMBERS + 1)], spare[most * (NUMBERS + 1) :]
+    moved = np.ones(links, dtype=np.bool_)
+    motors, torques, used = q.ravel(), torque.ravel(), 0
+    wrench[:] = 0.0
+    for b in range(begin, len(q)):
         joint_angles(integers, floats, motors, b * q.shape[1], angles)
         sines_cosines(angles, sines, cosines)
         place_links(integers, floats, angles, sines, cosines, moved, frames)
@@ -105,17 +115,16 @@ def contacts(
         if count == np.uint64(0):
             continue
         rows = np.int64(count)
-        if used + rows > room:
-            room = 2 * room + rows
-            wider, taller = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS)
-            wider[: used * NUMBERS], taller[: used * REALS] = numbers[: used * NUMBERS], reals[: used * REALS]
-            numbers, reals = wider, taller
-        sort_rows(found_numbers, rows, keys, order)
-        append_rows(b, found_numbers, found_reals, order, rows, numbers, reals, used)
-        push_links(numbers, reals, used, rows, wrench)  # in the order of the rows: the sum does not depend on how they were found
+        if (used + rows) * REALS > len(reals):
+            return b, used
+        sort_rows(found_numbers, count, keys, order)
+        append_rows(b, found_numbers, found_reals, order, count, numbers, reals, np.uint64(used))
+        push_links(
+            numbers, reals, np.uint64(used), count, wrench
+        )  # in the order of the rows: the sum does not depend on how they were found
         project(integers, floats, frames, wrench, cut, torques, b * q.shape[1])
         used += rows
-    return numbers[: used * NUMBERS], reals[: used * REALS], torque
+    return len(q), used
 
 
 @entry("void(uint64[::1], float64[::1], uint64[::1], float64[::1], float64[::1])")

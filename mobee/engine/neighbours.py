@@ -271,9 +271,9 @@ def follow(
             wider, taller = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS)
             wider[: used * NUMBERS], taller[: used * REALS] = numbers[: used * NUMBERS], reals[: used * REALS]
             numbers, reals = wider, taller
-        sort_rows(found_numbers, rows, keys, order)
-        append_rows(b, found_numbers, found_reals, order, rows, numbers, reals, used)
-        push_links(numbers, reals, used, rows, wrench)
+        sort_rows(found_numbers, count, keys, order)
+        append_rows(b, found_numbers, found_reals, order, count, numbers, reals, np.uint64(used))
+        push_links(numbers, reals, np.uint64(used), count, wrench)
         project(integers, floats, frames, wrench, False, torques, b * motors)
         used += rows
     return numbers[: used * NUMBERS], reals[: used * REALS], torque

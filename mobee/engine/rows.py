@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inlined, inner
 from mobee.engine.forces import push
 from mobee.engine.layout import SLOT
 from mobee.engine.narrow.dispatch import overlap
@@ -14,18 +14,19 @@ from mobee.robot.robot import Array, Ints
 
 NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
 
-_0, _1, _SLOT, _NUMBERS, _REALS = np.uint64(0), np.uint64(1), np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
+_0, _1, _2, _3, _4, _5, _6 = (np.uint64(k) for k in range(7))
+_SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
 
 
-@inner
+@inlined
 def _swap(numbers: Ints, n: np.uint64, out: Array) -> None:
     """Let the second be the first."""
-    for k in (np.uint64(2), np.uint64(4)):
+    for k in (_2, _4):
         numbers[n + k], numbers[n + k + _1] = numbers[n + k + _1], numbers[n + k]
     out[0], out[1], out[2] = -out[0], -out[1], -out[2]
 
 
-@inner
+@inlined
 def _name(integers: UInts, name: np.uint64, i: np.uint64, own_shapes: int, carried: Ints) -> int:
     """Index into the names: the robot's shapes, then the objects of the snapshot."""
     given = np.int64(integers[name + i])
@@ -58,7 +59,7 @@ def find_contacts(
     return found
 
 
-@inner
+@inlined
 def write_contact(
     integers: UInts,
     world: UInts,
@@ -78,69 +79,70 @@ def write_contact(
     i, j = a // _SLOT, b // _SLOT
     n, r = row * _NUMBERS, row * _REALS
     numbers[n + _1] = integers[role + i] | (integers[role + j] if j < shapes else _0)  # a carried object meets fields too
-    numbers[n + np.uint64(2)] = _name(integers, name, i, own_shapes, carried)
-    numbers[n + np.uint64(4)] = integers[link + i]
+    numbers[n + _2] = _name(integers, name, i, own_shapes, carried)
+    numbers[n + _4] = integers[link + i]
     if j < shapes:
-        numbers[n + np.uint64(3)] = _name(integers, name, j, own_shapes, carried)
-        numbers[n + np.uint64(5)] = integers[link + j]
-        if numbers[n + np.uint64(3)] < numbers[n + np.uint64(2)]:
+        numbers[n + _3] = _name(integers, name, j, own_shapes, carried)
+        numbers[n + _5] = integers[link + j]
+        if numbers[n + _3] < numbers[n + _2]:
             _swap(numbers, n, out)
     else:
         order = np.uint64(W_START) + world[CELLS] * world[CELLS + 1] * world[CELLS + 2] + _1
         if world[order + world[COUNT] + (j - shapes)] == _1 and np.int64(integers[link + i]) == reaching:
             return _0
-        numbers[n + np.uint64(3)] = own_shapes + np.int64(world[order + (j - shapes)])
-        numbers[n + np.uint64(5)] = -1
+        numbers[n + _3] = own_shapes + np.int64(world[order + (j - shapes)])
+        numbers[n + _5] = -1
     reals[r] = depth
-    for k in range(np.uint64(6)):
+    for k in range(_6):
         reals[r + _1 + k] = out[k]
     return _1
 
 
 @inner
-def sort_rows(numbers: Ints, count: int, keys: Ints, order: Ints) -> None:
+def sort_rows(numbers: Ints, count: np.uint64, keys: Ints, order: Ints) -> None:
     """Fill `order` with the rows by kind, first and second (shell sort: mostly a handful, at times hundreds)."""
     for i in range(count):
-        n = i * NUMBERS
-        keys[i] = (numbers[n + 1] << 60) | (numbers[n + 2] << 30) | numbers[n + 3]
+        n = i * _NUMBERS
+        keys[i] = (numbers[n + _1] << 60) | (numbers[n + _2] << 30) | numbers[n + _3]
         order[i] = i
-    gap = 1
-    while gap < count // 3:
-        gap = 3 * gap + 1
-    while gap > 0:
+    gap = _1
+    while gap < count // _3:
+        gap = _3 * gap + _1
+    while gap > _0:
         for i in range(gap, count):
             key, row, j = keys[i], order[i], i
             while j >= gap and keys[j - gap] > key:
                 keys[j], order[j] = keys[j - gap], order[j - gap]
                 j -= gap
             keys[j], order[j] = key, row
-        gap //= 3
+        gap = gap // _3
 
 
 @inner
 def append_rows(
-    pose: int, found_numbers: Ints, found_reals: Array, order: Ints, count: int, numbers: Ints, reals: Array, used: int
+    pose: int, found_numbers: Ints, found_reals: Array, order: Ints, count: np.uint64, numbers: Ints, reals: Array, used: np.uint64
 ) -> None:
     """Copy the rows of one pose, in order, behind the `used` rows of the poses before."""
     for c in range(count):
-        n, r = (used + c) * NUMBERS, (used + c) * REALS
+        row = np.uint64(order[c])
+        n, r, m, o = (used + c) * _NUMBERS, (used + c) * _REALS, row * _NUMBERS, row * _REALS
         numbers[n] = pose
-        for k in range(1, NUMBERS):
-            numbers[n + k] = found_numbers[order[c] * NUMBERS + k]
-        for k in range(REALS):
-            reals[r + k] = found_reals[order[c] * REALS + k]
+        for k in range(_1, _NUMBERS):
+            numbers[n + k] = found_numbers[m + k]
+        for k in range(_REALS):
+            reals[r + k] = found_reals[o + k]
 
 
 @inner
-def push_links(numbers: Ints, reals: Array, used: int, count: int, wrench: Array) -> None:
+def push_links(numbers: Ints, reals: Array, used: np.uint64, count: np.uint64, wrench: Array) -> None:
     """Add depth * normal of every field contact of rows used .. used + count - 1 to its first link, and the opposite to its second."""
-    for c in range(np.uint64(used), np.uint64(used + count)):
+    for c in range(used, used + count):
         n, r = c * _NUMBERS, c * _REALS
         if numbers[n + _1] != 1:
             continue
         depth = reals[r]
-        fx, fy, fz = depth * reals[r + _1], depth * reals[r + np.uint64(2)], depth * reals[r + np.uint64(3)]
-        x, y, z = reals[r + np.uint64(4)], reals[r + np.uint64(5)], reals[r + np.uint64(6)]
-        push(wrench, np.uint64(numbers[n + np.uint64(4)]), fx, fy, fz, x, y, z)
-        if numbers[n + np.uint64(5)] >= 0:
-            push(wrench, np.uint64(numbers[n + np.uint64(5)]), -fx, -fy, -fz, x, y, z)
+        fx, fy, fz = depth * reals[r + _1], depth * reals[r + _2], depth * reals[r + _3]
+        x, y, z = reals[r + _4], reals[r + _5], reals[r + _6]
+        push(wrench, np.uint64(numbers[n + _4]), fx, fy, fz, x, y, z)
+        if numbers[n + _5] >= 0:
+            push(wrench, np.uint64(numbers[n + _5]), -fx, -fy, -fz, x, y, z)

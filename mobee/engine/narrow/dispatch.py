@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inlined, inner
 from mobee.engine.narrow.box_box import box_box
 from mobee.engine.narrow.cylinder import sphere_cylinder
 from mobee.engine.narrow.difference import FRAME, relative, rounding
@@ -19,7 +19,7 @@ from mobee.engine.narrow.slots import KIND
 from mobee.robot.robot import Array
 
 
-@inner
+@inlined
 def overlap(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     """How deep two volumes overlap [m]; if they do not, minus a lower bound of their distance.
 

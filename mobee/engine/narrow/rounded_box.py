@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
-from mobee.engine.narrow.inlined import inlined
+from mobee.engine.compiled import inlined, inner
 from mobee.engine.narrow.segment_box import closest_to_box, distance_bound, span_within
 from mobee.engine.narrow.slots import (
     CENTER,

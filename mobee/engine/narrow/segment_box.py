@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mobee.engine.narrow.inlined import inlined
+from mobee.engine.compiled import inlined
 from mobee.engine.narrow.slots import FLAT, Vector, unit
 
 Spans = tuple[float, float, float, float, float, float]

@@ -72,7 +72,7 @@ def test_a_batch_is_its_poses_one_by_one_to_the_last_bit(rng: np.random.Generato
 
 
 def test_many_contacts_fit(rng: np.random.Generator) -> None:
-    """Far more than the room that a batch begins with."""
+    """Several times what one pass through the room holds."""
     robot, world = loaded("katana"), mobee.World()
     for index in range(50):
         world.add(f"around{index}", mobee.sphere(10.0))

@@ -17,7 +17,7 @@ def test_slots_are_the_volumes_placed_one_by_one(robot: Robot, poses: int, rng: 
     """Of every volume but the sphere, whose rotation nobody reads, all of the slot; of a batch, what its last pose leaves."""
     engine, snapshot, q = Engine(robot), random_world(rng, robot, 12).snapshot, posed(rng, robot, poses)
     engine.contacts(q, snapshot, -1)
-    here, room = engine._rooms[-1]
+    here, slots = engine._rooms[-1].scene, engine._rooms[-1].slots
     assert here is not None
     transforms = link_transforms(robot, q[-1])
     rows, _ = _rows(robot.shapes)
@@ -28,7 +28,7 @@ def test_slots_are_the_volumes_placed_one_by_one(robot: Robot, poses: int, rng: 
         else:
             row, link = rows[index], robot.shapes[index].link
         expected = placed(row, transforms[link])
-        found = room[slot * SLOT : (slot + 1) * SLOT].copy()
+        found = slots[slot * SLOT : (slot + 1) * SLOT].copy()
         if row[0] == 0:
             found[3:12] = expected[3:12]
         assert found == pytest.approx(expected, abs=1e-13), index

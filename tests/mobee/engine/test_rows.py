@@ -12,5 +12,5 @@ def test_rows_are_sorted_by_kind_first_and_second(count: int, rng: np.random.Gen
     numbers[:, 1] = rng.integers(0, 2, count)
     numbers[:, 2] = rng.integers(0, 5, count)
     order = np.empty(count, dtype=np.int64)
-    sort_rows(numbers.ravel(), count, np.empty(count, dtype=np.int64), order)
+    sort_rows(numbers.ravel(), np.uint64(count), np.empty(count, dtype=np.int64), order)
     assert np.array_equal(order, np.lexsort((numbers[:, 3], numbers[:, 2], numbers[:, 1])))
