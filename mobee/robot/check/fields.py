@@ -52,13 +52,14 @@ def _judge(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterat
     for field in around:
         holder = next((solid for solid in solids if outside(solid, surface(field)).max() < LEAST), None)
         if holder is not None:
+            rest = any(outside(other, surface(holder)).max() < LEAST for other in around if other is not field)
             yield Finding(
-                "warning",
+                "note" if rest else "warning",  # with --field a solid inside of another has a field too
                 "field",
                 subject.where("shape", field.name),
                 f"field {field.name!r} lies inside of solid {holder.name!r}",
                 "it can never be felt before the solid touches",
-                "make the field larger than the solid",
+                "nothing: another field surrounds that solid" if rest else "make the field larger than the solid",
             )
     if around:
         yield from _sticking(subject, solids, around)

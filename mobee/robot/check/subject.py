@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from mobee.collision.contact import Contact
 from mobee.collision.world import World
 from mobee.model import Model
 from mobee.robot.robot import Array, Robot, Shape
+from mobee.robot.xml_node import read_xml
 
 POSES = 256  # a pair that touches in all of them cannot be kept apart
 SEED = 20141030  # any: the same file is answered the same way every time
@@ -34,6 +36,18 @@ class Subject:
     def is_urdf(self) -> bool:
         """Whether the robot was read from a URDF, in which some remedies are written otherwise."""
         return any(".urdf:" in line for line in self.robot.where.values())
+
+    def urdf_link(self, shape: str) -> str | None:
+        """The link of the URDF that a shape is on, which a fixed joint may hold on the robot's link; None for another file."""
+        return self._urdf_links.get(self.where("shape", shape))
+
+    @cached_property
+    def _urdf_links(self) -> dict[str, str]:
+        """For every line of a URDF on which a shape of the robot begins its link."""
+        lines = (line.rpartition(":")[0] for (kind, _), line in self.robot.where.items() if kind == "shape")
+        files = {Path(file) for file in lines if file.lower().endswith(".urdf")}
+        links = (node for file in files for node in read_xml(file) if node.tag == "link")
+        return {f"{inner.file}:{inner.line}": link.optional("name") for link in links for inner in link}
 
     @cached_property
     def range(self) -> Array:

@@ -13,7 +13,6 @@ from mobee.robot.robot import Shape
 
 def always_touching(subject: Subject) -> Iterator[Finding]:
     """Pairs that overlap in every sampled pose."""
-    links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
     for first, second, kind in sorted(subject.always):
         yield Finding(
             "warning",
@@ -23,14 +22,17 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
             "their contact says nothing, and hides others behind a force that never ends"
             if kind == "field"
             else "every pose counts as a collision, so no plan is ever valid",
-            f"make one smaller, or leave the pair out: {_ignoring(subject, links[first], links[second])}",
+            f"make one smaller, or leave the pair out: {_ignoring(subject, first, second)}",
         )
 
 
 def _ignoring(subject: Subject, first: str, second: str) -> str:
-    if subject.is_urdf:
-        return f'<disable_collisions link1="{first}" link2="{second}" reason="Default"/> in the SRDF beside it'
-    return f'<ignore first="{first}" second="{second}"/>'
+    """What leaves out the pair of links of two shapes."""
+    link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
+    if link1 and link2:
+        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
+    links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
+    return f'<ignore first="{links[first]}" second="{links[second]}"/>'
 
 
 def home_contacts(subject: Subject) -> Iterator[Finding]:
@@ -69,8 +71,7 @@ def _parting(subject: Subject, contact: Contact) -> str:
     remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
     if contact.second_link < 0:
         return remedy
-    links = subject.robot.links
-    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, links[contact.first_link], links[contact.second_link])}"
+    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, contact.first, contact.second)}"
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:

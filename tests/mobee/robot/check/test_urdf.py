@@ -66,6 +66,25 @@ def test_a_collision_at_home_may_be_left_out_in_the_srdf(file: Path) -> None:
     assert '<disable_collisions link1="base" link2="fore"' in finding.remedy
 
 
+def test_a_solid_on_a_fixed_joint_is_left_out_by_its_own_link(file: Path) -> None:
+    bolt = '<joint name="bolt" type="fixed"><parent link="fore"/><child link="tool"/></joint>'
+    tool = '<link name="tool"><collision><geometry><sphere radius="0.12"/></geometry></collision></link>'
+    file.write_text(URDF.format(bolt + tool))
+    (finding,) = of(file, "always-touching")
+    assert '<disable_collisions link1="base" link2="tool" reason="Default"/>' in finding.remedy
+    file.with_suffix(".srdf").write_text('<robot name="toy"><disable_collisions link1="base" link2="tool" reason="Default"/></robot>')
+    assert of(file, "always-touching") == []
+
+
+def test_a_field_grown_inside_of_a_solid_that_has_its_own_is_a_note(file: Path) -> None:
+    seed = '<collision name="seed"><geometry><sphere radius="0.01"/></geometry></collision></link>'
+    file.write_text(
+        URDF.format("").replace('radius="0.06"/></geometry></collision></link>', f'radius="0.06"/></geometry></collision>{seed}')
+    )
+    findings = [finding for finding in check_file(file, field=0.03).findings if finding.check == "field"]
+    assert [(finding.severity, finding.what) for finding in findings] == [("note", "field 'seed_field' lies inside of solid 'fore'")]
+
+
 def test_fields_and_srdf_are_given_as_to_load_robot(file: Path, tmp_path: Path) -> None:
     file.write_text(URDF.format(""))
     assert [finding.what for finding in check_file(file).findings if finding.check == "field"] == ["the robot has no field"]
