@@ -10,7 +10,7 @@ import numpy as np
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Robot
-from mobee.robot.urdf.read import read_urdf
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.xml_world import read_world
 from mobee.robot.zero_position import read_robot
 
@@ -20,6 +20,7 @@ SHIPPED = FUZZ.parents[1] / "mobee" / "robot"
 CORPUS = FUZZ.parent / "corpus"
 DIVIDER = b"\n%%\n"  # between the files of one input
 URDF_FILES = ("given.urdf", "given.srdf", "given.stl", "given.obj", "given.dae")
+OPTIONS = (UrdfOptions(), UrdfOptions(field=0.03), UrdfOptions(field=0.03, meshes="bounding"))  # taken in turn
 
 
 def feed_xml(content: bytes, folder: Path) -> bool:
@@ -51,7 +52,7 @@ def feed_urdf(content: bytes, folder: Path) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            check_robot(read_urdf(folder / URDF_FILES[0]))
+            check_robot(read_urdf(folder / URDF_FILES[0], OPTIONS[len(content) % len(OPTIONS)]))
         except RobotFileError as error:
             check_message(error, folder)
             return False
