@@ -152,7 +152,8 @@ def test_the_table_is_felt_and_pushes_the_arm_off(run: Stage) -> None:
 
 def test_markers_are_where_the_library_has_them(run: Stage, rng: np.random.Generator) -> None:
     q = rng.uniform(*run.rig.robot.limits.T)
-    run.at(q)
+    run.at(q)  # comes back with the forces, and the pose is said after them
+    wait_for(lambda: run.poses and np.allclose(run.poses[-1].q, q, atol=1e-15), "the pose")
     said, pose = run.poses[-1], library().evaluate(q)
     np.testing.assert_allclose(said.q, q, atol=1e-15)
     assert {m.name for m in said.markers} == set(run.rig.robot.markers)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.engine.engine import Engine
-from mobee.engine.layout import SLOT
+from mobee.engine.layout import INVERSE, SLOT
 from mobee.engine.pack import _rows
 from mobee.kinematics import link_transforms
 from mobee.robot.robot import Robot
@@ -27,8 +27,8 @@ def test_slots_are_the_volumes_placed_one_by_one(robot: Robot, poses: int, rng: 
             row, link = snapshot.rows[snapshot.names.index(name)], robot.links.index(snapshot.objects[name].link or "")
         else:
             row, link = rows[index], robot.shapes[index].link
-        expected = placed(row, transforms[link])
-        found = slots[slot * SLOT : (slot + 1) * SLOT].copy()
+        expected = placed(row, transforms[link])[: INVERSE + 1]
+        found = slots[slot * SLOT : slot * SLOT + len(expected)].copy()
         if row[0] == 0:
             found[3:12] = expected[3:12]
         assert found == pytest.approx(expected, abs=1e-13), index
