@@ -41,7 +41,10 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
         with urllib.request.urlopen(told[1], timeout=5.0) as answer:
             assert b"<html" in answer.read(2000).lower()
         shown.send_signal(signal.SIGINT)
-        assert shown.wait(timeout=20) == 0
+        try:
+            assert shown.wait(timeout=20) == 0
+        finally:
+            shown.kill()  # or the end of `with` waits for ever
         assert "Traceback" not in shown.stderr.read()
 
 
