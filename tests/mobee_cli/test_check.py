@@ -9,6 +9,7 @@ from mobee.robot.load import shipped_robots, shipped_worlds
 from mobee_cli.__main__ import main
 from tests.mobee.robot.check.arm import ARM
 from tests.mobee.robot.robot_files import robot_file
+from tests.mobee.robot.urdf_files import arm_with
 
 
 @pytest.fixture
@@ -73,3 +74,17 @@ def test_what_cannot_be_read_is_bad_input_in_one_line(text: str, tmp_path: Path,
     assert said.startswith("mobee check: ")
     assert "broken.xml" in said
     assert len(said.splitlines()) == 1
+
+
+def test_a_urdf_is_checked_with_fields_and_an_srdf_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm = arm_with(tmp_path, '<sphere radius="0.1"/>')
+    assert main(["check", str(arm)]) == 0
+    assert "the robot has no field" in capsys.readouterr().out
+    groups = tmp_path / "groups.srdf"
+    groups.write_text(
+        '<robot name="toy"><group name="a"><joint name="shoulder"/></group><group name="b"><joint name="elbow"/></group></robot>'
+    )
+    assert main(["check", str(arm), "--field", "0.03", "--meshes", "bounding", "--srdf", str(groups)]) == 0
+    assert capsys.readouterr().out.endswith("toy: 2 parts, 2 motors, 2 joints, 2 shapes: nothing is wrong\n")
+    assert main(["check", "katana", "--field", "0.03"]) == 2
+    assert "field= is for .urdf files" in capsys.readouterr().err

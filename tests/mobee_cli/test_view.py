@@ -13,6 +13,7 @@ import pytest
 from mobee_cli.__main__ import main
 from tests.mobee.robot.check.arm import ARM
 from tests.mobee.robot.robot_files import robot_file
+from tests.mobee.robot.urdf_files import arm_with
 
 pytest.importorskip("rerun")
 from services.monitor.page import program  # noqa: E402
@@ -61,3 +62,9 @@ def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     assert "Did you mean 'icub'" in capsys.readouterr().err
     assert main(["view", "katana", "--save", str(tmp_path / "missing" / "out.rrd")]) == 2
     assert "make it" in capsys.readouterr().err
+
+
+def test_the_fields_grown_around_a_urdf_are_shown(tmp_path: Path) -> None:
+    saved = tmp_path / "toy.rrd"
+    assert main(["view", str(arm_with(tmp_path, '<sphere radius="0.1"/>')), "--field", "0.03", "--save", str(saved)]) == 0
+    assert b"palm_field" in saved.read_bytes()
