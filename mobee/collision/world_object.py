@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
@@ -51,34 +52,43 @@ def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
 
 
 def valid_shape(name: str, shape: Geometry) -> Geometry:
-    """The shape, if it is one of the four primitives with all of its lengths; raises InvalidValue."""
+    """The shape, if it is one of the four primitives with all of its lengths, finite and positive; raises InvalidValue."""
     lengths = LENGTHS.get(shape.kind)
     if lengths is None:
         raise InvalidValue(f"world object {name!r}: a {shape.kind!r} cannot be in the world; valid: {', '.join(LENGTHS)}.")
-    if len(shape.size) != lengths:
-        raise InvalidValue(f"world object {name!r}: {shape.kind} of size {shape.size}; it must be {lengths} lengths in metres.")
+    if len(shape.size) != lengths or not all(0.0 < length < math.inf for length in shape.size):
+        raise InvalidValue(f"world object {name!r}: {shape.kind} of size {shape.size}; it must be {lengths} positive lengths in metres.")
     return shape
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
     """A copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
-    value = np.array(given, dtype=np.float64)
-    if value.shape != (3,) or not np.isfinite(value).all():
+    value = _numbers(given)
+    if value is None or value.shape != (3,) or not np.isfinite(value).all():
         raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
     return value
 
 
 def valid_rotation(name: str, given: ArrayLike) -> Array:
     """A copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed."""
-    value = np.array(given, dtype=np.float64)
-    if value.shape != (3, 3) or not (abs(value @ value.T - np.eye(3)) <= _ORTHONORMAL).all() or not _is_right_handed(value):
+    value = _numbers(given)
+    if value is None or value.shape != (3, 3) or not _is_rotation(value):
         raise InvalidValue(f"world object {name!r}: rotation {given!r}; it must be a (3, 3) rotation matrix.")
     return value
 
 
-def _is_right_handed(rotation: Array) -> bool:
-    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
-    return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0)
+def _numbers(given: ArrayLike) -> Array | None:
+    """A copy as an array; None if it is no array of numbers."""
+    try:
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+
+
+def _is_rotation(value: Array) -> bool:
+    (a, b, c), (d, e, f), (g, h, i) = value.tolist()
+    orthonormal = (abs(value @ value.T - np.eye(3)) <= _ORTHONORMAL).all()
+    return bool(orthonormal and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0)
 
 
 def valid_role(name: str, role: Role) -> Role:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mobee
+from mobee.collision.geometry import Geometry
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
@@ -65,7 +66,11 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
     [
         ({"position": (0.0, 0.0)}, "three finite numbers"),
         ({"position": (0.0, 0.0, float("nan"))}, "three finite numbers"),
+        ({"position": "here"}, "three finite numbers"),
+        ({"position": [[0.0, 0.0], [0.0]]}, "three finite numbers"),
         ({"rotation": 2 * np.eye(3)}, "rotation matrix"),
+        ({"rotation": np.full((3, 3), np.nan)}, "rotation matrix"),
+        ({"rotation": "upright"}, "rotation matrix"),
         ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation matrix"),
         ({"role": "enemy"}, "obstacle, target, ghost"),
         ({"color": (255, 0, 0)}, "each 0 to 1"),
@@ -74,6 +79,13 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
 def test_what_is_no_pose_role_or_color_is_refused(world, given, complaint):
     with pytest.raises(mobee.InvalidValue, match=complaint):
         world.add("thing", mobee.sphere(0.1), **given)
+    assert list(world.objects) == ["cup"]
+
+
+@pytest.mark.parametrize("size", [(float("nan"),), (float("inf"),), (0.0,), (-0.1,), (), (0.1, 0.1)])
+def test_a_volume_without_a_finite_size_is_refused(world, size):
+    with pytest.raises(mobee.InvalidValue, match="positive lengths"):
+        world.add("thing", Geometry("sphere", size))
     assert list(world.objects) == ["cup"]
 
 
