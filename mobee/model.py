@@ -3,145 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.contact import Contact, ContactTable
-from mobee.collision.snapshot import Snapshot
-from mobee.collision.world import World
-from mobee.collision.world_object import WorldObject, placed, seen_from
+from mobee.collision.world import World, link_pose
+from mobee.collision.world_object import seen_from
 from mobee.engine import engine_of
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics.jacobian import point_jacobian
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.pose import Engine, Pose
+from mobee.robot.robot import Array, Robot
 
 if TYPE_CHECKING:
     from mobee.engine.track import Track
 
-
-class Finder(Protocol):
-    """What finds contacts."""
-
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
-
-
-class Engine(Protocol):
-    """What evaluates poses: the compiled engine, or python-fcl as its exact reference."""
-
-    def transforms(self, q: Array) -> Array:
-        """Every link in the poses q (B, n), (B, L, 4, 4)."""
-
-    def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
-
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
-
-
-class Pose:
-    """The robot at one q or at a batch of them, in the world as it was when `Model.evaluate` was called.
-
-    `q`: (..., n) rad.  What is asked for is computed when it is first asked for, and kept.
-    """
-
-    # Kept by hand: functools.cached_property takes one lock for all poses before Python 3.12, and no evaluation may wait for another.
-
-    def __init__(self, robot: Robot, engine: Engine, q: Array, snapshot: Snapshot, reaching: int) -> None:
-        self.robot = robot
-        self.q = q
-        self._engine = engine
-        self._snapshot = snapshot
-        self._reaching = reaching
-        self._transforms: Array | None = None
-        self._felt: tuple[ContactTable, Array] | None = None
-        self._contacts: tuple[Contact, ...] | None = None
-
-    @property
-    def transforms(self) -> Array:
-        """Where every link has gone: (..., L, 4, 4), from the root frame at zero pose to now."""
-        if self._transforms is None:
-            found = self._engine.transforms(self._flat)
-            self._transforms = found.reshape(*self.q.shape[:-1], *found.shape[1:])
-        return self._transforms
-
-    def position(self, marker: str) -> Array:
-        """Where a marker is, (..., 3) m in the root frame; raises UnknownName."""
-        m = self.robot.marker(marker)
-        link = self.transforms[..., m.link, :3, :]
-        return link[..., :3] @ m.position + link[..., 3]
-
-    def rotation(self, marker: str) -> Array:
-        """How a marker is turned, (..., 3, 3) in the root frame; raises UnknownName."""
-        m = self.robot.marker(marker)
-        return self.transforms[..., m.link, :3, :3] @ m.rotation
-
-    def normal(self, marker: str) -> Array:
-        """Where a marker's normal points, (..., 3) unit vector in the root frame; raises UnknownName."""
-        m = self.robot.marker(marker)
-        return self.transforms[..., m.link, :3, :3] @ m.normal
-
-    def point_jacobian(self, link: int, point: Array) -> Array:
-        """How a point (..., 3) m, root frame now, fixed to a link moves per motor: (..., 6, n), linear rows then angular."""
-        return point_jacobian(self.robot, self.transforms, link, point)
-
-    @property
-    def table(self) -> ContactTable:
-        """Every overlap of the tested pairs in every pose, as columns."""
-        return self._feel()[0]
-
-    @property
-    def projection(self) -> Array:
-        """The contacts of fields as the motors see them: sum of J^T (depth * normal), (..., n) in [m^2/rad] (thesis eq. 5.11).
-
-        Both sides of a self contact get opposite vectors, and all motors down to the base feel it.
-        """
-        return self._feel()[1].reshape(self.q.shape)
-
-    @property
-    def projection_of_part(self) -> Array:
-        """The projection, cut where a part ends, as in the original program: an arm's contact does not reach the torso."""
-        return self._engine.contacts(self._flat, self._snapshot, self._reaching, cut=True)[1].reshape(self.q.shape)
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """Every overlap of the tested pairs, solids before fields; one pose only (InvalidValue for a batch)."""
-        if self.q.ndim != 1:
-            raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use table, or evaluate one q.")
-        if self._contacts is None:
-            self._contacts = self.table.contacts()
-        return self._contacts
-
-    @property
-    def count(self) -> int | Ints:
-        """How many solid contacts: an int for one pose, (...,) integers for a batch."""
-        table = self.table
-        counted = np.bincount(table.pose[table.kind == 0], minlength=len(self._flat))
-        return int(counted[0]) if self.q.ndim == 1 else counted.reshape(self.q.shape[:-1])
-
-    @property
-    def objects(self) -> dict[str, WorldObject]:
-        """The world's objects as this evaluation saw them; one pose only: attached ones are where their link carries them."""
-        links = self.robot.links
-        return {
-            name: thing if thing.link is None else placed(thing, self.transforms[links.index(thing.link)])
-            for name, thing in self._snapshot.objects.items()
-        }
-
-    def feel(self, finder: Finder) -> None:
-        """Have the contacts found now, and by other means than the model's own."""
-        self._felt = finder.contacts(self._flat, self._snapshot, self._reaching)
-
-    @property
-    def _flat(self) -> Array:
-        return self.q.reshape(-1, self.q.shape[-1])
-
-    def _feel(self) -> tuple[ContactTable, Array]:
-        if self._felt is None:
-            self._felt = self._engine.contacts(self._flat, self._snapshot, self._reaching)
-        return self._felt
+__all__ = ["Model", "Pose"]
 
 
 class Model:
@@ -198,15 +75,16 @@ class Model:
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
         """Let a world object move with a link from where both are in the pose q (n,) rad."""
         pose = self.evaluate(q)
-        if link not in self.robot.links:
-            raise UnknownName("link", link, self.robot.links)
+        carrier = link_pose(pose, link)
         if name not in pose.objects:
             raise UnknownName("world object", name, pose.objects)
-        link_pose = pose.transforms[self.robot.links.index(link)]
-        self.world.attach(name, link, seen_from(link_pose, pose.objects[name]))
+        self.world.attach(name, link, seen_from(carrier, pose.objects[name]))
 
     def _checked(self, q: ArrayLike) -> Array:
-        value = np.array(q, dtype=np.float64, order="C")
+        try:
+            value = np.array(q, dtype=np.float64, order="C")
+        except (TypeError, ValueError):
+            raise InvalidValue(f"q is {q!r}; it must be an array of numbers, ({self._motors},) or (..., {self._motors}) rad.") from None
         n = self._motors
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")

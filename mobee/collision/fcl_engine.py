@@ -111,8 +111,8 @@ def _table(robot: Robot, snapshot: Snapshot, numbers: Ints, reals: Array) -> Con
 
 
 def _links(robot: Robot, snapshot: Snapshot) -> list[int]:
-    """Each volume's link, -1 for a free object."""
-    carrying = [-1 if thing.link is None else robot.links.index(thing.link) for thing in snapshot.objects.values()]
+    """Each volume's link, -1 for a free object and for a ghost on another robot."""
+    carrying = [robot.links.index(thing.link) if thing.link in robot.links else -1 for thing in snapshot.objects.values()]
     return [shape.link for shape in robot.shapes] + carrying
 
 

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from mobee.collision.snapshot import ATTACHED, OBSTACLE, TARGET, Snapshot
+from mobee.errors import UnknownName
 from mobee.robot.robot import Ints, Robot
 
 SOLID, FIELD = 0, 1
@@ -17,14 +18,15 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching_link: int) -> tuple[
 
     Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares what is on
     `reaching_link` (-1: none).  An object on a link meets the shapes of all links that its own is tested against, whatever else
-    such links carry, and the free objects, as a solid.  Ghosts meet nothing.
+    such links carry, and the free objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object on no link of the
+    robot.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]
     start = len(robot.shapes)
     things = list(enumerate(zip(snapshot.objects.values(), snapshot.roles, strict=True), start))
     free = [(index, role == TARGET) for index, (_, role) in things if role in (OBSTACLE, TARGET)]
-    carried = [(index, robot.links.index(thing.link)) for index, (thing, role) in things if role == ATTACHED and thing.link is not None]
+    carried = [(index, _link(robot, thing.link)) for index, (thing, role) in things if role == ATTACHED and thing.link is not None]
     bodies = [(index, shape.link, role) for index, (shape, role) in enumerate(zip(robot.shapes, roles, strict=True))]
 
     with_free = [(index, link, role) for index, link, role in bodies if index not in robot.base_shapes]
@@ -34,6 +36,12 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching_link: int) -> tuple[
     loads = [(a, b, SOLID) for (a, link), (b, other) in itertools.combinations(carried, 2) if _meet(robot, link, other)]
     first, second, kind = np.array([*own, *world, *load, *loads], dtype=np.intp).reshape(-1, 3).T
     return first, second, kind
+
+
+def _link(robot: Robot, name: str) -> int:
+    if name not in robot.links:
+        raise UnknownName("link", name, robot.links)
+    return robot.links.index(name)
 
 
 def _meet(robot: Robot, link: int, other: int) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from mobee.model import Pose
+    from mobee.pose import Pose
 
 
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:

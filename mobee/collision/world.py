@@ -122,10 +122,10 @@ class World:
             old = self._get(name)
             if pose is None:
                 seen = self._followed  # once: both links in the same pose
-                here = old if old.link is None else placed(old, _link_pose(seen, old.link))
-                pose = seen_from(_link_pose(seen, link), here)
+                here = old if old.link is None else placed(old, link_pose(seen, old.link))
+                pose = seen_from(link_pose(seen, link), here)
             elif self._followed is not None:
-                _link_pose(self._followed, link)
+                link_pose(self._followed, link)
             self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
 
     def detach(self, name: str) -> None:
@@ -134,7 +134,7 @@ class World:
             old = self._get(name)
             if old.link is None:
                 raise InvalidValue(f"world object {name!r} is not attached to any link.")
-            self._snapshot = changed(self._snapshot, placed(old, _link_pose(self._followed, old.link)))
+            self._snapshot = changed(self._snapshot, placed(old, link_pose(self._followed, old.link)))
 
     def follow(self, pose: Followed) -> None:
         """Told by a Model at every single-pose evaluation, for `attach` and `detach`."""
@@ -146,7 +146,8 @@ class World:
         return self._snapshot.objects[name]
 
 
-def _link_pose(seen: Followed | None, link: str) -> Array:
+def link_pose(seen: Followed | None, link: str) -> Array:
+    """Where a link is, (4, 4); raises UnknownName, and InvalidValue where no pose has been seen."""
     if seen is None:
         raise InvalidValue(f"where link {link!r} is, no model has said yet: evaluate a pose first, or give `relative`.")
     links = seen.robot.links

@@ -16,12 +16,11 @@ from mobee.engine.broad import own_pairs, world_pairs
 from mobee.engine.compiled import entry, inner
 from mobee.engine.forces import project
 from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
-from mobee.engine.layout import SLOT
-from mobee.engine.motion import bend_links, find_moved, measure, reach_out, swung
-from mobee.engine.narrow.dispatch import overlap
-from mobee.engine.pack import CLUSTERS, I_LINK, JOINTS, LINKS, SHAPES, UInts
+from mobee.engine.listed import MARGIN, gather, look
+from mobee.engine.motion import bend_links, find_moved, measure, reach_out
+from mobee.engine.pack import CLUSTERS, JOINTS, LINKS, SHAPES, UInts
 from mobee.engine.place import bound_clusters, place_shapes
-from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows, write_contact
+from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows
 from mobee.engine.scene import COUNT
 from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
@@ -32,12 +31,10 @@ HEADER = 4
 EMPTY, PLACED, LIST, RENEW = range(4)  # nothing; the last pose; a list; the last pose, in a world that has changed under a useful list
 _PLAIN, _BUILD, _USE = range(3)
 
-MARGIN = 1e-9  # m: above the rounding of distances and of what was moved
 WORTH = 4  # poses that a list must have served before an edit of the world to be made again at once, else so many go without
 SHORT = 4.0  # steps of the present length that a new list must last to be worth making
 
-_0, _1 = np.uint64(0), np.uint64(1)
-_SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
+_0 = np.uint64(0)
 
 
 def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int, int]:
@@ -48,104 +45,6 @@ def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int,
         4 * most + objects,
         HEADER + most * (3 + 2 * NUMBERS),
     )
-
-
-@inner
-def _gather(
-    integers: UInts,
-    way: Array,
-    common: UInts,
-    levers: Array,
-    bend: Array,
-    sway: Array,
-    chain: Array,
-    first: UInts,
-    second: UInts,
-    gap: Array,
-    row_of: Ints,
-    listed: np.uint64,
-    near_first: UInts,
-    near_second: UInts,
-    kept_numbers: Ints,
-    kept_reals: Array,
-    numbers: Ints,
-    reals: Array,
-) -> tuple[np.uint64, np.uint64]:
-    """Collect the listed pairs that may have met; returns how many, and how many rows are written of those that have not moved."""
-    near, found, shapes, links, link = _0, _0, integers[SHAPES], integers[LINKS], integers[I_LINK]
-    for p in range(listed):
-        a, b = first[p], second[p]
-        i, j = a // _SLOT, b // _SLOT
-        between = way[i] + way[j]
-        if between < gap[p]:
-            continue
-        if between == 0.0:  # both are where they were when the list was made
-            if row_of[p] >= 0:
-                _copy(kept_numbers, kept_reals, np.uint64(row_of[p]), numbers, reals, found)
-                found += _1
-            continue
-        if gap[p] > 0.0 and j < shapes:
-            one, two = integers[link + i], integers[link + j]
-            base = common[one * links + two]
-            if swung(one, base, levers[i], bend, sway, chain) + swung(two, base, levers[j], bend, sway, chain) < gap[p]:
-                continue
-        near_first[near], near_second[near] = a, b
-        near += _1
-    return near, found
-
-
-@inner
-def _test(
-    integers: UInts,
-    vertices: Array,
-    world: UInts,
-    carried: Ints,
-    own_shapes: int,
-    reaching: int,
-    skin: float,
-    building: bool,
-    slots: Array,
-    first: UInts,
-    second: UInts,
-    gap: Array,
-    row_of: Ints,
-    pairs: np.uint64,
-    kept_numbers: Ints,
-    kept_reals: Array,
-    out: Array,
-    numbers: Ints,
-    reals: Array,
-    found: np.uint64,
-) -> tuple[np.uint64, np.uint64]:
-    """Write the contacts among the pairs behind `found` rows; returns how many rows there are now, and how many pairs are listed.
-
-    If a list is being built, neighbours stay in the arrays, with what is between them and the row of their contact.
-    """
-    listed = _0
-    for p in range(pairs):
-        a, b = first[p], second[p]
-        depth = overlap(slots, np.int64(a), np.int64(b), vertices, out)
-        if building:
-            if -depth >= skin:
-                continue
-            first[listed], second[listed], gap[listed], row_of[listed] = a, b, -depth - MARGIN, -1
-            listed += _1
-        if depth > 0.0:
-            written = write_contact(integers, world, carried, own_shapes, reaching, a, b, depth, out, numbers, reals, found)
-            if building and written == _1:
-                _copy(numbers, reals, found, kept_numbers, kept_reals, found)
-                row_of[listed - _1] = np.int64(found)
-            found += written
-    return found, listed
-
-
-@inner
-def _copy(from_numbers: Ints, from_reals: Array, here: np.uint64, numbers: Ints, reals: Array, there: np.uint64) -> None:
-    """Copy one row."""
-    for k in range(_NUMBERS):
-        numbers[there * _NUMBERS + k] = from_numbers[here * _NUMBERS + k]
-    for k in range(_REALS):
-        reals[there * _REALS + k] = from_reals[here * _REALS + k]
 
 
 @inner
@@ -241,7 +140,7 @@ def follow(
         if mode == _USE:
             bend_links(integers, angles, angles0, spans, bend, sway, chain)
             one, two = near_first, near_second
-            pairs, found = _gather(
+            pairs, found = gather(
                 integers, way, common, levers, bend, sway, chain, first, second, gap, row_of, np.uint64(ints[LISTED]), one, two,
                 kept_numbers, kept_reals, found_numbers, found_reals,
             )  # fmt: skip
@@ -257,7 +156,7 @@ def follow(
             way[:] = 0.0
         if not building:
             pairs = sieve(slots, one, two, pairs)
-        count, listed = _test(
+        count, listed = look(
             integers, vertices, world, carried, own_shapes, reaching, skin, building, slots, one, two, gap, row_of, pairs,
             kept_numbers, kept_reals, out, found_numbers, found_reals, found,
         )  # fmt: skip

@@ -38,16 +38,16 @@ class Room:
         joints, links, groups = int(header[JOINTS]), int(header[LINKS]), int(header[CLUSTERS])
         shapes, objects = len(packed.order), int(scene.integers[COUNT])
         most = self.most = shapes * (shapes + 1) // 2 + shapes * objects
-        self.slots = _at_least(self.slots, (shapes + objects) * SLOT)
-        self.work = _at_least(self.work, 3 * joints + 18 * links + 3 * shapes + 4 * groups + 6 + 4 * objects + REALS * most)
-        self.lists = _at_least(self.lists, 2 * most + objects)
-        self.spare = _at_least(self.spare, (NUMBERS + 2) * most)
-        self.numbers = _at_least(self.numbers, NUMBERS * max(ROWS, most))
-        self.reals = _at_least(self.reals, REALS * max(ROWS, most))
+        self.slots = at_least(self.slots, (shapes + objects) * SLOT)
+        self.work = at_least(self.work, 3 * joints + 18 * links + 3 * shapes + 4 * groups + 6 + 4 * objects + REALS * most)
+        self.lists = at_least(self.lists, 2 * most + objects)
+        self.spare = at_least(self.spare, (NUMBERS + 2) * most)
+        self.numbers = at_least(self.numbers, NUMBERS * max(ROWS, most))
+        self.reals = at_least(self.reals, REALS * max(ROWS, most))
         settle(header, packed.floats, scene.integers, scene.snapshot.rows.reshape(-1), self.slots)
         self.scene = scene
 
 
-def _at_least(room: NDArray[Any], length: int) -> NDArray[Any]:
+def at_least(room: NDArray[Any], length: int) -> NDArray[Any]:
     """The array if it is long enough, else a new one with some to spare; what is never touched takes no memory."""
     return room if len(room) >= length else np.empty(length + length // 4, dtype=room.dtype)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
@@ -15,11 +15,12 @@ from mobee.engine.evaluate import settle
 from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
 from mobee.engine.neighbours import EMPTY, HEADER, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, follow, sizes
 from mobee.engine.pack import F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Packed, UInts
+from mobee.engine.room import at_least
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene
 from mobee.robot.robot import Array, Ints
 
 if TYPE_CHECKING:
-    from mobee.model import Pose
+    from mobee.pose import Pose
 
 
 class Neighbours:
@@ -58,10 +59,10 @@ class Neighbours:
         self._wide_places[W_COLUMNS + 3 * objects :] += self._skin
         was_of_use = self._ints[STATE] == LIST and self._ints[SERVED] >= WORTH
         floats, pairs, ints = sizes(int(header[JOINTS]), int(header[LINKS]), count, objects)
-        self._floats = _at_least(self._floats, floats)
-        self._pairs = _at_least(self._pairs, pairs)
-        self._ints = _at_least(self._ints, ints)
-        self._slots = _at_least(self._slots, (count + objects) * SLOT)
+        self._floats = at_least(self._floats, floats)
+        self._pairs = at_least(self._pairs, pairs)
+        self._ints = at_least(self._ints, ints)
+        self._slots = at_least(self._slots, (count + objects) * SLOT)
         settle(header, packed.floats, here.integers, here.snapshot.rows.reshape(-1), self._slots)
         self._ints[STATE] = RENEW if was_of_use else EMPTY
         self._ints[PAUSE] = 0 if was_of_use or self._known[0] is None else WORTH  # a world in motion outdates its lists
@@ -135,8 +136,3 @@ def _indices(packed: Packed, where: int, count: int) -> Ints:
     start = int(packed.integers[where])
     found: Ints = packed.integers[start : start + count].astype(np.intp)
     return found
-
-
-def _at_least(room: NDArray[Any], length: int) -> NDArray[Any]:
-    """The room if it is long enough, else a new one, with some to spare."""
-    return room if len(room) >= length else np.zeros(length + length // 4, dtype=room.dtype)

@@ -160,11 +160,29 @@ def test_attach_names_the_nearest_link_and_object(model):
         model.attach("cap", "link3", STRETCHED)
 
 
+@pytest.mark.parametrize("engine", ["compiled", "fcl"])
+def test_what_is_attached_to_no_link_of_the_robot_is_refused_by_name(model, engine):
+    world = model.world
+    for name in ("cup", "ball"):
+        world.add(name, mobee.sphere(0.04))
+    world.attach("ball", "tail", ((0.0, 0.0, 0.0), np.eye(3)))
+    other = mobee.Model(model.robot, world, engine=engine)
+    for ask in (
+        lambda: other.evaluate(STRETCHED).contacts,
+        lambda: other.evaluate(STRETCHED).objects,
+        lambda: other.attach("cup", "link3", STRETCHED),
+    ):
+        with pytest.raises(mobee.UnknownName, match="unknown link 'tail'"):
+            ask()
+
+
 @pytest.mark.parametrize(
     ("q", "complaint"),
     [
         (np.zeros(4), r"shape \(4,\).*has 3 motors, so it must be \(3,\)"),
         (0.0, r"shape \(\).*has 3 motors"),
+        ("home", r"q is 'home'; it must be an array of numbers"),
+        ([[0.0, 0.0, 0.0], [0.0]], "must be an array of numbers"),
         ([0.0, np.nan, 0.0], "motor 'm1' is nan"),
         (np.array([[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]), "motor 'm2' is inf"),
     ],
