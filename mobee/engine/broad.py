@@ -110,9 +110,10 @@ def _near_cluster(balls: Array, c: np.uint64, world: UInts, places: Array, shape
 def _span(offset: float, along: float, per_metre: float, cells: np.uint64) -> tuple[np.uint64, np.uint64]:
     """First and one past the last cell that [offset - along, offset + along] reaches; what lies outside counts to the edge cells."""
     last = float(cells) - 1.0
-    low = min(max((offset - along) * per_metre, 0.0), last)
-    high = min(max((offset + along) * per_metre, 0.0), last)
-    return np.uint64(low), np.uint64(high) + _1
+    low, high = (offset - along) * per_metre, (offset + along) * per_metre
+    # In this order NaN, of coordinates that have overflown, becomes a cell as well.
+    low, high = (low if low > 0.0 else 0.0), (high if high > 0.0 else 0.0)
+    return np.uint64(min(low, last)), np.uint64(min(high, last)) + _1
 
 
 @inlined

@@ -95,18 +95,21 @@ def _clipped(one: Array, count: Offset, window: Array, sides: Offset, spare: Arr
 
 @inner
 def _cut(points: Array, count: Offset, x: float, y: float, nx: float, ny: float, out: Array) -> Offset:
-    """Write the part of a convex polygon that is not beyond the line through (x, y) with the inward normal n; how many corners."""
-    kept, last = ZERO, (count - ONE) * TWO
+    """Write the part of a convex polygon that is not beyond the line through (x, y) with the inward normal n; how many corners.
+
+    Corners that `out` has no room for are left out: a polygon that is convex only within rounding may be cut more than twice.
+    """
+    kept, last, room = ZERO, (count - ONE) * TWO, np.uint64(len(out)) // TWO
     px, py = points[last], points[last + ONE]
     before = (px - x) * nx + (py - y) * ny
     for k in range(count):
         qx, qy = points[k * TWO], points[k * TWO + ONE]
         here = (qx - x) * nx + (qy - y) * ny
-        if (here < -_NEAR and before > _NEAR) or (here > _NEAR and before < -_NEAR):
+        if kept < room and ((here < -_NEAR and before > _NEAR) or (here > _NEAR and before < -_NEAR)):
             weight = before / (before - here)
             out[kept * TWO], out[kept * TWO + ONE] = px + weight * (qx - px), py + weight * (qy - py)
             kept += ONE
-        if here >= -_NEAR:
+        if kept < room and here >= -_NEAR:
             out[kept * TWO], out[kept * TWO + ONE] = qx, qy
             kept += ONE
         px, py, before = qx, qy, here

@@ -7,6 +7,8 @@ import pytest
 
 import mobee
 from mobee.engine import scene
+from mobee.engine.broad import _span
+from mobee.engine.compiled import entry
 from mobee.engine.engine import Engine
 from tests.mobee.engine.random_scenes import loaded, posed, random_world
 
@@ -51,3 +53,16 @@ def test_objects_touch_whatever_their_number(rng: np.random.Generator) -> None:
         after, _ = engine.contacts(q, world.snapshot, -1)
         assert np.array_equal(after.numbers, before.numbers)
         assert np.array_equal(after.reals, before.reals)
+
+
+@entry("UniTuple(uint64, 2)(float64, float64, float64, uint64)")
+def span(offset: float, along: float, per_metre: float, cells: np.uint64) -> tuple[np.uint64, np.uint64]:
+    return _span(offset, along, per_metre, cells)
+
+
+@pytest.mark.parametrize("offset", [0.0, -1e300, 1e300, float("inf"), -float("inf"), float("nan")])
+@pytest.mark.parametrize("along", [0.0, 1e300, float("inf"), float("nan")])
+@pytest.mark.parametrize("per_metre", [0.0, 1e-300, 2.5, 1e300, float("inf")])
+def test_coordinates_that_overflow_stay_in_the_grid(offset: float, along: float, per_metre: float) -> None:
+    first, end = span(offset, along, per_metre, 4)
+    assert 0 <= first < end <= 4
