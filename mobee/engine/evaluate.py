@@ -31,7 +31,7 @@ from mobee.engine.scene import CELLS, COUNT, W_START
 from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
 
-_ROW, _LINK = np.uint64(ROW), np.uint64(12)
+_ROW = np.uint64(ROW)
 
 
 @entry("float64[:,:,:,::1](uint64[::1], float64[::1], float64[:,::1])")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.engine.compiled import inner
+from mobee.engine.kinematics import LINK
 from mobee.engine.pack import (
     DRIVES,
     F_AXIS,
@@ -20,7 +21,7 @@ from mobee.engine.pack import (
 from mobee.robot.robot import Array
 
 _1, _2, _3, _4, _5, _6 = (np.uint64(k) for k in range(1, 7))
-_LINK = np.uint64(12)
+_LINK = np.uint64(LINK)
 
 
 @inner

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from mobee.engine.compiled import inner
+from mobee.engine.kinematics import LINK
 from mobee.engine.layout import (
     BOUND,
     BOX,
@@ -32,7 +33,7 @@ from mobee.engine.layout import (
 from mobee.engine.pack import CLUSTERS, F_ROW, I_LINK, I_START, SHAPES, Flags, UInts
 from mobee.robot.robot import Array
 
-_SLOT, _ROW, _LINK = np.uint64(SLOT), np.uint64(ROW), np.uint64(12)
+_SLOT, _ROW, _LINK = np.uint64(SLOT), np.uint64(ROW), np.uint64(LINK)
 _1, _2, _3, _4, _5, _6 = (np.uint64(k) for k in range(1, 7))
 _7, _8, _9, _10, _11 = (np.uint64(k) for k in range(7, 12))
 _CENTER, _ROTATION, _HALF, _CORE, _RADIUS, _BOUND, _KIND = (np.uint64(k) for k in (CENTER, ROTATION, HALF, CORE, RADIUS, BOUND, KIND))

@@ -25,8 +25,6 @@ W_COLUMNS = 5
 GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
 PER_CELL = 8  # objects, aimed at
 
-_U1 = np.uint64(1)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:

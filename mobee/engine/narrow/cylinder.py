@@ -12,7 +12,7 @@ from mobee.robot.robot import Array
 
 
 @inner
-def sphere_cylinder(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def sphere_cylinder(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)

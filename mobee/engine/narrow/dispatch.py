@@ -33,11 +33,11 @@ def overlap(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     first, second = P[np.uint64(a) + KIND], P[np.uint64(b) + KIND]
     if second <= CAPSULE:
         if first == CAPSULE:
-            depth = capsule_capsule(P, a, b, V, out)
+            depth = capsule_capsule(P, a, b, out)
         else:
-            depth = sphere_capsule(P, a, b, V, out) if second == CAPSULE else sphere_sphere(P, a, b, V, out)
+            depth = sphere_capsule(P, a, b, out) if second == CAPSULE else sphere_sphere(P, a, b, out)
     elif second == BOX and first <= CAPSULE:
-        depth = sphere_box(P, a, b, V, out) if first == SPHERE else capsule_box(P, a, b, V, out)
+        depth = sphere_box(P, a, b, out) if first == SPHERE else capsule_box(P, a, b, out)
     elif first == BOX and second == BOX:
         depth = box_box(P, a, b, V, out)
     else:
@@ -55,12 +55,12 @@ def distance(P: Array, a: int, b: int, V: Array) -> float:
     i, j = np.uint64(a), np.uint64(b)
     first, second = P[i + KIND], P[j + KIND]
     if first == SPHERE and second == BOX:
-        apart = -sphere_box(P, a, b, V, np.empty(6))
+        apart = -sphere_box(P, a, b, np.empty(6))
     elif first == SPHERE and second == CYLINDER:
-        apart = -sphere_cylinder(P, a, b, V, np.empty(6))
+        apart = -sphere_cylinder(P, a, b, np.empty(6))
     elif second <= CAPSULE:
         # A sphere is a capsule without length.
-        apart = -capsule_capsule(P, a, b, V, np.empty(6))
+        apart = -capsule_capsule(P, a, b, np.empty(6))
     elif first == CAPSULE and second == BOX:
         apart = capsule_box_distance(P, a, b)
     else:

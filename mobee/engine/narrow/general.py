@@ -25,7 +25,7 @@ def general(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     if P[i + KIND] == SPHERE and P[j + KIND] == CYLINDER:
-        return sphere_cylinder(P, a, b, V, out)
+        return sphere_cylinder(P, a, b, out)
     x, y, z = centers_apart(P, i, j)
     apart = math.sqrt(x * x + y * y + z * z) - P[i + _BOUND] - P[j + _BOUND]
     if apart >= 0.0:

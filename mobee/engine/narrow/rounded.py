@@ -29,7 +29,7 @@ _X, _Z = np.uint64(0), TWO
 
 
 @inner
-def sphere_sphere(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def sphere_sphere(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)
@@ -46,7 +46,7 @@ def sphere_sphere(P: Array, a: int, b: int, V: Array, out: Array) -> float:
 
 
 @inner
-def sphere_capsule(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def sphere_capsule(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)
@@ -66,7 +66,7 @@ def sphere_capsule(P: Array, a: int, b: int, V: Array, out: Array) -> float:
 
 
 @inner
-def capsule_capsule(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def capsule_capsule(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)

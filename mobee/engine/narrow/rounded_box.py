@@ -30,7 +30,7 @@ from mobee.robot.robot import Array
 
 
 @inner
-def sphere_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def sphere_box(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)
@@ -47,7 +47,7 @@ def sphere_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
 
 
 @inner
-def capsule_box(P: Array, a: int, b: int, V: Array, out: Array) -> float:
+def capsule_box(P: Array, a: int, b: int, out: Array) -> float:
     """See `overlap`; cheap bounds of the distance come first."""
     i, j = np.uint64(a), np.uint64(b)
     x, y, z = centers_apart(P, i, j)
