@@ -62,5 +62,5 @@ def draw(figure: Any, curves: dict[str, Any], path: Path) -> None:
     left.set_xticks(BOXES, [str(count) for count in BOXES])
     right.set_xticks(PRIMITIVES, [str(count) for count in PRIMITIVES])
     left.set_ylabel("processor time a pose [us]")
-    left.legend(fontsize="small")
+    left.legend(fontsize="small", loc="upper left", bbox_to_anchor=(0.02, 0.88))  # between the curves of the peers
     figure.savefig(path, dpi=150)
