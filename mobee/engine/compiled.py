@@ -26,32 +26,41 @@ def entry(*signatures: str) -> Callable[[F], F]:
     """Compile a function that Python calls, for these signatures only, when its module is imported; it releases the GIL."""
 
     def compile_now(function: F) -> F:
-        return _njit(function, signatures, _FAST)
+        return _njit(function, signatures, _FAST, counting=True)
 
     return compile_now
 
 
 def inner(function: F) -> F:
-    """Compile a function that only compiled functions call, with the first that does."""
-    return _njit(function, (), _FAST)
+    """Compile a function that only compiled functions call, with the first that does; it makes no arrays.
+
+    It does not count references either: every call would count those of its arrays, which costs more than a pair of volumes.
+    """
+    return _njit(function, (), _FAST, counting=False)
 
 
 def inlined(function: F) -> F:
-    """Like `inner`, and never called: a call counts the references of its arrays, which costs more than a pair of volumes."""
+    """Like `inner`, but made part of whatever calls it."""
     compiled: Any = inner(function)
     if compiled is not function:  # NUMBA_DISABLE_JIT leaves it as it is
         compiled.targetoptions["forceinline"] = True
     return cast(F, compiled)
 
 
+def inner_with_memory(function: F) -> F:
+    """Like `inner`, for a function that makes arrays."""
+    return _njit(function, (), _FAST, counting=True)
+
+
 def inner_as_written(function: F) -> F:
     """Like `inner`, for sums whose rounding depends on their order: no term is moved."""
-    return _njit(function, (), _AS_WRITTEN)
+    return _njit(function, (), _AS_WRITTEN, counting=False)
 
 
-def _njit(function: F, signatures: tuple[str, ...], fast: set[str]) -> F:
+def _njit(function: F, signatures: tuple[str, ...], fast: set[str], counting: bool) -> F:
     compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=fast)(function)
     if compiled is not function:  # NUMBA_DISABLE_JIT, for debugging, leaves it as it is
+        compiled.targetoptions["_nrt"] = counting
         compiled._cache = Shelf(function, FOLDER)
         for signature in signatures:
             compiled.compile(signature)

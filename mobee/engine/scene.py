@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee.collision.snapshot import OBSTACLE, TARGET, Snapshot
-from mobee.engine.compiled import entry, inner
+from mobee.engine.compiled import entry, inner, inner_with_memory
 from mobee.engine.layout import ROW, ROW_BOUND, ROW_POSITION
 from mobee.engine.pack import Packed, UInts
 from mobee.robot.robot import Array, Ints
@@ -57,7 +57,7 @@ def _cell(rows: Array, i: int, cells: Ints, floats: Array) -> int:
     return number
 
 
-@inner
+@inner_with_memory
 def _file(rows: Array, roles: Ints, usual: float, cells: Ints, integers: UInts, floats: Array) -> None:
     """Counting sort of the objects by cell, the large ones before all cells."""
     count, large = np.int64(integers[COUNT]), np.int64(integers[LARGE])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inlined, inner
+from mobee.engine.compiled import inlined, inner_with_memory
 from mobee.engine.narrow.box_box import box_box
 from mobee.engine.narrow.cylinder import sphere_cylinder
 from mobee.engine.narrow.difference import FRAME, relative, rounding
@@ -47,7 +47,7 @@ def overlap(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     return depth
 
 
-@inner
+@inner_with_memory
 def distance(P: Array, a: int, b: int, V: Array) -> float:
     """How far two volumes are apart [m]: 0 if they overlap; P, a, b and V as for `overlap`."""
     if P[np.uint64(a) + KIND] > P[np.uint64(b) + KIND]:

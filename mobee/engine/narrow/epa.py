@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inner, inner_with_memory
 from mobee.engine.narrow.difference import farthest
 from mobee.engine.narrow.polish import polish
 from mobee.engine.narrow.slots import FOUR, ONE, SIX, THREE, TIE, TWO, ZERO, Offset, Vector, vector
@@ -27,7 +27,7 @@ _FULL = np.uint64(_FACES - 8)  # which is sooner than there are too many corners
 _EXACT = 1e-12  # m, for volumes of up to a metre: the bounds have met
 
 
-@inner
+@inner_with_memory
 def way_out(P: Array, i: Offset, j: Offset, V: Array, frame: Array, shortest: float, way: Vector) -> tuple[float, Vector]:
     """The least reach of the difference b - a over all directions [m], and that direction, in the first's axes.
 

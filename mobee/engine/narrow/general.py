@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mobee.engine import layout
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inner, inner_with_memory
 from mobee.engine.narrow.cylinder import sphere_cylinder
 from mobee.engine.narrow.difference import FRAME, farthest, relative, rounding
 from mobee.engine.narrow.epa import way_out
@@ -20,7 +20,7 @@ from mobee.robot.robot import Array
 _BOUND = np.uint64(layout.BOUND)
 
 
-@inner
+@inner_with_memory
 def general(P: Array, a: int, b: int, V: Array, out: Array) -> float:
     """See `overlap`."""
     i, j = np.uint64(a), np.uint64(b)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inner, inner_with_memory
 from mobee.engine.narrow.difference import farthest
 from mobee.engine.narrow.slots import FOUR, ONE, THREE, TWO, ZERO, Offset, Vector, vector
 from mobee.robot.robot import Array
@@ -19,7 +19,7 @@ _FLAT = 1e-24  # squared sine of the angle below which a tetrahedron is one of i
 _NOWHERE = (0.0, 0.0, 0.0)
 
 
-@inner
+@inner_with_memory
 def closest(P: Array, i: Offset, j: Offset, V: Array, frame: Array, limit: float) -> tuple[float, Vector]:
     """The distance of two cores [m] and the closest point of their difference b - a, in the first's axes; 0 if they overlap.
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.compiled import inner
+from mobee.engine.compiled import inner, inner_with_memory
 from mobee.engine.narrow.features import feature, most_corners, reach
 from mobee.engine.narrow.rounded import closest_parameters
 from mobee.engine.narrow.slots import CENTER, ONE, THREE, TWO, ZERO, Offset, Vector, centers_apart, store, vector
@@ -15,7 +15,7 @@ from mobee.robot.robot import Array
 _NEAR = 1e-9  # m: a corner this close to an edge lies on it
 
 
-@inner
+@inner_with_memory
 def store_contact(P: Array, i: Offset, j: Offset, V: Array, normal: Vector, depth: float, out: Array) -> None:
     """Write the contact of two volumes of any kind, given the way out of the first and its length."""
     nx, ny, nz = normal
