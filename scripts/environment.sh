@@ -45,7 +45,7 @@ install_environment() { # interpreter, fingerprint of the dependencies, fingerpr
   local pip=("$venv/bin/python" -m pip install --quiet --quiet --no-input --disable-pip-version-check)
   if ! is_current stamp-dependencies "$2"; then
     local start=$SECONDS
-    say "installing the environment into .venv: once, about a minute and 2 GB ..."
+    say "installing the environment into .venv: once, one or two minutes and 3 GB ..."
     rm -rf "$venv"
     if ! "$1" -m venv "$venv"; then
       say "$1 cannot make a virtual environment: install its venv module (Debian: apt install python3-venv)."
