@@ -25,7 +25,7 @@ def test_two_minutes_at_the_table(tmp_path: Path) -> None:
 
 
 def test_without_contact_forces_solids_touch(tmp_path: Path) -> None:
-    summary = launch(tmp_path, "default", "services.model.contact_forces=false", duration=50).summary(timeout=150)
+    summary = launch(tmp_path, "default", "services.model.contact_forces=false", duration=35).summary(timeout=150)
     print(summary_line(summary))
     assert summary["solid_contact_ticks"] > 0
     assert summary["deepest_solid_contact_m"] > 0.0
