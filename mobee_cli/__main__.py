@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from typing import NoReturn
 
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
 
 VERBS = {
     "launch": "start a scenario and keep it running",
@@ -30,7 +30,7 @@ VERBS = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment."""
+    """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] in ("-h", "--help"):
         print(_usage())
@@ -55,16 +55,17 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _run(verb: str, arguments: list[str]) -> int:
-    module = importlib.import_module(f"mobee_cli.{verb}")
-    parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
-    module.add_arguments(parser)
     try:
+        module = importlib.import_module(f"mobee_cli.{verb}")
+        parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
+        module.add_arguments(parser)
         return int(module.run(parser.parse_args(arguments)))
     except UserError as error:
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return error.code
-    except KeyboardInterrupt:
-        return 0
+    except KeyboardInterrupt:  # a verb that is meant to end so does not let it come here
+        print(f"mobee {verb}: interrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:  # the reader has seen enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -72,7 +73,7 @@ def _run(verb: str, arguments: list[str]) -> int:
 
 def _usage() -> str:
     verbs = "\n".join(f"  {verb:<11}{text}" for verb, text in VERBS.items())
-    notes = "`mobee <verb> --help` tells more.  Exit codes: 0 ok, 1 failed, 2 bad input, 3 environment."
+    notes = "`mobee <verb> --help` tells more.  Exit codes: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."
     return f"usage: mobee <verb> [options]\n\n{verbs}\n\n{notes}"
 
 

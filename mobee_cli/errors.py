@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 FAILED, BAD_INPUT, ENVIRONMENT = 1, 2, 3
+INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
 
 
 class UserError(Exception):

@@ -28,3 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
             return int(_ACTIONS[arguments.action].run(session, arguments))
         except ValueError as error:
             raise UserError(str(error), BAD_INPUT) from None
+        except KeyboardInterrupt:
+            if arguments.action == "list":
+                raise
+            return 0  # the way to end the others

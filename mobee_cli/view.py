@@ -39,7 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
         world = load_world(arguments.world) if arguments.world else None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
-    view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True))
+    try:
+        view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True))
+    except KeyboardInterrupt:
+        if save is not None:
+            raise
+        return 0
     if save is None:
         raise UserError("the page's server ended by itself; --save FILE.rrd writes a recording instead")
     print(f"{save}: open it with `rerun {save}`")

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+
 from mobee.engine.load import load
 
+INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
+
 if __name__ == "__main__":
-    load()
+    try:
+        load()
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
 
     from mobee.engine.compiled import FOLDER
 

@@ -38,6 +38,8 @@ class Progress(event.Listener):
             sys.stderr.write("\r\033[K")
         if kind is None:
             say(f"the engine is compiled, {self._seconds():.0f} s.")
+        elif kind is KeyboardInterrupt:
+            say("interrupted; what is compiled so far is kept.")
 
     def on_start(self, event: Any) -> None:
         """A function begins."""

@@ -24,7 +24,9 @@ def compile_engine() -> None:
         raise EngineMissing(f"cannot make {error.filename}: {error.strerror}; {_REMEDY}") from None
     if not os.access(folder, os.W_OK):
         raise EngineMissing(f"cannot write {folder}; {_REMEDY}")
-    code = subprocess.run([sys.executable, "-m", "mobee.engine"], stdout=subprocess.DEVNULL, check=False).returncode
+    # In a group of its own, so that a terminal's Ctrl-C reaches the launcher alone, and `run` ends it without a traceback.
+    argv = [sys.executable, "-m", "mobee.engine"]
+    code = subprocess.run(argv, stdout=subprocess.DEVNULL, check=False, process_group=0).returncode
     if not is_ready(folder):
         raise EngineMissing(f"the engine was not compiled into {folder} (exit code {code}), see above; try `python -m mobee.engine`")
 

@@ -30,6 +30,7 @@ from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
 
 OK, FAILED, BAD_INPUT, ENVIRONMENT = 0, 1, 2, 3
+INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
 
 _REDRAW = 0.5  # s
 _FOREVER = 1e6  # s
@@ -49,7 +50,7 @@ class Options:
 
 
 def launch(options: Options) -> int:
-    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment."""
+    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C."""
     started = time.monotonic()
     try:
         scenario = read_scenario(options.scenario, options.settings, leave_out=["monitor"] if options.headless else [])
@@ -64,6 +65,8 @@ def launch(options: Options) -> int:
         return _refuse(str(error), BAD_INPUT)
     except (MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
+    except KeyboardInterrupt:
+        return _refuse("interrupted before anything was started; what is compiled of the engine so far is kept", INTERRUPTED)
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)
         service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)

@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
+import services.monitor.view
+from mobee_cli import bench, check, robots, topic, topic_echo, topic_hz, topic_list
 from mobee_cli.__main__ import VERBS, main
 from tests.services.launched import mobee
 
@@ -49,6 +54,34 @@ def test_with_nothing_running_it_says_how_to_start(verb: list[str], free_port: i
     assert f"no router at {endpoint}" in said
     assert "Start it with `mobee launch`" in said
     assert len(said.splitlines()) == 1
+
+
+def interrupt(*_: Any, **__: Any) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("module", "arguments"), [(check, ["check", "icub"]), (bench, ["bench", "model"]), (robots, ["robots"])])
+def test_ctrl_c_is_no_success(
+    module: Any, arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(module, "run", interrupt)
+    assert main(arguments) == 130
+    assert capsys.readouterr().err == f"mobee {arguments[0]}: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "code"), [(topic_echo, ["echo", "clock"], 0), (topic_hz, ["hz", "clock"], 0), (topic_list, ["list"], 130)]
+)
+def test_ctrl_c_is_how_to_end_what_has_no_end(module: Any, arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(topic, "connected", lambda _: contextlib.nullcontext())
+    monkeypatch.setattr(module, "run", interrupt)
+    assert main(["topic", *arguments]) == code
+
+
+def test_ctrl_c_ends_a_page_but_breaks_off_a_recording(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(services.monitor.view, "view", interrupt)
+    assert main(["view", "katana"]) == 0
+    assert main(["view", "katana", "--save", str(tmp_path / "katana.rrd")]) == 130
 
 
 def test_the_command_itself_imports_nothing_heavy() -> None:

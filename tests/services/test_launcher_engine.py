@@ -8,6 +8,7 @@ import pytest
 
 from mobee.engine.cache import READY, cache_folder
 from services.launcher import engine
+from services.launcher.run import Options, launch
 
 
 @pytest.fixture
@@ -43,3 +44,18 @@ def test_a_cache_that_cannot_be_written_is_refused_before_half_a_minute_is_lost(
     with pytest.raises(engine.EngineMissing, match="MOBEE_CACHE"):
         engine.compile_engine()
     assert runs == []
+
+
+def test_ctrl_c_while_the_engine_is_compiled_is_one_line(
+    runs: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, free_port: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: Any, process_group: int, **__: Any) -> None:
+        assert process_group == 0  # the compiler hears no Ctrl-C of its own, of which it would print a traceback
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(subprocess, "run", interrupted)
+    assert launch(Options(headless=True, endpoint=f"tcp/127.0.0.1:{free_port}", runs=tmp_path / "runs")) == 130
+    said = capsys.readouterr().err
+    assert said.startswith("mobee launch: interrupted before anything was started")
+    assert len(said.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()

@@ -47,3 +47,13 @@ def test_in_a_file_lines_come_now_and_then(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(shown(False, 30, monkeypatch).splitlines()) == 2
     monkeypatch.setattr(progress, "PERIOD", 0.0)
     assert len(shown(False, 30, monkeypatch).splitlines()) == 2 + 60
+
+
+def test_an_interruption_is_said_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Screen(terminal=True)
+    monkeypatch.setattr(sys, "stderr", screen)
+    compiled = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=load.load)})
+    with pytest.raises(KeyboardInterrupt), progress.Progress(Path("/cache")) as counter:
+        counter.on_start(compiled)
+        raise KeyboardInterrupt
+    assert screen.getvalue().endswith("\r\033[Kmobee: interrupted; what is compiled so far is kept.\n")
