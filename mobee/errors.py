@@ -21,9 +21,9 @@ class InvalidValue(MobeeError, ValueError):
 class UnknownName(MobeeError, KeyError):
     """A name that the robot, the world or a table does not have."""
 
-    def __init__(self, kind: str, given: str, valid: Iterable[str]) -> None:
-        names = sorted(valid)
-        near = difflib.get_close_matches(given, names, n=1)
+    def __init__(self, kind: str, given: object, valid: Iterable[object]) -> None:
+        names = sorted(map(str, valid))
+        near = difflib.get_close_matches(str(given), names, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
         super().__init__(f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names) or 'none'}.")
 

@@ -29,6 +29,10 @@ class Model:
     """
 
     def __init__(self, robot: Robot, world: World | None = None, engine: Literal["compiled", "fcl"] = "compiled") -> None:
+        if not isinstance(robot, Robot):
+            raise InvalidValue(f"robot is {robot!r}; it must be a Robot, as of load_robot.")
+        if not isinstance(world, World | None):
+            raise InvalidValue(f"world is {world!r}; it must be a World, as of load_world, or None.")
         self.robot = robot
         self.world = World() if world is None else world
         self._engine = _engine(robot, engine)

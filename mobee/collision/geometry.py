@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import ShapeKind
@@ -43,6 +44,6 @@ def capsule(radius: float, height: float) -> Geometry:
 
 def _lengths(kind: str, **given: float) -> tuple[float, ...]:
     for name, value in given.items():
-        if not (math.isfinite(value) and value > 0.0):
+        if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < math.inf:
             raise InvalidValue(f"{kind}: {name} is {value!r}; it must be a positive length in metres.")
     return tuple(float(value) for value in given.values())

@@ -19,6 +19,7 @@ from mobee.collision.world_object import (
     placed,
     seen_from,
     valid_color,
+    valid_name,
     valid_position,
     valid_role,
     valid_rotation,
@@ -78,7 +79,8 @@ class World:
         role: Role = "obstacle",
         color: Sequence[float] | None = None,
     ) -> None:
-        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken."""
+        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken or empty."""
+        valid_name(name)
         volume, at = valid_shape(name, shape), valid_position(name, position)
         turn = np.eye(3) if rotation is None else valid_rotation(name, rotation)
         new = WorldObject(name, volume.kind, volume.size, at, turn, valid_role(name, role), valid_color(name, color))

@@ -51,8 +51,17 @@ def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
     return back @ (thing.position - link_pose[:3, 3]), back @ thing.rotation
 
 
+def valid_name(name: str) -> str:
+    """The name, if it is text and not empty; raises InvalidValue."""
+    if not isinstance(name, str) or not name:
+        raise InvalidValue(f"world object {name!r}: its name must be text that is not empty.")
+    return name
+
+
 def valid_shape(name: str, shape: Geometry) -> Geometry:
     """The shape, if it is one of the four primitives with all of its lengths, finite and positive; raises InvalidValue."""
+    if not isinstance(shape, Geometry):
+        raise InvalidValue(f"world object {name!r}: shape {shape!r}; it must be a Geometry, as sphere(0.1), box, cylinder or capsule.")
     lengths = LENGTHS.get(shape.kind)
     if lengths is None:
         raise InvalidValue(f"world object {name!r}: a {shape.kind!r} cannot be in the world; valid: {', '.join(LENGTHS)}.")

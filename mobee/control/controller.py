@@ -40,6 +40,10 @@ class Controller:
         speed_scale: float = 1.0,
         contact_forces: bool = True,
     ) -> None:
+        if not callable(getattr(model, "track", None)):  # who brings a model of their own is welcome
+            raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
+        if not isinstance(gains, Gains | None):
+            raise InvalidValue(f"gains is {gains!r}; it must be Gains, as Gains.default() or Gains.named(name), or None.")
         if not 0 < speed_scale <= 1:
             raise InvalidValue(f"speed_scale {speed_scale}: must be above 0 and at most 1")
         self.model = model

@@ -52,7 +52,9 @@ def shipped_worlds() -> tuple[str, ...]:
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
-    """The file that a shipped name or a path stands for."""
+    """The file that a shipped name or a path stands for; raises InvalidValue for what is neither."""
+    if not isinstance(name_or_path, str | Path):
+        raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")
     path, given = Path(name_or_path), str(name_or_path)
     suffixes = ".xml or .urdf" if kind == "robot" else ".xml"
     if path.suffix.lower() == ".xacro":

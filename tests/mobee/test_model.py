@@ -257,3 +257,9 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
         thread.join()
     assert failures == []
     assert len(counts) > 2  # the world did change under the evaluations
+
+
+@pytest.mark.parametrize(("robot", "world", "complaint"), [("icub", None, "robot is 'icub'"), (None, "table", "world is 'table'")])
+def test_a_name_in_place_of_a_robot_or_world_is_refused(model, robot, world, complaint):
+    with pytest.raises(mobee.InvalidValue, match=complaint):
+        mobee.Model(robot or model.robot, world)

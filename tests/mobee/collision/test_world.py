@@ -104,3 +104,18 @@ def test_an_attached_object_moves_only_with_its_link(world):
 def test_what_is_not_attached_cannot_be_detached(world):
     with pytest.raises(mobee.InvalidValue, match="not attached"):
         world.detach("cup")
+
+
+@pytest.mark.parametrize("name", [3, "", None])
+def test_a_name_is_text_that_is_not_empty(world, name):
+    with pytest.raises(mobee.InvalidValue, match=f"{name!r}: its name must be text"):
+        world.add(name, mobee.sphere(0.1))
+    assert list(world.objects) == ["cup"]
+    with pytest.raises(mobee.UnknownName, match="Valid: cup"):
+        world.remove(name)
+
+
+@pytest.mark.parametrize("shape", [0.1, "sphere", mobee.sphere])
+def test_what_is_no_shape_is_refused(world, shape):
+    with pytest.raises(mobee.InvalidValue, match="must be a Geometry, as sphere"):
+        world.add("lamp", shape)

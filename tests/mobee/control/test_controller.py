@@ -208,5 +208,9 @@ def test_bad_input_is_refused() -> None:
         controller.step(STRETCHED, 0.1)
     with pytest.raises(InvalidValue, match="speed_scale"):
         arm_controller(speed_scale=0.0)
+    with pytest.raises(InvalidValue, match="it must be a Model"):
+        Controller(two_part_arm())  # type: ignore[arg-type]
+    with pytest.raises(InvalidValue, match=r"gains is 'default'; .*Gains.named"):
+        arm_controller(gains="default")
     with pytest.raises(UnknownName, match="tip"):
         controller.push("tpi", np.zeros(3))

@@ -73,3 +73,10 @@ def test_the_katana_of_appendix_b_rests_without_touching_itself() -> None:
     assert len(katana.motors) == 6
     assert len(katana.motor_table[5].joints) == 2  # the gripper's two fingers
     assert Model(katana).evaluate(katana.home).contacts == ()
+
+
+def test_what_is_neither_name_nor_path_is_refused() -> None:
+    with pytest.raises(InvalidValue, match="robot is 3; it must be a path, or a name: icub,"):
+        load_robot(3)  # type: ignore[arg-type]
+    with pytest.raises(InvalidValue, match="world is None; .* table,"):
+        load_world(None)  # type: ignore[arg-type]
