@@ -22,7 +22,7 @@ from experiments.flood.endurance import COLUMNS as ENDURANCE_COLUMNS
 from experiments.flood.endurance import RECORDS as ENDURANCE
 from experiments.flood.endurance import endure
 from experiments.flood.figure import draw, draw_endurance
-from experiments.flood.rates import rates
+from experiments.flood.rates import SHORTEST, rates
 from experiments.flood.records import COLUMNS, Record, read_flood
 from experiments.options import positive_number, positive_whole
 from experiments.progress import Progress
@@ -72,12 +72,15 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
     for robot in arguments.robots:
         mine = [record for record in records if record["robot"] == robot]
         flooded, still = [r for r in mine if r["edits"]], [r for r in mine if not r["edits"]]
+        seconds = sum(r["seconds"] for r in flooded)
         found[robot] = {
             "evaluations_per_second_flooded": dict(rates(flooded)),
             "evaluations_per_second_still": dict(rates(still)),
-            "edits_per_second": round(sum(r["edits"] for r in flooded) / max(sum(r["seconds"] for r in flooded), 1e-9)),
+            "edits_per_second": round(sum(r["edits"] for r in flooded) / max(seconds, 1e-9)),
             "objects_reached": max((r["objects"] for r in flooded), default=0),
         }
+        if seconds < SHORTEST:
+            found[robot]["note"] = f"flooded for {seconds:.2g} s, too short for a rate: give more --edits or --objects"
     is_complete = all(found[robot]["objects_reached"] >= arguments.objects for robot in arguments.robots)
     return {"complete": is_complete, **found}
 

@@ -81,3 +81,24 @@ def test_rates_weigh_records_by_their_time():
     records = [record(100, 1.0, 100), record(105, 3.0, 100), record(200, 1.0, 7), record(3, 1.0, 9)]
     assert dict(rates(records)) == {100: 50, 200: 7}
     assert list(binned(records, 2.0)) == [(51.5, 54.5), (105.0, pytest.approx(100 / 3))]
+
+
+def short(objects, evaluations, seconds=0.01):
+    return {"robot": "icub", "objects": objects, "edits": 200, "seconds": seconds, "evaluations": evaluations}
+
+
+def test_records_too_short_for_a_rate_are_pooled_with_the_nearest():
+    records = [short(number, 0 if number % 2 else 20) for number in range(1, 61)]
+    told = dict(rates(records))
+    assert 1 not in told and set(told.values()) <= {900, 950, 1000, 1050, 1100}
+    assert 50 in told
+
+
+def test_a_flood_too_short_in_all_has_no_rate():
+    records = [short(number, 20) for number in range(1, 6)]
+    assert not dict(rates(records))
+    assert not list(binned(records, 1.0))
+
+
+def test_a_flood_shorter_than_a_bin_is_one_point():
+    assert list(binned([short(number, 10) for number in range(1, 62)], 1.0)) == [(31.0, pytest.approx(1000.0))]
