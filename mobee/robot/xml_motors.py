@@ -30,7 +30,10 @@ class MotorDraft:
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     """One <motor>; `count` motors came before it."""
     low, high = node.number("minPos"), node.number("maxPos")
-    if low >= high:
+    if low == high:
+        remedy = "Write a <link> instead of the joint if it shall not move, or another interval"
+        node.fail("minPos", f"equals maxPos {high:g}, so the motor cannot move", remedy)
+    if low > high:
         node.fail("minPos", f"{low:g} is not below maxPos {high:g}", "Swap the two")
     if high - low < NARROWEST:
         node.fail("minPos", f"is less than {NARROWEST:g} deg below maxPos", "Write limits in degrees, or a <link> instead of the joint")

@@ -73,7 +73,7 @@ PHRASES = {
     "robots/motor_idx_negative.xml": "-1 is not a whole number from 0 on",
     "robots/motor_idx_twice.xml": "<motor> idx: 0 is taken by 'pan'",
     "robots/motor_limits_almost_equal.xml": "is less than 1e-06 deg below maxPos",
-    "robots/motor_limits_equal.xml": "5 is not below maxPos 5",
+    "robots/motor_limits_equal.xml": "equals maxPos 5, so the motor cannot move",
     "robots/motor_limits_swapped.xml": "90 is not below maxPos -90. Swap the two",
     "robots/motor_outside_every_part.xml": "a motor outside of every part",
     "robots/motor_twice.xml": "a second motor 'pan'. The first is in line 4",
