@@ -56,6 +56,17 @@ def newest_run(runs: Path, name: str) -> Path:
     return max(found, key=lambda folder: (found[folder][0], int(found[folder][1] or 1)))
 
 
+def given_run(folder: Path, runs: Path, name: str) -> Path:
+    """The folder that was named, if it is one; raises InvalidValue with the newest run."""
+    if folder.is_dir():
+        return folder
+    try:
+        newest = newest_run(runs, name)
+    except InvalidValue as error:
+        raise InvalidValue(f"{folder}: there is no such folder; {error}") from None
+    raise InvalidValue(f"{folder}: there is no such folder. The newest run of {name!r} is {newest}.")
+
+
 def write(path: Path, content: Mapping[str, Any]) -> None:
     """Write JSON for people and programs."""
     path.write_text(json.dumps(content, indent=2, default=str) + "\n")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import RESULTS, new_run, newest_run, options_of, write
+from experiments.run_folder import RESULTS, given_run, new_run, newest_run, options_of, write
 from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
 
@@ -55,8 +57,10 @@ def _list(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps([{"name": e.NAME, "claim": e.CLAIM, "source": e.SOURCE} for e in found], indent=2))
         return 0
+    columns = shutil.get_terminal_size().columns  # 80 in a pipe
     for experiment in found:
-        print(f"{experiment.NAME:<12} {experiment.CLAIM} ({experiment.SOURCE})")
+        text = f"{experiment.CLAIM} ({experiment.SOURCE})"
+        print(textwrap.fill(text, columns, initial_indent=f"{experiment.NAME:<12} ", subsequent_indent=" " * 13, break_on_hyphens=False))
     return 0
 
 
@@ -97,7 +101,8 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 
 
 def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:
-    path = experiment.figure(arguments.folder or newest_run(arguments.runs, experiment.NAME))
+    runs, name = arguments.runs, experiment.NAME
+    path = experiment.figure(given_run(arguments.folder, runs, name) if arguments.folder else newest_run(runs, name))
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0
 

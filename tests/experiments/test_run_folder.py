@@ -5,7 +5,7 @@ import json
 import pytest
 
 import mobee
-from experiments.run_folder import new_run, newest_run, options_of
+from experiments.run_folder import given_run, new_run, newest_run, options_of
 
 
 def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
@@ -30,3 +30,12 @@ def test_what_is_no_run_is_refused(tmp_path):
         options_of(tmp_path, "flood")
     with pytest.raises(mobee.InvalidValue, match="run of 'flood', not of 'press'"):
         options_of(new_run(tmp_path, "flood", {}), "press")
+
+
+def test_a_folder_that_is_not_there_is_answered_with_the_newest(tmp_path):
+    with pytest.raises(mobee.InvalidValue, match="nope: there is no such folder; no run of 'flood'"):
+        given_run(tmp_path / "nope", tmp_path, "flood")
+    folder = new_run(tmp_path, "flood", {})
+    assert given_run(folder, tmp_path, "flood") == folder
+    with pytest.raises(mobee.InvalidValue, match=f"there is no such folder. The newest run of 'flood' is {folder}"):
+        given_run(tmp_path / "nope", tmp_path, "flood")

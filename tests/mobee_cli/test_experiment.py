@@ -22,7 +22,9 @@ def test_list_names_every_experiment_with_its_claim(capsys):
     assert [entry["name"] for entry in listed] == list(EXPERIMENTS)
     assert all(entry["claim"] and entry["source"] for entry in listed)
     assert main(["experiment", "list"]) == 0
-    assert all(f"{entry['name']:<12} {entry['claim']}" in capsys.readouterr().out for entry in listed[:1])
+    said = capsys.readouterr().out
+    assert all(f"{entry['name']} {entry['claim']} ({entry['source']})" in " ".join(said.split()) for entry in listed)
+    assert all(len(line) <= 80 for line in said.splitlines())
 
 
 def test_a_run_leaves_its_options_versions_records_and_results(tmp_path, capsys):
@@ -62,6 +64,7 @@ def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
     [
         (["run", "flod"], "Did you mean 'flood'"),
         (["figure", "flood", "--runs", "nowhere"], "no run of 'flood'"),
+        (["figure", "flood", "nope", "--runs", "nowhere"], "nope: there is no such folder"),
         (["run", "flood", "--resume", "nowhere"], "not the folder of a run"),
     ],
 )
