@@ -14,6 +14,7 @@ from mobee.learning.neighbours import NO_ACTION, equidistant_goals, lattice_digi
 from mobee.robot.robot import Array, Ints, Part, Robot
 
 MAX_STATES = 100_000  # beyond this the space is no learning problem on a robot any more (thesis 7.4)
+NEIGHBOURS = 16  # of the thesis' arms
 
 
 class Lattice:
@@ -27,7 +28,7 @@ class Lattice:
         joints: motor names, all of one part.
         levels: fractions of each joint's range, ascending in [0, 1].
         neighbours: how many nearest samples (in fractions of the range) each state has actions to, or "equidistant":
-            the samples one step away along one joint.
+            the samples one step away along one joint.  When left out: 16, or all others where there are fewer.
         tie_seed: seed of the draw among equally near samples at the last rank.
         rest: fraction of its range at which every other motor of the part is kept.
 
@@ -40,7 +41,7 @@ class Lattice:
         robot: Robot,
         joints: Sequence[str],
         levels: Sequence[float] = (0.25, 0.5, 0.75),
-        neighbours: int | Literal["equidistant"] = 16,
+        neighbours: int | Literal["equidistant"] | None = None,
         tie_seed: int = 0,
         rest: float = 0.5,
     ) -> None:
@@ -49,6 +50,8 @@ class Lattice:
         if not 0.0 <= rest <= 1.0:
             raise InvalidValue(f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay.")
         self.robot, self.part, self.joints = robot, part.name, tuple(joints)
+        if neighbours is None:
+            neighbours = min(NEIGHBOURS, len(self.levels) ** len(joints) - 1)
         self.neighbours, self.tie_seed, self.rest = neighbours, tie_seed, rest
         self.columns: Ints = indices - part.start
         """Where the lattice joints stand among the motors of the part, shape (d,)."""

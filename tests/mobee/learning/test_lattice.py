@@ -133,6 +133,14 @@ def test_a_space_that_cannot_be_is_refused_with_what_is_valid(joints, options, m
         Lattice(toy_robot(), joints, **options)
 
 
+def test_a_small_space_has_all_other_states_as_neighbours_unless_told():
+    small = Lattice(toy_robot(), ["l_elbow", "l_shoulder_pitch"])
+    assert (small.neighbours, small.settings["neighbours"], small.goals.shape) == (8, 8, (9, 8))
+    assert Lattice(toy_robot(), ["l_elbow", "l_shoulder_pitch"], np.linspace(0, 1, 5)).neighbours == 16
+    with pytest.raises(InvalidValue, match="from 1 to 8"):
+        Lattice(toy_robot(), ["l_elbow", "l_shoulder_pitch"], neighbours=16)
+
+
 def test_an_unknown_motor_is_refused_with_the_nearest_name():
     with pytest.raises(UnknownName, match="Did you mean 'l_elbow'"):
         Lattice(toy_robot(), ["l_elbo"])
