@@ -10,13 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mobee.collision.world import World
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.check.finding import SEVERITIES, Finding
 from mobee.robot.check.robot import check_robot
+from mobee.robot.check.source import source
 from mobee.robot.check.world import check_world
-from mobee.robot.load import WORLDS, load_robot, load_world, shipped_robots, shipped_worlds
+from mobee.robot.load import ROBOTS, WORLDS, find_file, load_robot, load_world, shipped_robots, shipped_worlds
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.shapes import Meshes
+from mobee.robot.xml_file import is_folder
 from mobee.robot.xml_node import read_xml
 
 
@@ -41,6 +43,7 @@ def check_file(
     `world`: what a robot is also checked against, at home; `field`, `meshes`, `srdf`: of a URDF, as in load_robot.
     Raises RobotFileError, UnknownName or InvalidValue when it cannot be read at all, or not with these options.
     """
+    _refuse(name_or_path)
     path = world_file(name_or_path)
     said: list[Finding] = []
     content: Robot | World
@@ -48,14 +51,29 @@ def check_file(
         with _listening(said):
             content = load_robot(name_or_path, field=field, meshes=meshes, srdf=srdf)
         found = check_robot(content, world)
+        file = find_file(name_or_path, ROBOTS, "robot")
+        found += source(read_xml(file)) if file.suffix.lower() != ".urdf" else []
     elif world is not None or (field, meshes, srdf) != (None, None, None):
         raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it, fields, meshes or an SRDF.")
     else:
         with _listening(said):
             content = load_world(path)
-        lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in read_xml(path)}
-        found = check_world(content, lines)
+        root = read_xml(path)
+        lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in root}
+        found = check_world(content, lines) + list(source(root))
     return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
+
+
+def _refuse(name_or_path: str | Path) -> None:
+    """Raise for a folder, and for a name that neither a robot nor a world has."""
+    given, path = str(name_or_path), Path(name_or_path)
+    known = {*shipped_robots(), *shipped_worlds()}
+    if given in known:
+        return
+    if is_folder(path):
+        raise RobotFileError(f"{path}: is a folder. Give the path of a .xml or .urdf file in it.")
+    if not path.suffix and path.name == given:
+        raise UnknownName("robot or world", given, known)
 
 
 def world_file(name_or_path: str | Path) -> Path | None:

@@ -1,7 +1,8 @@
-"""Things that are there twice: identical shapes, and names that differ in case only."""
+"""Things that are there twice: identical shapes, and names that differ in case only; names that others cannot use."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import combinations
 
@@ -13,6 +14,7 @@ from mobee.robot.check.surface import vertices
 from mobee.robot.robot import Shape
 
 NEAR = 1e-6  # m
+KEY = re.compile(r"[a-z0-9_]+")
 
 
 def identical_shapes(subject: Subject) -> Iterator[Finding]:
@@ -53,6 +55,30 @@ def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
                     "names are told apart by case, and people do not",
                     "rename one of the two",
                 )
+
+
+def unusable_names(subject: Subject) -> Iterator[Finding]:
+    """Parts that cannot stand in a key of the bus, and motors that no list of names can hold."""
+    for part in subject.robot.parts:
+        if not KEY.fullmatch(part):
+            yield Finding(
+                "warning",
+                "part-name",
+                subject.where("part", part),
+                f"part name {part!r} cannot stand in a key of the bus",
+                "the services name their topics after the parts: none of them can run this robot",
+                "rename it: a-z, 0-9 and _ only",
+            )
+    for motor in subject.robot.motors:
+        if re.search(r"[\s,]", motor):
+            yield Finding(
+                "warning",
+                "motor-name",
+                subject.where("motor", motor),
+                f"motor name {motor!r} holds a blank or a comma",
+                "lists of motors are separated by these: a constraint cannot name it",
+                "rename it: _ instead of the blank",
+            )
 
 
 def _same(one: Shape, other: Shape) -> bool:

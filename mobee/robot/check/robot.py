@@ -13,9 +13,9 @@ from mobee.robot.check.finding import SEVERITIES, Finding
 from mobee.robot.check.joints import coupling, joint_limits
 from mobee.robot.check.markers import unreachable_markers
 from mobee.robot.check.motors import home_limits, idle_motors, idle_parts
-from mobee.robot.check.names import identical_shapes, names_differing_in_case
+from mobee.robot.check.names import identical_shapes, names_differing_in_case, unusable_names
 from mobee.robot.check.subject import Subject
-from mobee.robot.check.touching import always_touching, foreign_solids, home_contacts
+from mobee.robot.check.touching import always_touching, foreign_solids, home_contacts, world_contacts
 from mobee.robot.check.units import radians, size
 from mobee.robot.robot import Robot
 
@@ -31,12 +31,14 @@ CHECKS: tuple[Check, ...] = (
     radians,
     always_touching,
     home_contacts,
+    world_contacts,
     foreign_solids,
     fields,
     constraints,
     unreachable_markers,
     identical_shapes,
     names_differing_in_case,
+    unusable_names,
 )
 
 

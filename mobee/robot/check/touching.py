@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mobee.collision.contact import Contact
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
-from mobee.robot.check.words import length
+from mobee.robot.check.words import count, length, some
 from mobee.robot.robot import Shape
 
 
@@ -62,6 +62,23 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 "the force pushes the robot away from its home before anything has happened",
                 "make a field smaller, or move the home",
             )
+
+
+def world_contacts(subject: Subject) -> Iterator[Finding]:
+    """What the robot touches at home in the world, in one line; nothing without a world."""
+    if subject.world is None:
+        return
+    world = subject.world.objects
+    touched = [contact for contact in subject.at_home if contact.second in world]
+    pairs = (f"{contact.kind} {contact.first!r} and {contact.second!r} ({length(contact.depth)})" for contact in touched)
+    yield Finding(
+        "note",
+        "world",
+        subject.where("robot", subject.robot.name),
+        f"at home in this world of {count(world, 'object')} the robot touches {some(pairs) or 'nothing'}",
+        "",
+        "",
+    )
 
 
 def _parting(subject: Subject, contact: Contact) -> str:

@@ -36,3 +36,13 @@ def test_what_cannot_be_read_is_the_readers_error(tmp_path: Path) -> None:
         check_file(robot_file(tmp_path, "<bodypart/>"))
     with pytest.raises(UnknownName, match="icub"):
         check_file("icubb")
+
+
+def test_a_misspelt_world_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot or world 'tabel'. Did you mean 'table'\?"):
+        check_file("tabel")
+
+
+def test_a_folder_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="is a folder"):
+        check_file(tmp_path)

@@ -39,3 +39,15 @@ def test_names_that_differ_in_case_only_are_found(tmp_path: Path) -> None:
 
 def test_the_same_name_for_things_of_different_kinds_is_none(tmp_path: Path) -> None:
     assert named(arm(tmp_path, ("<marker", '<marker name="PAN" px="0.1"/><marker')), "name-case") == []
+
+
+@pytest.mark.parametrize("name", ["left arm", "Arm", "arm/left", "arm*"])
+def test_a_part_that_cannot_stand_in_a_key_is_found(tmp_path: Path, name: str) -> None:
+    (finding,) = named(arm(tmp_path, ('name="arm"', f'name="{name}"')), "part-name")
+    assert finding.what == f"part name {name!r} cannot stand in a key of the bus"
+    assert finding.where.endswith(":2")
+
+
+@pytest.mark.parametrize(("name", "found"), [("the pan", 1), ("a,b", 1), ("Pan-1", 0)])
+def test_a_motor_that_no_list_can_name_is_found(tmp_path: Path, name: str, found: int) -> None:
+    assert len(named(arm(tmp_path, ('motor name="pan"', f'motor name="{name}"')), "motor-name")) == found
