@@ -29,6 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     target: Path = arguments.target
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)
+    if not target.resolve().parent.is_dir():
+        raise UserError(f"{target}: there is no folder {target.resolve().parent}: make it, or choose another", FAILED)
     taken = [path for path in _written(target) if path.exists()]
     if taken and not arguments.force:
         raise UserError(f"{taken[0]} is there already. Choose another name, or write over it with --force", BAD_INPUT)

@@ -32,6 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
             raise
         raise UserError("a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder", ENVIRONMENT) from None
     save: Path | None = arguments.save
+    if save is not None and save.suffix.lower() != ".rrd":
+        raise UserError(f"--save {save}: it writes recordings only: give a name that ends in .rrd", BAD_INPUT)
     if save is not None and not save.resolve().parent.is_dir():
         raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
     try:

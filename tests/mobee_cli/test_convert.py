@@ -40,7 +40,7 @@ def test_files_that_are_there_are_kept_unless_told_otherwise(tmp_path: Path, cap
     [
         (["icbu", "x.urdf"], BAD_INPUT, "Did you mean 'icub'?"),
         (["icub", "x.sdf"], BAD_INPUT, "x.sdf: OUT must end in .xml or .urdf"),
-        (["icub", "nowhere/x.urdf"], FAILED, "cannot be written (No such file or directory)"),
+        (["icub", "nowhere/x.urdf"], FAILED, "nowhere: make it, or choose another"),
         (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for .urdf files"),
         (["mine.urdf", "x.xml"], BAD_INPUT, "mine.urdf: no such file"),
     ],

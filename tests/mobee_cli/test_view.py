@@ -62,6 +62,8 @@ def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     assert "Did you mean 'icub'" in capsys.readouterr().err
     assert main(["view", "katana", "--save", str(tmp_path / "missing" / "out.rrd")]) == 2
     assert "make it" in capsys.readouterr().err
+    assert main(["view", "katana", "--save", str(tmp_path / "out.png")]) == 2
+    assert "ends in .rrd" in capsys.readouterr().err
 
 
 def test_the_fields_grown_around_a_urdf_are_shown(tmp_path: Path) -> None:
