@@ -140,24 +140,24 @@ class Robot:
 
     @cached_property
     def limits(self) -> Array:
-        """Motor limits, shape (n, 2), in [rad], or [m] of a prismatic joint."""
-        return np.array([m.limits for m in self.motor_table])
+        """Motor limits, shape (n, 2), in [rad], or [m] of a prismatic joint; read-only."""
+        return _fixed(np.array([m.limits for m in self.motor_table]))
 
     @cached_property
     def home(self) -> Array:
-        """Motor positions at home, shape (n,), in [rad], or [m] of a prismatic joint."""
-        return np.array([m.home for m in self.motor_table])
+        """Motor positions at home, shape (n,), in [rad], or [m] of a prismatic joint; read-only."""
+        return _fixed(np.array([m.home for m in self.motor_table]))
 
     @cached_property
     def coupling(self) -> tuple[Array, Array]:
-        """Joint positions (rad or m) as coupling @ q + offset: shapes (joints, n) and (joints,)."""
+        """Joint positions (rad or m) as coupling @ q + offset: shapes (joints, n) and (joints,); read-only."""
         matrix = np.zeros((len(self.joints), len(self.motor_table)))
         offset = np.zeros(len(self.joints))
         for column, motor in enumerate(self.motor_table):
             for joint, scale, shift in motor.joints:
                 matrix[joint, column] = scale
                 offset[joint] = shift
-        return matrix, offset
+        return _fixed(matrix), _fixed(offset)
 
     def part(self, name: str) -> Part:
         """The part of that name; raises UnknownName with the nearest one."""
@@ -176,3 +176,9 @@ class Robot:
         if name not in self.markers:
             raise UnknownName("marker", name, self.markers)
         return self.markers[name]
+
+
+def _fixed(array: Array) -> Array:
+    """The array, which is shared from now on."""
+    array.flags.writeable = False
+    return array

@@ -151,7 +151,7 @@ def test_evaluations_leave_one_room_behind_not_one_each(rng: np.random.Generator
     engine = engine_of(robot)
     small, large = random_world(rng, robot, 2).snapshot, random_world(rng, robot, 300).snapshot
     for snapshot in (small, large) * 20:
-        engine.contacts(robot.home[None], snapshot, -1)
+        engine.contacts(robot.home[None].copy(), snapshot, -1)
     assert len(engine._rooms) == 1
 
 
