@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mobee.collision import World, sphere
 from mobee.robot.check import check_robot
 from tests.mobee.robot.check.arm import arm, named
 
@@ -59,3 +60,15 @@ def test_a_field_that_reaches_into_another_parts_bare_solid_is_noted(tmp_path: P
 def test_a_field_that_meets_the_other_solids_own_field_is_felt(tmp_path: Path) -> None:
     findings = check_robot(arm(tmp_path, beside(KNOB, HALO)))
     assert [finding.check for finding in findings] == ["home-force"]
+
+
+def test_in_a_world_one_note_says_what_is_touched_at_home(tmp_path: Path) -> None:
+    def notes(place: tuple[float, float, float]) -> list[str]:
+        world = World()
+        world.add("rock", sphere(0.05), position=place)
+        return [finding.what for finding in check_robot(arm(tmp_path), world) if finding.check == "world"]
+
+    (far,) = notes((5.0, 0.0, 0.0))
+    assert far == "at home in this world of 1 object the robot touches nothing"
+    (near,) = notes((-0.2, 0.0, 0.2))
+    assert "touches " in near and "'upper' and 'rock' (" in near
