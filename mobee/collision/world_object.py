@@ -18,8 +18,7 @@ Role = Literal["obstacle", "target", "ghost"]
 Color = tuple[float, float, float, float]
 
 LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
-# What numpy.allclose(r @ r.T, eye, atol=1e-6) allows, at a tenth of its time: a flood of edits runs through here.
-_ORTHONORMAL = 1e-6 + 1e-5 * np.eye(3)
+_LONG, _SKEW = 1.1e-5, 1e-6  # allowed of a rotation: squares of its rows beside 1, products of two rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,9 +94,15 @@ def _numbers(given: ArrayLike) -> Array | None:
 
 
 def _is_rotation(value: Array) -> bool:
+    """Orthonormal and right-handed.  In plain floats: a product of matrices gives up the interpreter's lock for a moment.
+
+    A thread that edits without a pause would then be woken again before any other has its turn.
+    """
     (a, b, c), (d, e, f), (g, h, i) = value.tolist()
-    orthonormal = (abs(value @ value.T - np.eye(3)) <= _ORTHONORMAL).all()
-    return bool(orthonormal and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0)
+    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
+    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    orthonormal = all(abs(one - 1.0) <= _LONG for one in squares) and all(abs(one) <= _SKEW for one in products)
+    return orthonormal and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0
 
 
 def valid_role(name: str, role: Role) -> Role:
