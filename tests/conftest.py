@@ -1,11 +1,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 
 import hypothesis
 import numpy as np
 import pytest
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and all programs that they start would inherit it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 hypothesis.settings.register_profile("mobee", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("mobee")
