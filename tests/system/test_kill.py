@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,9 +30,17 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Wat
 def kill(watcher: Watcher, who: str) -> tuple[int, int]:
     """kill -9; the tick at which it happened, and the pid that is no more."""
     pid = watcher.stat(who).pid
+    until(lambda: keeps_up(watcher), 20.0, "the watcher hears ticks as they are made")
     k = watcher.k
     os.kill(pid, signal.SIGKILL)
     return k, pid
+
+
+def keeps_up(watcher: Watcher) -> bool:
+    """Whether ticks come at their pace: after a stall of this process they come in a burst, and the newest heard is seconds old."""
+    before = watcher.k
+    time.sleep(0.1)
+    return 5 <= watcher.k - before <= 20
 
 
 def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
