@@ -1,4 +1,4 @@
-"""`mobee bench`: measure mobee on this machine, beside its peers."""
+"""The egocentric model beside MuJoCo and python-fcl, on one core, turn by turn: poses per second, and the same contacts."""
 
 from __future__ import annotations
 
@@ -7,20 +7,15 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.bench.mujoco_peer import MujocoMissing
 from experiments.options import positive_whole
 from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
 
 _PICTURES = (".png", ".svg", ".pdf")
-_NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """One parser a benchmark."""
-    benches = parser.add_subparsers(dest="bench", required=True, metavar="model")
-    text = "The egocentric model beside MuJoCo and python-fcl, on one core, turn by turn: poses per second, and the same contacts."
-    model = benches.add_parser("model", help="the egocentric model beside MuJoCo and python-fcl", description=text, epilog=_NOTES)
-    model.add_argument(
+    """What may be chosen."""
+    parser.add_argument(
         "--objects",
         type=_objects,
         nargs="+",
@@ -28,20 +23,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="boxes, 0 to 1000 each (default: 0 10 100 1000)",
     )
-    model.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
-    model.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, 50 poses to compare")
-    model.add_argument(
+    parser.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
+    parser.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, 50 poses to compare")
+    parser.add_argument(
         "--figure", type=_picture, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)"
     )
-    model.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
-    try:
-        return _figure(arguments) if arguments.figure else _model(arguments)
-    except MujocoMissing as error:
-        raise UserError(str(error), ENVIRONMENT) from None
+    return _figure(arguments) if arguments.figure else _model(arguments)
 
 
 def _model(arguments: argparse.Namespace) -> int:

@@ -1,0 +1,35 @@
+"""`mobee bench`: measure mobee on this machine, beside its peers."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+
+from mobee_cli.errors import ENVIRONMENT, UserError
+
+# One module of this package a benchmark: `add_arguments(parser)`, and `run(arguments)`, which returns the exit code.
+BENCHES = {
+    "model": "the egocentric model beside MuJoCo and python-fcl",
+}
+_NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """One parser a benchmark."""
+    benches = parser.add_subparsers(dest="bench", required=True, metavar="|".join(BENCHES))
+    for name, text in BENCHES.items():
+        module = importlib.import_module(f"mobee_cli.bench.{name}")
+        one = benches.add_parser(name, help=text, description=module.__doc__, epilog=_NOTES)
+        one.add_argument("--json", action="store_true", help="print as JSON")
+        module.add_arguments(one)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and print."""
+    from experiments.bench.mujoco_peer import MujocoMissing
+
+    try:
+        code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
+    except MujocoMissing as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    return code
