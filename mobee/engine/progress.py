@@ -11,6 +11,8 @@ from typing import Any
 
 from numba.core import event
 
+from mobee.engine.cache import compiled_sources
+
 PERIOD = 10.0  # s between lines where they stay
 
 _DECORATED = re.compile(r"^@(?:inner|inlined|entry)", re.MULTILINE)
@@ -45,7 +47,7 @@ class Progress(event.Listener):
         """A function begins."""
         if self._total > 0:
             return
-        self._total = sum(len(_DECORATED.findall(file.read_text())) for file in Path(__file__).parent.rglob("*.py"))
+        self._total = sum(len(_DECORATED.findall(file.read_text())) for file in compiled_sources())
         say(f"compiling the engine into {self._folder}, once after an install or an edit: about half a minute ...")
 
     def on_end(self, event: Any) -> None:

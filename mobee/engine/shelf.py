@@ -12,13 +12,14 @@ import os
 import pickle
 import uuid
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
+
+from mobee.engine.cache import others, stamp
 
 _CHECKSUM = 32  # bytes at the start of a file
 
@@ -44,9 +45,9 @@ class Shelf(NullCache):
     def load_overload(self, sig: object, target_context: Any) -> object:
         """The compiled function from its file; None if there is none, or not as it was written."""
         target_context.refresh()
-        try:
-            content = self._path(sig, target_context.codegen()).read_bytes()
-        except OSError:
+        path = self._path(sig, target_context.codegen())
+        content = _content(path)
+        if content is None:
             return None
         payload = content[_CHECKSUM:]
         if hashlib.sha256(payload).digest() != content[:_CHECKSUM]:
@@ -69,12 +70,19 @@ class Shelf(NullCache):
 
     def _path(self, sig: object, codegen: Any) -> Path:
         code = self._function.__code__
-        parts = (sig, codegen.magic_tuple(), _stamp(code.co_filename), code.co_firstlineno)
+        parts = (sig, codegen.magic_tuple(), stamp(code.co_filename), code.co_firstlineno)
         digest = hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()
         return self._folder / f"{self._function.__name__}-{digest[:16]}"
 
 
-@cache
-def _stamp(file: str) -> str:
-    """The hash of a source file: the folder's key knows the engine's own, not those of tests."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+def _content(path: Path) -> bytes | None:
+    """What a file holds; one that only the folder of another version has is taken over from there."""
+    with contextlib.suppress(OSError):
+        return path.read_bytes()
+    with contextlib.suppress(OSError):
+        for folder in others(path.parent):
+            if (folder / path.name).exists():
+                path.parent.mkdir(exist_ok=True)
+                os.link(folder / path.name, path)
+                return path.read_bytes()
+    return None

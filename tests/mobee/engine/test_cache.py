@@ -10,13 +10,13 @@ import pytest
 
 from mobee.engine import cache
 
-SOURCES = Path(cache.__file__).parent
+SOURCES = Path(cache.__file__).parents[1]
 
 
 @pytest.fixture
 def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the engine, whose key is then asked for."""
-    folder = tmp_path / "engine"
+    """A copy of the library, whose key is then asked for."""
+    folder = tmp_path / "mobee"
     shutil.copytree(SOURCES, folder, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(cache, "_SOURCES", folder)
     return folder
@@ -29,22 +29,35 @@ def test_the_key_is_that_of_the_content_not_of_place_or_time(copy: Path, monkeyp
 
 
 def test_an_edit_of_any_source_changes_the_key(copy: Path) -> None:
-    keys, sources = {cache.key()}, sorted(copy.rglob("*.py"))
+    keys, sources = {cache.key()}, cache.compiled_sources()
+    assert all(source.is_relative_to(copy) for source in sources)
     for source in sources:
         text = source.read_bytes()
         source.write_bytes(text + b"#")
         keys.add(cache.key())
         source.write_bytes(text)
-    assert len(sources) > 20
+    assert len(sources) > 40
     assert len(keys) == len(sources) + 1
 
 
 def test_a_new_file_and_a_new_name_change_the_key(copy: Path) -> None:
     before = cache.key()
-    (copy / "new.py").touch()
+    (copy / "engine" / "new.py").touch()
     added = cache.key()
-    (copy / "new.py").rename(copy / "newer.py")
+    (copy / "engine" / "new.py").rename(copy / "engine" / "newer.py")
     assert len({before, added, cache.key()}) == 3
+
+
+def test_a_functions_file_depends_on_what_its_source_imports_and_on_nothing_else(copy: Path) -> None:
+    def stamps() -> dict[str, str]:
+        cache.stamp.cache_clear()
+        cache._imported.cache_clear()
+        return {name: cache.stamp(str(copy / "engine" / f"{name}.py")) for name in ("sieve", "neighbours", "narrow/gjk")}
+
+    before = stamps()
+    (copy / "engine" / "sieve.py").open("a").write("#")
+    after = stamps()
+    assert [name for name in before if before[name] != after[name]] == ["sieve", "neighbours"]
 
 
 @pytest.mark.parametrize("package", ["numba", "llvmlite", "numpy"])
@@ -81,7 +94,7 @@ def test_the_folder_is_where_the_environment_says(monkeypatch: pytest.MonkeyPatc
 
 def test_the_file_alone_prints_the_folder_without_numba() -> None:
     """As scripts/environment.sh asks for it at every start."""
-    argv = [sys.executable, "-I", "-X", "importtime", str(SOURCES / "cache.py")]
+    argv = [sys.executable, "-I", "-X", "importtime", str(SOURCES / "engine" / "cache.py")]
     done = subprocess.run(argv, capture_output=True, text=True, check=True)
     assert done.stdout == f"{cache.cache_folder()}\n"
     assert not {"numba", "numpy", "llvmlite", "mobee"} & {line.split("|")[-1].strip() for line in done.stderr.splitlines()}

@@ -85,6 +85,14 @@ def test_an_edit_of_a_file_elsewhere_compiles_what_is_in_it_anew(tmp_path: Path)
     assert Start(tmp_path).end()[0] == 0
 
 
+def test_another_version_takes_over_what_has_not_changed(tmp_path: Path) -> None:
+    Start(tmp_path).end()
+    [folder] = (tmp_path / "cache").glob("engine-*")
+    folder.rename(folder.with_name(f"engine-{0:016x}"))
+    assert Start(tmp_path).end() == (0, "")
+    assert len(code_files(tmp_path)) == 3  # not `half`: it is part of `twice`
+
+
 def test_of_two_starts_at_once_one_compiles_and_the_other_waits_for_it(tmp_path: Path) -> None:
     one, two = Start(tmp_path, NAP="3"), Start(tmp_path, NAP="3")
     results = sorted((one.end(), two.end()))
