@@ -8,13 +8,13 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 import tyro
-from msgspec import Struct
+from msgspec import Meta, Struct
 
-from services.common.session import DEFAULT_ENDPOINT
+from services.common.session import DEFAULT_ENDPOINT, NAMESPACE
 
 _C = TypeVar("_C", bound=Struct)
 
@@ -28,6 +28,8 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     endpoint: str = DEFAULT_ENDPOINT
     """Where the router listens."""
+    namespace: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
+    """Whose keys it uses: the robot's, or those of a filter in front of it."""
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
     seed: int = 0

@@ -51,7 +51,7 @@ class Service:
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
         self.log = log.set_up(who)
-        session = session or open_client(config.endpoint)
+        session = session or open_client(config.endpoint, namespace=config.namespace)
         try:
             self._begin(session, robot)
         except BaseException:

@@ -9,10 +9,9 @@ import time
 import zenoh
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-NAMESPACE = "icub"
+NAMESPACE = "icub"  # of the robot itself
 
 _COMMON = {
-    "namespace": NAMESPACE,
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
@@ -26,15 +25,18 @@ class BusUnreachable(Exception):
     """No router where one was expected; the message names the endpoint and the remedy."""
 
 
-def _config(settings: dict[str, object]) -> zenoh.Config:
+def _config(namespace: str, settings: dict[str, object]) -> zenoh.Config:
     config = zenoh.Config()
-    for path, value in {**_COMMON, **settings}.items():
+    for path, value in {**_COMMON, "namespace": namespace, **settings}.items():
         config.insert_json5(path, json.dumps(value))
     return config
 
 
-def open_client(endpoint: str, patience: float = 10.0) -> zenoh.Session:
-    """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable."""
+def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE) -> zenoh.Session:
+    """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
+
+    `namespace`: the robot that its keys are about, or the filter in front of it; one chunk of a key.
+    """
     settings: dict[str, object] = {
         "mode": "client",
         "connect/endpoints": [endpoint],
@@ -43,7 +45,7 @@ def open_client(endpoint: str, patience: float = 10.0) -> zenoh.Session:
     give_up = time.monotonic() + patience
     while True:
         try:
-            return zenoh.open(_config(settings))
+            return zenoh.open(_config(namespace, settings))
         except zenoh.ZError as error:
             if time.monotonic() >= give_up:
                 raise BusUnreachable(
@@ -57,7 +59,7 @@ def open_router(endpoint: str) -> zenoh.Session:
     """The router every service connects to, listening at `endpoint`; raises BusUnreachable when that is taken."""
     settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint]}
     try:
-        return zenoh.open(_config(settings))
+        return zenoh.open(_config(NAMESPACE, settings))
     except zenoh.ZError as error:
         raise BusUnreachable(
             f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop --endpoint {endpoint}` ends it; "
