@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -43,6 +44,10 @@ class Backend(Protocol):
 
     def contact(self) -> SolidContact:
         """The deepest solid contact of the last tick."""
+        ...
+
+    def contacts(self) -> Mapping[str, float]:
+        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
         ...
 
     def gap(self) -> float:

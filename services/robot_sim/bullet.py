@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pybullet
@@ -41,7 +41,7 @@ class BulletBackend:
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s], the same as at the start."""
-        self._contact = NO_CONTACT
+        self._deepest.clear()
         for _ in range(self._substeps):
             self._advance(self._substep)
             self._look_for_contacts()
@@ -53,7 +53,14 @@ class BulletBackend:
 
     def contact(self) -> SolidContact:
         """The deepest solid contact of the last tick."""
-        return self._contact
+        if not self._deepest:
+            return NO_CONTACT
+        pair = max(self._deepest, key=self._deepest.__getitem__)
+        return SolidContact(self._deepest[pair], pair)
+
+    def contacts(self) -> Mapping[str, float]:
+        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        return self._deepest
 
     def gap(self) -> float:
         """Closest distance of hands and forearms to the obstacles, m; -1 when there is none."""
@@ -76,7 +83,7 @@ class BulletBackend:
         driven = self._robot.limits[scene.motors]
         self._lower, self._upper = driven[:, 0], driven[:, 1]
         self._forces = [self._robot.motor_table[motor].max_torque for motor in scene.motors]
-        self._contact = NO_CONTACT
+        self._deepest: dict[str, float] = {}  # m, by pair, in the last tick
 
     def _advance(self, h: float) -> None:
         scene, motors = self._scene, self.motors
@@ -98,7 +105,7 @@ class BulletBackend:
         scene = self._scene
         for point in scene.client.getContactPoints(scene.body):
             depth = -point[8]
-            if depth > self._contact.depth:
+            if depth > 0.0:
                 self._keep(depth, *point[1:5])
 
     def _keep(self, depth: float, first_body: int, second_body: int, first_link: int, second_link: int) -> None:
@@ -108,4 +115,5 @@ class BulletBackend:
             for body, link in ((first_body, first_link), (second_body, second_link))
         ]
         if all(name in scene.links or name in self._obstacles for name in names):  # the ball is there to be touched
-            self._contact = SolidContact(depth, " ".join(sorted(names)))
+            pair = " ".join(sorted(names))
+            self._deepest[pair] = max(depth, self._deepest.get(pair, 0.0))

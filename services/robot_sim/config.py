@@ -37,3 +37,5 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Standard deviation of a part's sampling time, share of a tick."""
     truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
     """Messages a second of what only the simulator knows."""
+    record: str = ""
+    """Folder to which every tick is written as it was, for experiments (services.robot_sim.record); empty: none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from mobee.collision.world import World
 from mobee.robot.robot import Robot
@@ -38,6 +38,10 @@ class KinematicBackend:
     def contact(self) -> SolidContact:
         """Nothing here is solid."""
         return SolidContact()
+
+    def contacts(self) -> Mapping[str, float]:
+        """Nothing here is solid."""
+        return {}
 
     def gap(self) -> float:
         """Not measured."""

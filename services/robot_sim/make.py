@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from mobee.robot.load import load_world
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.backend import Backend, BackendUnavailable
 from services.robot_sim.config import Config
 from services.robot_sim.kinematic import KinematicBackend
+from services.robot_sim.record import Recorded
 
 
 def make_backend(config: Config, robot: Robot) -> Backend:
     """The body; raises BackendUnavailable or MobeeError."""
+    backend = _make_backend(config, robot)
+    return Recorded(backend, Path(config.record)) if config.record else backend
+
+
+def _make_backend(config: Config, robot: Robot) -> Backend:
     parameters = MotorParameters(
         lag=config.lag, delay=config.delay, backlash=config.backlash, encoder_noise=config.encoder_noise, substep=config.substep
     )
