@@ -18,6 +18,7 @@ ALL_STATES = "*/state"
 ALL_EVENTS = "event/*"
 ALL_TRANSITIONS = "agents/*/transition"
 ALL_WORLD = "world/*"
+ALL_DONE = "done/*"
 
 EYES = ("left", "right")
 
@@ -44,6 +45,11 @@ def command(part: str) -> str:
 def motion(part: str) -> str:
     """Where the action of a part stands: controller to all."""
     return f"{chunk(part)}/motion"
+
+
+def done(who: str) -> str:
+    """Lockstep: a participant has answered a tick."""
+    return f"done/{chunk(who)}"
 
 
 def meta(part: str) -> str:

@@ -40,11 +40,20 @@ class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Clock(Message, frozen=True, kw_only=True):
-    """Start of tick k."""
+    """Start of tick k; mode lock: the next one comes when everybody who takes part has answered this one."""
 
     dt: Annotated[int, Meta(gt=0)]  # ns a tick
     mode: Literal["free", "lock", "paused"]
     rate: Annotated[float, Meta(gt=0)]  # simulated seconds a second that are asked for
+
+
+class StepDone(Message, frozen=True, kw_only=True):
+    """Lockstep: all that its sender has to say to tick re_k has been put."""
+
+    re_k: Count
+    ok: bool = True  # False: it lacked something, so the run cannot be repeated
+    busy: list[Name] = []  # of the controller: services with nothing to decide, every part that they own being under way
+    last: bool = False  # it takes part no longer
 
 
 class State(Message, frozen=True, kw_only=True):

@@ -13,7 +13,7 @@ from zenoh.handlers import RingChannel
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Event, Message
-from services.common.delivery import EVENTS, Delivery
+from services.common.delivery import EVENTS, LATEST, Delivery
 
 _M = TypeVar("_M", bound=Message)
 NO_RUN = "-"  # before the first clock message
@@ -80,6 +80,7 @@ class Bus:
         self.part_sizes: dict[str, int] = {}
         self.robot_size: int | None = None
         self.rejected: Counter[str] = Counter()
+        self.control = LATEST  # how the streams of control travel: STEP in lockstep
         self._reported: dict[str, float] = {}
         self._events: Publisher[Event] = self.publisher(keys.event(who), Event, EVENTS)
 

@@ -34,6 +34,8 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Shipped robot, or path to a robot file."""
     seed: int = 0
     """Seed of everything random in this service."""
+    mode: Literal["free", "lock"] = "free"
+    """The clock on the wall sets the pace, or lockstep: every tick waits for all who take part, as fast as they are."""
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:

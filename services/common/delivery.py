@@ -19,6 +19,7 @@ class Delivery:
 _DROP = zenoh.CongestionControl.DROP
 
 LATEST = Delivery(_DROP, zenoh.Priority.REAL_TIME)  # control: the newest value or nothing; never blocks the sender
+STEP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # control in lockstep: all, in order
 STOP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # emergency stop: rather late than never
 DATA = Delivery(_DROP, zenoh.Priority.DATA)  # perceived objects, ground truth
 BULK = Delivery(_DROP, zenoh.Priority.DATA_LOW)  # pictures: behind everything else

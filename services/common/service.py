@@ -15,6 +15,7 @@ from typing import Any, Self, TypeVar
 import msgspec
 import zenoh
 import zenoh.ext
+from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Message
@@ -24,6 +25,7 @@ from mobee.robot.robot import Robot
 from services.common import log, rpc
 from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
+from services.common.delivery import LATEST, STEP
 from services.common.inbox import CROWDED, CROWDED_WITH_CALLS, Inbox, Newest
 from services.common.session import open_client
 
@@ -60,6 +62,8 @@ class Service:
 
     def _begin(self, session: zenoh.Session, robot: Robot | None) -> None:
         self.bus = Bus(session, self.who, self.log)
+        self.locked = self.config.mode == "lock"
+        self.bus.control = STEP if self.locked else LATEST
         if robot is not None:
             self.bus.robot_size = len(robot.motors)
             self.bus.part_sizes = {name: len(part) for name, part in robot.parts.items()}
@@ -99,10 +103,18 @@ class Service:
     def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
         """Have the newest message of a stream handled; older ones waiting are overwritten."""
         slot = Newest(self.inbox, lambda sample: self._deliver(cls, sample, handler, part))
-        self._kept.append(self.bus.session.declare_subscriber(key, slot.offer))
+        self._subscribe(key, slot.offer)
 
     def on_each(
-        self, key: str, cls: type[_M], handler: Callable[[_M], None], *, history: bool = False, any_run: bool = False, crowd: int = CROWDED
+        self,
+        key: str,
+        cls: type[_M],
+        handler: Callable[[_M], None],
+        *,
+        part: str | None = None,
+        history: bool = False,
+        any_run: bool = False,
+        crowd: int = CROWDED,
     ) -> None:
         """Have every message of a stream handled, with `history` also those from before this service came.
 
@@ -110,13 +122,17 @@ class Service:
         """
 
         def enqueue(sample: zenoh.Sample) -> None:
-            self.inbox.offer(lambda: self._deliver(cls, sample, handler, None, any_run), crowd)
+            self.inbox.offer(lambda: self._deliver(cls, sample, handler, part, any_run), crowd)
 
         if history:
             settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)
             self._kept.append(zenoh.ext.declare_advanced_subscriber(self.bus.session, key, enqueue, history=settings))
         else:
-            self._kept.append(self.bus.session.declare_subscriber(key, enqueue))
+            self._subscribe(key, enqueue)
+
+    def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
+        """Each subscriber has a thread of its own, which in lockstep would mix up what one service put on two keys."""
+        self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self.locked else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
@@ -134,8 +150,7 @@ class Service:
                     announce()
             handler(clock)
 
-        slot = Newest(self.inbox, tick)
-        self._kept.append(self.bus.session.declare_subscriber(keys.CLOCK, slot.offer))
+        self._subscribe(keys.CLOCK, Newest(self.inbox, tick).offer)
 
     def on_run(self, handler: Callable[[], None]) -> None:
         """Have it called at the first tick of every run."""

@@ -1,0 +1,105 @@
+"""Lockstep: tick k + 1 begins when everybody who takes part has answered tick k (docs/bus.md).
+
+A participant keeps a `Participant` and says `done(k)` when all that it has to say to tick k is put; whoever owns the clock waits at a
+`Barrier`.  In free mode `done` says nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+from bus_schema import keys
+from bus_schema.messages import StepDone
+from services.common.delivery import STEP
+from services.common.service import Service
+
+CEILING = 2.0  # s of the clock on the wall for one tick: who has not answered then is out
+TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long before it answers, which must change nothing
+
+
+class Participant:
+    """One who answers every tick, or every tick at which there is something to decide."""
+
+    def __init__(self, service: Service) -> None:
+        self._locked = service.config.mode == "lock"
+        self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
+        if self._locked:
+            self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
+
+    def done(self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False) -> None:
+        """All that this service has to say to tick k is put; see StepDone for the rest."""
+        if not self._locked:
+            return
+        self.dawdle()
+        self._done.put(re_k=k, ok=ok, busy=list(busy), last=last)
+
+    def dawdle(self) -> None:
+        """For tests: sleep for a random time, if the environment says so."""
+        if self._delay:
+            time.sleep(random.uniform(0.0, self._delay))  # not seeded: it stands for the scheduler
+
+
+class Barrier:
+    """Who must answer, and who has.
+
+    A participant counts from its first answer on until its token goes, until it is dropped for being late, or until its last
+    answer; when it answers again it counts again.  Who is named busy by the controller's answer need not answer that tick.
+    """
+
+    def __init__(
+        self, service: Service, participants: Iterable[str], tell: Callable[[str, str], None], referee: str = "controller"
+    ) -> None:
+        """`tell` hears (who, why) of all that makes a run one that cannot be repeated; `referee` says who is busy."""
+        self._service, self._tell, self._referee = service, tell, referee
+        self._expected = set(participants)
+        self._present: set[str] = set()
+        self._answers: dict[str, StepDone] = {}
+        service.on_each(keys.ALL_DONE, StepDone, self._note)
+        service.on_alive(self._note_alive)
+
+    def begin(self) -> None:
+        """A new run: everybody has to come anew."""
+        self._present.clear()
+        self._answers.clear()
+
+    def absent(self) -> list[str]:
+        """Who is expected and does not take part (yet)."""
+        return sorted(self._expected - self._present)
+
+    def missing(self, k: int) -> list[str]:
+        """Who must still answer tick k."""
+        waiting = [who for who in self._present if (answer := self._answers.get(who)) is None or answer.re_k < k]
+        if not waiting or self._referee in waiting:
+            return sorted(waiting)
+        referee = self._answers.get(self._referee)
+        return sorted(set(waiting) - set(referee.busy)) if referee is not None and referee.re_k == k else sorted(waiting)
+
+    def wait(self, k: int) -> list[str]:
+        """Handle what comes until tick k is answered by all, or until those who have not are late: these are dropped, and named."""
+        self._service.spin(time.monotonic() + CEILING, lambda: not self.missing(k))
+        late = self.missing(k)
+        for who in late:
+            self._drop(who, f"has not answered tick {k} within {CEILING:g} s")
+        return late
+
+    def _drop(self, who: str, why: str) -> None:
+        if who in self._present:
+            self._present.discard(who)
+            self._tell(who, why)
+
+    def _note(self, done: StepDone) -> None:
+        self._answers[done.src] = done
+        if done.last:
+            self._present.discard(done.src)
+            self._expected.discard(done.src)
+            return
+        self._present.add(done.src)
+        if not done.ok:
+            self._tell(done.src, f"lacked something at tick {done.re_k}")
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        if not up and not self._service.alive.get(who):
+            self._drop(who, "is gone")
