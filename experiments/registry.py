@@ -10,7 +10,9 @@ from typing import Any, Protocol, cast
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
+    "clauses": "experiments.clauses",
     "flood": "experiments.flood",
+    "settle": "experiments.settle",
 }
 
 

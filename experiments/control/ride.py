@@ -1,0 +1,53 @@
+"""Runs of the offline plant that are looked at tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.robot.robot import Array
+from mobee.simulation import OfflinePlant
+
+GAINS = ("default", "published_2014")
+PERIOD = {"default": 0.01, "published_2014": 0.02}  # s, the tick at which each set is used
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ride:
+    """T ticks of a plant; row t is the end of tick t."""
+
+    q: Array  # (T, n) rad, where the joints are, not what the encoders say
+    velocity: Array  # (T, n) rad/s, commanded
+    dt: float  # s
+
+    @property
+    def times(self) -> Array:
+        """(T,) s from the beginning of the ride to the end of each tick."""
+        times: Array = self.dt * np.arange(1, len(self.q) + 1)
+        return times
+
+    def last(self, seconds: float) -> Ride:
+        """The end of the ride."""
+        count = round(seconds / self.dt)
+        return Ride(self.q[-count:], self.velocity[-count:], self.dt)
+
+
+def ride(plant: OfflinePlant, seconds: float, before: Callable[[int], None] | None = None) -> Ride:
+    """Run the plant, at least one tick; `before` is called ahead of each tick with its number, from 0."""
+    ticks = max(1, round(seconds / plant.dt))
+    q, velocity = (np.empty((ticks, len(plant.robot.motors))) for _ in range(2))
+    for tick in range(ticks):
+        if before is not None:
+            before(tick)
+        plant.tick()
+        q[tick] = plant.motors.q
+        velocity[tick] = plant.controller.velocity
+    return Ride(q, velocity, plant.dt)
+
+
+def place(plant: OfflinePlant, q: Array) -> None:
+    """Put a plant that has not ticked yet at rest at q (n,) rad, its attractor there."""
+    plant.motors.adopt(q)
+    plant.controller.reset(q)

@@ -1,0 +1,131 @@
+"""Steps of one motor or of many, and what is measured of the response."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+
+from experiments.control.margins import clause_violations
+from experiments.control.ride import Ride, place, ride
+from mobee import Gains, Model, load_robot
+from mobee.robot.robot import Array
+from mobee.simulation import OfflinePlant
+
+STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, of the range: the smaller is the step of a motor alone
+BAND = 0.05  # of the step
+REST = 1.0  # s, the end of a ride, in which nothing may move
+WORTH = np.deg2rad(5.0)  # a smaller step of a motor among others is not judged
+TIME_CONSTANTS = 15.0  # a ride lasts so many of damping / stiffness
+LATTICE = {"torso": 3, "left_arm": 7, "right_arm": 7}
+MIDDLE = (0.25, 0.75)  # of the range of a motor in a posture
+MARGIN = np.deg2rad(15.0)  # from every constraint, of a posture
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """A row of settle.csv."""
+
+    gains: str
+    period_ms: float
+    step: str  # the motor, or "posture 3"
+    settling: float  # s
+    overshoot: float  # of the step
+    error_deg: float  # between rest and attractor
+    rest_deg: float  # standard deviation at rest
+    is_settled: bool
+
+    def record(self) -> dict[str, object]:
+        """For the file."""
+        return {key: round(value, 6) if isinstance(value, float) else value for key, value in asdict(self).items()}
+
+    @classmethod
+    def of_record(cls, row: Mapping[str, str]) -> Response:
+        """From the file."""
+        settling, overshoot, error, rest = (float(row[key]) for key in ("settling", "overshoot", "error_deg", "rest_deg"))
+        return cls(row["gains"], float(row["period_ms"]), row["step"], settling, overshoot, error, rest, row["is_settled"] == "True")
+
+
+COLUMNS = tuple(field.name for field in fields(Response))
+
+
+@lru_cache(maxsize=1)
+def model() -> Model:
+    """The iCub alone."""
+    return Model(load_robot("icub"))
+
+
+def responses(
+    gains: str, period_ms: float, motors: Sequence[str] | None, targets: Sequence[Array], seed: int, done: Collection[object]
+) -> Iterator[Response]:
+    """All steps that are not done yet; motors that the gain set never moves are left out."""
+    robot = model().robot
+    numbers = Gains.named(gains)
+    weight = numbers.weight(robot.motors)
+    for i, motor in enumerate(robot.motors):
+        if weight[i] and (motors is None or motor in motors) and (gains, period_ms, motor) not in done:
+            start, end = motor_step(i)
+            yield judge(step_ride(numbers, period_ms, start, end, seed + i), start, end, gains, period_ms, motor)
+    before = robot.home
+    for number, target in enumerate(targets):
+        name = f"posture {number}"
+        if (gains, period_ms, name) not in done:
+            end = np.where(weight > 0, target, robot.home)
+            yield judge(step_ride(numbers, period_ms, before, end, seed + number), before, end, gains, period_ms, name)
+        before = np.where(weight > 0, target, robot.home)
+
+
+def motor_step(motor: int) -> tuple[Array, Array]:
+    """From below the middle of a motor's range to above it, the others at home."""
+    robot = model().robot
+    low, high = robot.limits[motor]
+    size = min(STEP, SHARE * (high - low))
+    start, end = robot.home.copy(), robot.home.copy()
+    start[motor], end[motor] = (low + high - size) / 2.0, (low + high + size) / 2.0
+    return start, end
+
+
+def postures(count: int, seed: int) -> list[Array]:
+    """Random postures of torso and arms without any contact and away from limits and constraints."""
+    robot, rng = model().robot, np.random.default_rng(seed)
+    found: list[Array] = []
+    while len(found) < count:
+        q = robot.home.copy()
+        for part, motors in LATTICE.items():
+            where = slice(robot.parts[part].start, robot.parts[part].start + motors)
+            low, high = robot.limits[where].T
+            q[where] = low + rng.uniform(*MIDDLE, motors) * (high - low)
+        if clause_violations(robot, q[None]).max() < -MARGIN and not len(model().evaluate(q).table):
+            found.append(q)
+    return found
+
+
+def step_ride(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> Ride:
+    """At rest at `start` (n,) rad, then the attractor is `end`."""
+    plant = OfflinePlant(model(), seed, gains, dt=period_ms / 1e3)
+    place(plant, start)
+    plant.controller.attractor = end
+    return ride(plant, TIME_CONSTANTS * gains.damping / gains.stiffness)
+
+
+def judge(done: Ride, start: Array, end: Array, gains: str, period_ms: float, step: str) -> Response:
+    """Measure the joints that had to go WORTH or farther."""
+    moved = np.abs(end - start) >= WORTH
+    rest = done.last(REST).q[:, moved]
+    final = rest.mean(axis=0)
+    size = final - start[moved]
+    beyond = (done.q[:, moved] - final) / size
+    outside = np.abs(beyond) > BAND
+    settling = done.dt * max(int(np.flatnonzero(row)[-1]) + 1 if row.any() else 0 for row in outside.T)
+    return Response(
+        gains,
+        period_ms,
+        step,
+        settling,
+        overshoot=float(np.maximum(beyond, 0.0).max()),
+        error_deg=float(np.rad2deg(np.abs(end[moved] - final).max())),
+        rest_deg=float(np.rad2deg(rest.std(axis=0).max())),
+        is_settled=bool(settling <= done.times[-1] - REST),
+    )
