@@ -67,6 +67,11 @@ def goal(part: str, verb: str) -> str:
     return f"{part if part == '*' else chunk(part)}/rpc/{chunk(verb)}"
 
 
+def waypoint(part: str) -> str:
+    """Where a motion may be undone to: the filter of the first MoBeE, on request."""
+    return f"{part if part == '*' else chunk(part)}/rpc/waypoint"
+
+
 def sim(verb: str) -> str:
     """The simulator itself: reset, pause, resume, place."""
     return f"sim/rpc/{chunk(verb)}"

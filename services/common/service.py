@@ -48,12 +48,21 @@ class CallRefused(Exception):
 class Service:
     """A process on the bus.  All handlers run in the main thread, inside `spin` or `run`."""
 
-    def __init__(self, who: str, config: ServiceConfig, robot: Robot | None = None, session: zenoh.Session | None = None) -> None:
+    def __init__(
+        self,
+        who: str,
+        config: ServiceConfig,
+        robot: Robot | None = None,
+        session: zenoh.Session | None = None,
+        inbox: Inbox | None = None,
+    ) -> None:
+        """`session` and `inbox`: its own unless they are given; two services of one process share an inbox."""
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
         self.log = log.set_up(who)
         session = session or open_client(config.endpoint, namespace=config.namespace)
+        self.inbox = inbox or Inbox()
         try:
             self._begin(session, robot)
         except BaseException:
@@ -67,7 +76,6 @@ class Service:
         if robot is not None:
             self.bus.robot_size = len(robot.motors)
             self.bus.part_sizes = {name: len(part) for name, part in robot.parts.items()}
-        self.inbox = Inbox()
         self.alive: dict[str, set[str]] = {}
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
