@@ -45,7 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(_as_json(content, checked.findings, groups), indent=2))
     else:
-        lines = [*_findings(checked.findings), *(_pairs(content, groups, arguments.pairs) if isinstance(content, Robot) else [])]
+        lines = _findings(checked.findings)
+        if isinstance(content, Robot):
+            lines += [*_pairs(content, groups, arguments.pairs), *_masses(content)]
         print("\n".join([*lines, _summary(content, checked.findings)]))
     return FAILED if any(finding.severity != "note" for finding in checked.findings) else 0
 
@@ -75,6 +77,13 @@ def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
     return lines
 
 
+def _masses(robot: Robot) -> list[str]:
+    """What the robot weighs."""
+    if not robot.bodies:
+        return _wrapped("Masses: none. In the torque modality the robot's own weight is not compensated.", "", "  ")
+    return [f"Masses: {sum(body.mass for body in robot.bodies):.4g} kg on {count(robot.bodies, 'link')}."]
+
+
 def _summary(content: Robot | World, findings: tuple[Finding, ...]) -> str:
     counts = Counter(finding.severity for finding in findings)
     said = ", ".join(f"{counts[severity]} {severity}{'' if counts[severity] == 1 else 's'}" for severity in SEVERITIES if counts[severity])
@@ -94,5 +103,6 @@ def _as_json(content: Robot | World, findings: tuple[Finding, ...], groups: list
     listed: dict[str, Any] = {"findings": [asdict(finding) for finding in findings]}
     if isinstance(content, Robot):
         tested = {"solid_pairs": len(content.solid_pairs), "field_pairs": len(content.field_pairs)}
-        listed |= {"robot": content.name, "tested": tested, "untested": [asdict(group) for group in groups]}
+        mass = sum(body.mass for body in content.bodies)
+        listed |= {"robot": content.name, "mass": mass, "tested": tested, "untested": [asdict(group) for group in groups]}
     return listed

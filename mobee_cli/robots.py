@@ -44,6 +44,7 @@ def _robot(name: str, readme: str) -> dict[str, Any]:
             "fields": roles["field"],
             "markers": len(robot.markers),
             "constraints": len(robot.clauses),
+            "masses": len(robot.bodies),
         },
         "about": _row(readme, name),
         "file": str(ROBOTS / f"{name}.xml"),

@@ -17,6 +17,7 @@ import numpy as np
 from experiments.robots.icub_fields import BESIDE, HEAD, LEFT_ARM, TRUNK, Field
 from experiments.robots.icub_solids import BOXES
 from experiments.robots.xml_writer import box_turn, element, number, vector, write
+from mobee.robot.bodies import to_six
 from mobee.robot.robot import Array
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
@@ -107,6 +108,7 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
             pan.set("maxPos", number(interval[1]))
     if name.endswith("wrist_pitch"):
         pan.set("noSelfCollision", "true")
+    add_mass(pan, joint, here)
     carried = [link, *(rigid for rigid, host in RIGID.items() if host == link)]
     for source in carried:
         add_shapes(pan, data["models"]["icub_v2_5"], source, here)
@@ -114,6 +116,19 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
     add_markers(pan, data, link, here)
     for source in carried if link.endswith("hand") else [link]:
         add_joints(pan, data, source, here)
+
+
+def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
+    """What moves with a joint, relative to a point.
+
+    Fingers and eyes are left out: 0.01 kg each and 0.001 kg m^2 are placeholders of the source, in whose other model hand and head
+    weigh the same without them; that is the one which is simulated.
+    """
+    if "_hand_" in joint["name"] or "eye" in joint["name"]:
+        return
+    place = vector("px py pz", np.array(joint["body_com_root"]) - point)
+    inertia = " ".join(number(value, 9) for value in to_six(np.array(joint["body_inertia_com_root_axes"])))
+    element(parent, "mass", value=joint["body_mass_kg"], **place, inertia=inertia)
 
 
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue, UnknownName
+from mobee.robot.bodies import one_a_link
 from mobee.robot.joined_pairs import joined_pairs, joined_untested
-from mobee.robot.robot import Array, Clause, Joint, Marker, Motor, Part, Robot, Shape
+from mobee.robot.robot import Array, Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
 
 SEPARATOR = "_"  # part names are chunks of keys on the bus: a-z, 0-9 and _ only
 
@@ -79,6 +80,7 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
         base_shapes=frozenset(index + start for body, start in zip(bodies, starts, strict=False) for index in body.base_shapes),
         untested=joined_untested(bodies, shapes, (solid_pairs, field_pairs)),
         where=where,
+        bodies=one_a_link(mass for body in bodies for mass in body.bodies),
     )
 
 
@@ -111,6 +113,10 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         moved = replace(old, position=point(old.position), rotation=turn @ old.rotation)
         return replace(moved, name=one.name(old.name), part=one.name(old.part), link=link(old.link))
 
+    def body(old: Body) -> Body:
+        inertia = None if old.inertia is None else turn @ old.inertia @ turn.T
+        return Body(link(old.link), old.mass, point(old.centre), inertia)
+
     def clause(old: Clause) -> Clause:
         a = np.zeros((len(old.b), all_motors))
         a[:, motors : motors + old.a.shape[1]] = old.a
@@ -126,6 +132,7 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         markers={one.name(key): marker(old) for key, old in robot.markers.items()},
         shapes=tuple(map(shape, robot.shapes)),
         clauses=tuple(map(clause, robot.clauses)),
+        bodies=tuple(map(body, robot.bodies)),
         untested={
             frozenset(map(link, pair)): f"{one.prefix}: {reason}" if one.prefix else reason for pair, reason in robot.untested.items()
         },

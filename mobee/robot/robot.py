@@ -98,6 +98,16 @@ class Marker:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """The mass of a link (root frame, zero pose)."""
+
+    link: int
+    mass: float  # kg
+    centre: Array  # (3,) m, centre of mass
+    inertia: Array | None = None  # (3, 3) kg m^2 about the centre, along the root frame's axes; None where nobody knows it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Clause:
     """A disjunction of linear rows over the motor vector, each satisfied when a.q + b > 0 (thesis 5.14-5.17).
 
@@ -117,6 +127,7 @@ class Robot:
     `field_pairs` and `solid_pairs` are (p, 2) indices into `shapes`: what is tested against each other.
     `base_shapes` marks shapes that are never tested against world objects (they stand on them).  `untested` says of every two
     links that are never tested against each other why, `where` from which file and line a thing was read: ("joint", its name).
+    `bodies` holds at most one a link, in the order of the links; () where the file says nothing of masses.
     """
 
     name: str
@@ -132,6 +143,7 @@ class Robot:
     base_shapes: frozenset[int] = field(default_factory=frozenset)
     untested: Mapping[LinkPair, str] = field(default_factory=dict)
     where: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    bodies: tuple[Body, ...] = ()
 
     @cached_property
     def motors(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from mobee.robot.drives import drives_of
 from mobee.robot.number_text import number, numbers
 from mobee.robot.robot import Array, Marker, Motor, Robot
 from mobee.robot.urdf.frames import rpy_of
+from mobee.robot.urdf.inertial import inertial_element
 from mobee.robot.urdf.write_geometry import GeometryWriter
 from mobee.robot.urdf.write_srdf import write_srdf
 from mobee.robot.write_pairs import role_elements
@@ -56,7 +57,11 @@ def _master(motor: Motor) -> Master:
 
 
 def _comment(robot: Robot) -> str:
-    lines = ["Written by mobee convert. It holds no masses."]
+    lines = ["Written by mobee convert."]
+    if not robot.bodies:
+        lines.append("It holds no masses.")
+    elif any(body.inertia is None for body in robot.bodies):
+        lines.append('Where <mobee assumed="true"/> stands only the mass is known; the moments of inertia are those of a ball of water.')
     if robot.clauses:
         lines.append("Not in this file: at least one row of every clause holds, a.q + b > 0 in rad.")
     for index, clause in enumerate(robot.clauses):
@@ -69,6 +74,7 @@ def _comment(robot: Robot) -> str:
 
 
 def _write_body(robot: Robot, link: ET.Element, index: int, point: Array, part: str, writer: GeometryWriter) -> None:
+    link.extend(inertial_element(body, point) for body in robot.bodies if body.link == index)
     for k, shape in enumerate(robot.shapes):
         if shape.link != index:
             continue

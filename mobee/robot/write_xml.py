@@ -8,9 +8,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from mobee.errors import InvalidValue
+from mobee.robot.bodies import to_six
 from mobee.robot.drives import Drive, drives_of
 from mobee.robot.number_text import degrees, number, numbers
-from mobee.robot.robot import Array, Clause, Joint, Motor, Robot, Shape
+from mobee.robot.robot import Array, Body, Clause, Joint, Motor, Robot, Shape
 from mobee.robot.write_pairs import ignore_elements
 from mobee.robot.xml_node import DEEPEST
 from mobee.robot.xml_volume import Y, align
@@ -22,7 +23,7 @@ DIGITS = 1e-14  # m; less is the rounding of a sum
 def write_xml(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a zero-position XML file (robots/README.md) and return its path.
 
-    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers and clauses. Shapes may come in another order, and a
+    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses and clauses. Shapes may come in another order, and a
     convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
@@ -90,7 +91,8 @@ def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Eleme
 
 
 def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> None:
-    """The shapes and markers of a link, each part's in a <bodypart> of that name."""
+    """The mass, the shapes and the markers of a link; the shapes of each part stand in a <bodypart> of that name."""
+    element.extend(_mass(body, origin) for body in robot.bodies if body.link == link)
     parts: dict[str, ET.Element] = {}
     for index, shape in enumerate(robot.shapes):
         if shape.link != link:
@@ -108,6 +110,11 @@ def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> 
         if marker.link == link:
             place = _vector(("px", "py", "pz"), marker.position - origin) | _vector(("nx", "ny", "nz"), marker.normal)
             ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": numbers(marker.rotation.reshape(9))})
+
+
+def _mass(body: Body, origin: Array) -> ET.Element:
+    inertia = {} if body.inertia is None else {"inertia": numbers(to_six(body.inertia))}
+    return ET.Element("mass", {"value": number(body.mass)} | _vector(("px", "py", "pz"), body.centre - origin) | inertia)
 
 
 def _volume(shape: Shape, origin: Array) -> dict[str, str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from mobee.robot.join import Placed
 from mobee.robot.pairs_2014 import Element
-from mobee.robot.robot import Array, Joint, Marker, Shape
+from mobee.robot.robot import Array, Body, Joint, Marker, Shape
 from mobee.robot.xml_motors import MotorDraft
 from mobee.robot.xml_node import Node
 
@@ -27,6 +27,7 @@ class Draft:
     shape_names: dict[str, int] = field(default_factory=dict)  # and how many more were named after it
     base_shapes: set[int] = field(default_factory=set)
     markers: dict[str, Marker] = field(default_factory=dict)
+    bodies: list[Body] = field(default_factory=list)  # several a link, perhaps
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
     others: list[tuple[Node, Placed]] = field(default_factory=list)  # robots of other files, and where they were asked for

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mobee.errors import InvalidValue
+from mobee.robot.bodies import one_a_link
 from mobee.robot.join import Placed, join_placed
 from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
 from mobee.robot.pairs_2014 import published_pairs, published_untested
@@ -56,6 +57,7 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
         base_shapes=frozenset(draft.base_shapes),
         untested=untested,
         where=draft.where,
+        bodies=one_a_link(draft.bodies),
     )
 
 
@@ -78,7 +80,7 @@ def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, I
 def _with_others(robot: Robot, draft: Draft) -> Robot:
     """The robot of this file, if it has a body, and those of other files."""
     node, _ = draft.others[-1]
-    own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers else []
+    own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers or draft.bodies else []
     placed = own + [other for _, other in draft.others]
     if sum(len(one.robot.shapes) for one in placed) > MOST_SHAPES or sum(len(one.robot.joints) for one in placed) > MOST_JOINTS:
         node.fail("file", f"more than {MOST_SHAPES} shapes or {MOST_JOINTS} joints in all", "Include fewer or simpler robots")

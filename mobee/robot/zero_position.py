@@ -15,6 +15,7 @@ from mobee.robot.xml_draft import Draft, Place, enter
 from mobee.robot.xml_finish import MOST_JOINTS, finish_robot
 from mobee.robot.xml_ignore import IGNORE_ATTRIBUTES
 from mobee.robot.xml_include import INCLUDE_ATTRIBUTES, Trail, read_include
+from mobee.robot.xml_mass import MASS_ATTRIBUTES, read_mass
 from mobee.robot.xml_motors import read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
@@ -32,6 +33,7 @@ KNOWN = {
     ),
     "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque"}),
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
+    "mass": MASS_ATTRIBUTES,
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
     "robot": INCLUDE_ATTRIBUTES,
@@ -193,6 +195,7 @@ READERS = {
     "link": _read_link,
     "joint": _read_joint,
     "marker": read_marker,
+    "mass": read_mass,
     "constraintlist": _read_constraints,
     "ignore": _read_ignore,
 } | dict.fromkeys(BODY_TAGS, read_shape)

@@ -12,6 +12,7 @@ from mobee.robot.check.fields import fields
 from mobee.robot.check.finding import SEVERITIES, Finding
 from mobee.robot.check.joints import coupling, joint_limits
 from mobee.robot.check.markers import unreachable_markers
+from mobee.robot.check.masses import masses
 from mobee.robot.check.motors import home_limits, idle_motors, idle_parts
 from mobee.robot.check.names import identical_shapes, names_differing_in_case, unusable_names
 from mobee.robot.check.subject import Subject
@@ -36,6 +37,7 @@ CHECKS: tuple[Check, ...] = (
     fields,
     constraints,
     unreachable_markers,
+    masses,
     identical_shapes,
     names_differing_in_case,
     unusable_names,

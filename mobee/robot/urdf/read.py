@@ -10,6 +10,7 @@ import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
+from mobee.robot.urdf.inertial import read_bodies
 from mobee.robot.urdf.layout import Skeleton, lay_out, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
 from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
@@ -91,6 +92,7 @@ def _finish(root: Node, path: Path, tree: Tree, skeleton: Skeleton, srdf: Srdf, 
         base_shapes=frozenset(body.base),
         untested=untested_links(body.shapes, solid_pairs, rules),
         where=where,
+        bodies=read_bodies(tree, skeleton),
     )
     return without_ignored(robot, [node for note in notes for node in note if node.tag == "ignore"])
 

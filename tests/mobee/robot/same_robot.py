@@ -88,6 +88,19 @@ def assert_same_markers(one: Robot, other: Robot) -> None:
             assert np.abs(getattr(marker, attribute) - getattr(twin, attribute)).max() < 1e-9, (marker.name, attribute)
 
 
+def assert_same_bodies(one: Robot, other: Robot) -> None:
+    """Masses, their centres and their moments of inertia."""
+    theirs = {other.links[body.link]: body for body in other.bodies}
+    assert {one.links[body.link] for body in one.bodies} == set(theirs)
+    for body in one.bodies:
+        twin = theirs[one.links[body.link]]
+        assert abs(body.mass - twin.mass) < 1e-12 * body.mass
+        assert np.abs(body.centre - twin.centre).max() < 1e-9
+        assert (body.inertia is None) == (twin.inertia is None)
+        if body.inertia is not None and twin.inertia is not None:
+            assert np.abs(body.inertia - twin.inertia).max() < 1e-9 * max(1.0, float(np.abs(body.inertia).max()))
+
+
 def assert_same_robot(one: Robot, other: Robot) -> None:
     assert one.name == other.name
     assert one.links[0] == other.links[0]
@@ -96,3 +109,4 @@ def assert_same_robot(one: Robot, other: Robot) -> None:
     assert_same_shapes(one, other)
     assert_same_pairs(one, other)
     assert_same_markers(one, other)
+    assert_same_bodies(one, other)

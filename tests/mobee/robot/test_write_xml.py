@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Joint, Marker, Motor, Part, Robot, Shape
+from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.write_xml import write_xml
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
@@ -113,8 +113,19 @@ def random_robot(seed: int, tilt: float) -> Robot:
     marker = Marker("m", int(rng.integers(count + 1)), rng.normal(size=3), turned(seed + 99), normal / np.linalg.norm(normal))
     return Robot(
         "any", links, joints, tuple(motors), parts, {"m": marker}, tuple(shapes), (), pairs["field"], pairs["solid"],
-        frozenset(k for k in range(len(shapes)) if rng.random() < 0.3), untested,
+        frozenset(k for k in range(len(shapes)) if rng.random() < 0.3), untested, {}, random_bodies(rng, count + 1),
     )  # fmt: skip
+
+
+def random_bodies(rng: np.random.Generator, links: int) -> tuple[Body, ...]:
+    """Masses of some of the links, of some with moments of inertia: those of a cloud of points."""
+    bodies = []
+    for link in range(links):
+        mass, cloud = float(rng.uniform(0.1, 5.0)), rng.normal(size=(6, 3))
+        inertia = (cloud**2).sum() * np.eye(3) - cloud.T @ cloud if rng.random() < 0.5 else None
+        if rng.random() < 0.7:
+            bodies.append(Body(link, mass, rng.normal(size=3), inertia))
+    return tuple(bodies)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
