@@ -1,0 +1,108 @@
+"""What the motors need to carry the robot's weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mobee.errors import InvalidValue
+from mobee.kinematics.forward import link_transforms
+from mobee.kinematics.tables import tables
+from mobee.robot.robot import Array, Ints, Robot
+
+EARTH = (0.0, 0.0, -9.81)  # m/s^2, root frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Masses:
+    """Links with a mass, and the joints that carry any."""
+
+    links: Ints  # (B,)
+    moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
+    joints: Ints  # (C,)
+    carried: Array  # (C, B) 1 where the joint carries the link's mass
+    loads: Array  # (C,) kg
+    frames: Array  # (C, 4, 2) axis and point of the joints, each with its fourth coordinate
+    slides: NDArray[np.bool_]  # (C,)
+    drives: Array  # (C, n) joint per motor
+
+
+_CACHE: WeakKeyDictionary[Robot, _Masses] = WeakKeyDictionary()
+
+
+def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
+    """The torque [N m] with which the motors hold the robot still against its weight.
+
+    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame.  Returns (..., n), for a prismatic joint's motor that
+    counts in m the force [N]: the derivative of the potential energy with respect to q.  Zeros where the robot has no masses.
+    """
+    q = _checked(robot, q)
+    if not robot.bodies:
+        return np.zeros(q.shape)
+    m = _masses(robot)
+    moved = link_transforms(robot, q)[..., :3, :]
+    moments = (moved[..., m.links, :, :] @ m.moments)[..., 0]  # kg m, about the root frame's origin
+    carried = m.carried @ moments
+    frames = moved[..., m.joints + 1, :, :] @ m.frames  # a joint leaves its own axis where it is
+    axes, points = frames[..., 0], frames[..., 1]
+    pull = np.asarray(gravity, dtype=float)
+    # g . (axis x lever) = (g x axis) . lever: no cross product with the lever
+    turning = ((axes @ _crossed(pull)) * (carried - m.loads[:, None] * points)).sum(axis=-1)
+    sliding = (axes @ pull) * m.loads
+    torque: Array = -np.where(m.slides, sliding, turning) @ m.drives
+    return torque
+
+
+def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
+    """The potential energy [J] of the robot's masses, shape (...,), zero at the root frame's origin; arguments as gravity_torque."""
+    q = _checked(robot, q)
+    if not robot.bodies:
+        return np.zeros(q.shape[:-1])
+    m = _masses(robot)
+    moments = (link_transforms(robot, q)[..., m.links, :3, :] @ m.moments)[..., 0]
+    energy: Array = -moments.sum(axis=-2) @ np.asarray(gravity, dtype=float)
+    return energy
+
+
+def _checked(robot: Robot, q: Array) -> Array:
+    q, n = np.asarray(q, dtype=float), len(robot.motor_table)
+    if q.ndim == 0 or q.shape[-1] != n:
+        raise InvalidValue(f"q of shape {q.shape}: must be (..., {n}), a position for every motor of {robot.name}")
+    return q
+
+
+def _crossed(v: Array) -> Array:
+    """The matrix (3, 3) whose product with rows of axes gives v x axis."""
+    return np.array([[0.0, v[2], -v[1]], [-v[2], 0.0, v[0]], [v[1], -v[0], 0.0]])
+
+
+def _masses(robot: Robot) -> _Masses:
+    found = _CACHE.get(robot)
+    if found is None:
+        found = _CACHE[robot] = _build(robot)
+    return found
+
+
+def _build(robot: Robot) -> _Masses:
+    t = tables(robot)
+    carried = np.zeros((len(robot.joints), len(robot.bodies)))
+    for column, body in enumerate(robot.bodies):
+        carried[t.ancestry[body.link], column] = 1.0
+    joints = np.flatnonzero(carried.any(axis=1))
+    weights = np.array([body.mass for body in robot.bodies])
+    centres = np.array([[*body.centre, 1.0] for body in robot.bodies])
+    frames = np.zeros((len(joints), 4, 2))
+    frames[:, :3, 0], frames[:, :3, 1], frames[:, 3, 1] = t.axes[joints], t.points[joints], 1.0
+    return _Masses(
+        links=np.array([body.link for body in robot.bodies], dtype=np.intp),
+        moments=(weights[:, None] * centres)[..., None],
+        joints=joints,
+        carried=carried[joints],
+        loads=carried[joints] @ weights,
+        frames=frames,
+        slides=t.revolute[joints] == 0.0,
+        drives=np.ascontiguousarray(t.coupling[:, joints].T),
+    )
