@@ -1,0 +1,90 @@
+"""Motor babbling (thesis 4.1.1): random position moves of 23 motors at 20 % speed, a table in front of the robot.
+
+Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second
+MoBeE lets more of the commands happen, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
+hours over several trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all
+of them", on the robot.  Here: the PyBullet robot, every process in lockstep, postures uniform over the whole ranges of torso (3
+motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is a posture of one part; it
+is completed when all its motors end within 5 degrees, deflected when the part ends elsewhere, returned when it ends where it began.
+
+Run time: 2 h of robot time in each of three modes take about an hour; a run that was broken off goes on with --resume.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.babbling.figure import draw
+from experiments.babbling.measured import POSITIONS, Trial, measure, read_trial, write_trial
+from experiments.babbling.modes import MODES, RATE, TITLES
+from experiments.babbling.moved import ROBOT
+from experiments.babbling.results import summarise, verdict
+from experiments.babbling.table import as_table
+from experiments.babbling.trial import run_trial
+from experiments.options import positive_number
+from experiments.progress import Progress
+from mobee import load_robot
+from mobee.errors import InvalidValue
+
+NAME = "babbling"
+CLAIM = "random position moves break nothing under MoBeE, and 2.0 deflects them less than 1.0"
+SOURCE = "thesis 4.1.1"
+
+TRIAL = "trial.json"
+SEEDS = 10_000  # trials a seed
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--minutes", type=positive_number, default=120.0, metavar="M", help="of robot time in each mode (default: 120)")
+    parser.add_argument("--trial", type=positive_number, default=10.0, metavar="M", help="robot time of a trial (default: 10)")
+    parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), metavar="MODE", help=f"of {', '.join(MODES)}")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Run the trials that are not there yet; returns the table, and whether the claims stand."""
+    robot = load_robot(ROBOT)
+    lengths = trial_lengths(arguments.minutes, arguments.trial)
+    total, done = len(lengths) * len(arguments.modes), 0
+    with Progress() as progress:
+        for number, minutes in enumerate(lengths):
+            for mode in arguments.modes:
+                place, before = _place(folder, mode, number), done
+                if not (place / TRIAL).exists():
+                    text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
+                    seed = SEEDS * arguments.seed + number
+                    run_trial(place, mode, robot, seed, minutes, lambda share: progress.show((before + share) / total, text))  # noqa: B023
+                    write_trial(place / TRIAL, measure(place, robot, 1.0 / RATE))
+                    (place / POSITIONS).unlink()
+                done += 1
+    rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
+    claims = verdict(rows)
+    if not arguments.json:
+        print(as_table(rows))
+    return {"passed": all(claims.values()), "claims": claims, **({"modes": rows} if arguments.json else {})}
+
+
+def trial_lengths(minutes: float, trial: float) -> list[float]:
+    """The trials that make up so many minutes, in minutes; the last may be shorter."""
+    whole = int(minutes / trial + 1e-9)
+    rest = minutes - whole * trial
+    return [trial] * whole + ([rest] if rest > 1e-6 * trial else [])
+
+
+def read_trials(folder: Path, mode: str) -> list[Trial]:
+    """All finished trials of a mode, in order."""
+    return [read_trial(path) for path in sorted(folder.glob(f"{mode}/*/{TRIAL}"))]
+
+
+def figure(folder: Path) -> Path:
+    """Collisions by pair, their depths, and what became of the commands."""
+    trials = {mode: found for mode in MODES if (found := read_trials(folder, mode))}
+    if not trials:
+        raise InvalidValue(f"{folder} has no finished trial: it was stopped before the first was over.")
+    return draw({mode: summarise(found) for mode, found in trials.items()}, folder / "babbling.png")
+
+
+def _place(folder: Path, mode: str, number: int) -> Path:
+    return folder / mode / f"{number:03}"

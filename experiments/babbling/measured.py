@@ -1,0 +1,108 @@
+"""One trial, measured: what is kept of it when its record of every tick is thrown away."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from experiments.babbling.command_log import COMMANDS, Commanded, Ending, finished_at, read_commands
+from experiments.babbling.contacts import Touch, read_touches
+from experiments.babbling.motion import beyond_limits, dimensionless_jerk, jerk, path_length
+from experiments.babbling.moved import moved_motors
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array, Robot
+
+TOLERANCE = float(np.deg2rad(5.0))  # rad, of every motor of a part, within which a posture is reached
+POSITIONS, CONTACTS = "q.f64", "contacts.csv"  # as services.robot_sim.record writes them
+
+Outcome = Literal["completed", "deflected", "returned"]
+
+
+class Judged(Struct, frozen=True):
+    """A command and what became of it."""
+
+    outcomes: dict[str, Outcome]  # by part
+    endings: dict[str, Ending]  # by part
+    duration: float  # s
+    path: float  # rad, all motors together
+    way: float  # rad, the straight way from begin to target, all motors together
+    jerk: float | None  # ln of the dimensionless jerk; None when nothing moved
+
+
+class Trial(Struct, frozen=True):
+    """The numbers of one trial."""
+
+    seconds: float  # robot time
+    commands: list[Judged]
+    touches: list[Touch]
+    beyond: float  # rad, the furthest beyond a limit; negative: inside
+    motor: str  # that went there
+    jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
+    jerk_max: float  # rad/s^3
+    path: float  # rad
+
+
+def measure(folder: Path, robot: Robot, dt: float) -> Trial:
+    """What a finished trial left in its folder; raises MobeeError when it is not whole."""
+    last = finished_at(folder / COMMANDS)
+    if last is None:
+        raise MobeeError(f"{folder}: the babbling did not come to its end")
+    q_all = np.fromfile(folder / POSITIONS).reshape(-1, len(robot.motors))
+    if len(q_all) < last - 1:
+        raise MobeeError(f"{folder}: {len(q_all)} of {last} ticks were recorded")
+    moved = moved_motors(robot)
+    q = q_all[:last, moved]
+    worst = beyond_limits(q, robot.limits[moved])
+    third = jerk(q, dt)
+    return Trial(
+        seconds=last * dt,
+        commands=[judge(commanded, q_all, robot, dt) for commanded in read_commands(folder / COMMANDS)],
+        touches=read_touches(folder / CONTACTS, dt, last),
+        beyond=float(worst.max()),
+        motor=robot.motors[moved[int(worst.argmax())]],
+        jerk_squared=float((third**2).mean()),
+        jerk_max=float(np.abs(third).max()),
+        path=path_length(q),
+    )
+
+
+def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged:
+    """Where the parts ended; q_all (ticks, n) rad at the ends of the ticks, the first is tick 1."""
+    moved = moved_motors(robot)
+    target = np.array(commanded.target)
+    course = q_all[max(commanded.begin - 2, 0) : max(commanded.end - 1, 1)]  # from the beginning of tick `begin` to that of `end`
+    first, last = course[0], course[-1]
+    outcomes = {}
+    for name, part in robot.parts.items():
+        own = moved[(moved >= part.slice.start) & (moved < part.slice.stop)]
+        outcomes[name] = _outcome(first[own], last[own], target[own])
+    return Judged(
+        outcomes=outcomes,
+        endings=commanded.endings,
+        duration=(commanded.end - commanded.begin) * dt,
+        path=path_length(course[:, moved]),
+        way=float(np.abs(target - first)[moved].sum()),
+        jerk=dimensionless_jerk(course[:, moved], dt),
+    )
+
+
+def _outcome(first: Array, last: Array, target: Array) -> Outcome:
+    if np.abs(last - target).max() <= TOLERANCE:
+        return "completed"
+    return "returned" if np.abs(last - first).max() <= TOLERANCE else "deflected"
+
+
+def write_trial(path: Path, trial: Trial) -> None:
+    """Write it whole or not at all."""
+    new = path.with_suffix(".new")
+    new.write_bytes(msgspec.json.format(msgspec.json.encode(trial), indent=1))
+    new.replace(path)
+
+
+def read_trial(path: Path) -> Trial:
+    """What `write_trial` wrote."""
+    return msgspec.json.decode(path.read_bytes(), type=Trial)
