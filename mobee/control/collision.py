@@ -1,33 +1,36 @@
-"""The force that drives fields out of each other (thesis eq. 5.11): f_coll = L(sum over contacts of J^T f)."""
+"""The force that drives fields out of each other (thesis eq. 5.11): f_coll = L(sum over contacts of J^T f).  Compiled."""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
 
-import numpy as np
-
-from mobee.control.gains import Gains
-from mobee.control.squash import squash_norm
-from mobee.robot.robot import Array, Robot
-
-# "tree": a contact is felt down to the base, so that a hand on the table also stops the torso; "part": by the part's own motors.
-Propagate = Literal["tree", "part"]
+from mobee.control.layout import CONTACT_GAIN, CONTACT_SLOPE, I_PART, MAX_CONTACT, PARTS, PUBLISHED, TOUCH
+from mobee.control.squash import norm, squash_norm
+from mobee.engine.compiled import inner_exact
+from mobee.robot.robot import Array, Ints
 
 
-def collision_forces(robot: Robot, projection: Array, gains: Gains) -> Array:
-    """Turn the sum of J^T d (n,) into a force in rad/s^2, its norm bounded part by part (eq. 5.8).
-
-    The default law is linear in the penetration before it is bounded; the published one is quadratic,
-    in degrees.
-    """
-    force = gains.contact_gain * projection
-    if not force.any():
-        return force
-    for part in robot.parts.values():
-        f = force[part.slice]
-        if not f.any():
+@inner_exact
+def collision_forces(integers: Ints, floats: Array, torque: Array, force: Array) -> None:
+    """Fill `force` (n,) in rad/s^2 from `torque`, the sum of J^T d (n,); its norm is bounded part by part (eq. 5.8)."""
+    if integers[TOUCH] == 0:
+        return
+    for part in range(integers[PARTS]):
+        first, stop = integers[integers[I_PART] + 2 * part], integers[integers[I_PART] + 2 * part + 1]
+        touched = False
+        for i in range(first, stop):
+            force[i] = floats[CONTACT_GAIN] * torque[i]
+            touched = touched or force[i] != 0.0
+        if not touched:
             continue
-        if gains.law == "published_2014":
-            f = np.deg2rad(np.sqrt(f @ f) * f)
-        force[part.slice] = squash_norm(f, gains.max_contact, gains.contact_slope)
-    return force
+        if integers[PUBLISHED] == 1:
+            square_2014(force, first, stop)
+        squash_norm(force, first, stop, floats[MAX_CONTACT], floats[CONTACT_SLOPE])
+
+
+@inner_exact
+def square_2014(force: Array, first: int, stop: int) -> None:
+    """The published law is quadratic in the penetration, in degrees; the default one is linear until it is bounded."""
+    length = norm(force, first, stop)
+    for i in range(first, stop):
+        force[i] = math.radians(length * force[i])

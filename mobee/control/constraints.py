@@ -1,4 +1,4 @@
-"""Forces of the linear constraints in configuration space (thesis eqs. 5.14-5.17).
+"""Forces of the linear constraints in configuration space (thesis eqs. 5.14-5.17).  Compiled.
 
 A row is satisfied when a.q + b > 0 (the robot files' convention; the thesis prints n.q < b), a clause
 when one of its rows is, and a robot wants all of its clauses.
@@ -6,60 +6,77 @@ when one of its rows is, and a robot wants all of its clauses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mobee.robot.robot import Array, Clause
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ClauseRows:
-    """The rows of all clauses below each other: row i belongs to clause `clause[i]`."""
-
-    a: Array  # (rows, n)
-    b: Array  # (rows,) rad
-    normals: Array  # (rows, n), a / |a|
-    norms: Array  # (rows,)
-    clause: NDArray[np.intp]  # (rows,)
-    starts: NDArray[np.intp]  # (clauses,) the first row of each
-
-
-def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
-    """Put the clauses of a robot with n motors into one matrix."""
-    counts = [len(c.b) for c in clauses]
-    a = np.concatenate([c.a for c in clauses]) if clauses else np.zeros((0, n))
-    b = np.concatenate([c.b for c in clauses]) if clauses else np.zeros(0)
-    norms = np.linalg.norm(a, axis=1)
-    starts = np.cumsum([0, *counts[:-1]])[: len(counts)].astype(np.intp)
-    return ClauseRows(a, b, a / norms[:, None], norms, np.repeat(np.arange(len(counts)), counts), starts)
+from mobee.control.layout import (
+    CLAUSES,
+    ENTRY,
+    F_MOTOR,
+    FACTOR,
+    FELT,
+    I_CLAUSE,
+    I_ENTRY,
+    I_FELT,
+    I_ROW,
+    MAX_CONSTRAINT,
+    MOTOR,
+    MOTORS,
+    NORMAL,
+    OFFSET,
+    PUBLISHED,
+    ROW,
+    ZONE,
+)
+from mobee.engine.compiled import inner_exact
+from mobee.robot.robot import Array, Ints
 
 
-def clause_forces(rows: ClauseRows, q: Array, width: float, maximum: float) -> Array:
-    """The default law: a clause pushes only while none of its rows is satisfied by more than `width`.
+@inner_exact
+def clause_forces(integers: Ints, floats: Array, q: Array, force: Array) -> None:
+    """Add the pushes of all clauses to `force` (n,), which is zero before; rad/s^2."""
+    maximum, published, pushed = floats[MAX_CONSTRAINT], integers[PUBLISHED] == 1, False
+    for clause in range(integers[CLAUSES]):
+        first, stop = integers[integers[I_CLAUSE] + clause], integers[integers[I_CLAUSE] + clause + 1]
+        least = math.inf
+        for row in range(first, stop):
+            least = min(least, lack(integers, floats, q, row))
+        if published and least >= 0.0:
+            pushed = True
+            for row in range(first, stop):
+                push(integers, floats, row, lack(integers, floats, q, row), force)
+        elif not published and least > 0.0:
+            for row in range(first, stop):
+                push(integers, floats, row, maximum * least, force)
+    if pushed:
+        clip_2014(integers, maximum, force)
 
-    The push grows linearly to `maximum` at the boundary of the clause and on beyond it, along the unit
-    normal of each of its rows.  `q` (n,) rad, `width` rad along the normal, result (n,) in rad/s^2.  The row that is
-    nearest to being satisfied sets the size for all rows of its clause, which keeps the force continuous
-    where that row becomes satisfied.
+
+@inner_exact
+def lack(integers: Ints, floats: Array, q: Array, row: int) -> float:
+    """How much a row lacks of being satisfied with margin: 0 where the zone begins, 1 on the boundary, on beyond it (eq. 5.15)."""
+    o = F_MOTOR + integers[MOTORS] * MOTOR
+    entries = o + integers[integers[I_CLAUSE] + integers[CLAUSES]] * ROW
+    value = 0.0
+    for k in range(integers[integers[I_ROW] + row], integers[integers[I_ROW] + row + 1]):
+        value += floats[entries + k * ENTRY + FACTOR] * q[integers[integers[I_ENTRY] + k]]
+    return 1.0 - (value + floats[o + row * ROW + OFFSET]) / floats[o + row * ROW + ZONE]
+
+
+@inner_exact
+def push(integers: Ints, floats: Array, row: int, size: float, force: Array) -> None:
+    """Add a push along the unit normal of a row (eq. 5.15).
+
+    In the default law the row nearest to being satisfied sets the size for all rows of its clause, which keeps the force
+    continuous where that row becomes satisfied.
     """
-    if not len(rows.b):
-        return np.zeros(rows.a.shape[1])
-    lack = 1.0 - (rows.a @ q + rows.b) / (rows.norms * width)
-    push: Array = maximum * np.maximum(np.minimum.reduceat(lack, rows.starts), 0.0)
-    return push[rows.clause] @ rows.normals
+    entries = F_MOTOR + integers[MOTORS] * MOTOR + integers[integers[I_CLAUSE] + integers[CLAUSES]] * ROW
+    for k in range(integers[integers[I_ROW] + row], integers[integers[I_ROW] + row + 1]):
+        force[integers[integers[I_ENTRY] + k]] += size * floats[entries + k * ENTRY + NORMAL]
 
 
-def clause_forces_2014(rows: ClauseRows, q: Array, width: float, maximum: float) -> Array:
-    """The published law: rows not normalised, the sum clipped to +-1 a motor, times `maximum`.
-
-    `width` is in units of a.q + b: for the shoulder rows 40 degrees are 13.5 to 28 degrees along the normal.
-    Result (n,) in rad/s^2.
-    """
-    if not len(rows.b):
-        return np.zeros(rows.a.shape[1])
-    lack = 1.0 - (rows.a @ q + rows.b) / width
-    pushes = np.minimum.reduceat(lack, rows.starts) >= 0.0
-    return maximum * np.clip(np.where(pushes[rows.clause], lack, 0.0) @ rows.normals, -1.0, 1.0)
+@inner_exact
+def clip_2014(integers: Ints, maximum: float, force: Array) -> None:
+    """The published law: rows not normalised, their sum clipped to +-1 a motor, times `maximum`."""
+    for k in range(integers[FELT]):
+        i = integers[integers[I_FELT] + k]
+        force[i] = maximum * min(max(force[i], -1.0), 1.0)

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mobee.control.collision import Propagate
-from mobee.control.dynamics import acceleration, largest_step, require_stable
-from mobee.control.forces import Forces, constraint_forces
+from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.modality import Command, Modality, torque
-from mobee.control.squash import squash, squash_norm
-from mobee.errors import InvalidValue
+from mobee.control.layout import OWN_ACCELERATION, OWN_VELOCITY
+from mobee.control.load import law
+from mobee.control.modality import Command, Modality
+from mobee.control.pack import pack
+from mobee.control.stability import largest_step, require_stable
+from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
-
-INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
-LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
 
 
 class Controller:
@@ -30,6 +29,11 @@ class Controller:
     compensate gravity yet.  The motors' limits on velocity (times `speed_scale`, 0 to 1) and
     acceleration are kept here, so that the robot's safety gate has nothing to refuse.
     """
+
+    __slots__ = (
+        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_state", "_track", "contact_forces", "gains", "last_forces",
+        "max_dt", "modality", "model", "propagate", "robot", "weight",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -46,6 +50,8 @@ class Controller:
             raise InvalidValue(f"gains is {gains!r}; it must be Gains, as Gains.default() or Gains.named(name), or None.")
         if not 0 < speed_scale <= 1:
             raise InvalidValue(f"speed_scale {speed_scale}: must be above 0 and at most 1")
+        if modality not in ("position", "velocity", "torque"):
+            raise UnknownName("modality", modality, ("position", "velocity", "torque"))
         self.model = model
         self._track = model.track()
         self.robot = model.robot
@@ -53,14 +59,11 @@ class Controller:
         self.modality: Modality = modality
         self.propagate: Propagate = propagate
         self.contact_forces = contact_forces
-        self.max_dt = largest_step(self.gains)
-        motors = self.robot.motor_table
         self.weight = self.gains.weight(self.robot.motors)
-        self._max_velocity = INSIDE * speed_scale * np.array([m.max_velocity for m in motors])
-        self._max_acceleration = INSIDE * np.array([m.max_acceleration for m in motors])
-        self._max_torque = np.array([m.max_torque for m in motors])
-        self._client = np.zeros(len(motors))
-        self._pushes: dict[str, Array] = {}
+        self.max_dt = largest_step(self.robot, self.gains)
+        self._compiled = law()
+        self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces)
+        self.clear()
         self.reset(self.robot.home)
 
     @property
@@ -70,16 +73,28 @@ class Controller:
 
     @attractor.setter
     def attractor(self, q: Array) -> None:
-        self._attractor = self._checked("attractor", q, len(self.robot.motor_table))
+        self._attractor = _checked("attractor", q, len(self.robot.motors))
+
+    @property
+    def velocity(self) -> Array:
+        """The law's own velocity, shape (n,), in [rad/s]: a copy."""
+        own: Array = self._state[OWN_VELOCITY].copy()
+        return own
+
+    @property
+    def acceleration(self) -> Array:
+        """The acceleration of the last step, shape (n,), in [rad/s^2]: a copy."""
+        own: Array = self._state[OWN_ACCELERATION].copy()
+        return own
 
     def set_attractor(self, part: str, q: Array) -> None:
         """Set the slice of q* that belongs to a part: (n_part,) rad."""
         where = self.robot.part(part)
-        self._attractor[where.slice] = self._checked(f"attractor of {part}", q, len(where))
+        self._attractor[where.slice] = _checked(f"attractor of {part}", q, len(where))
 
     def force(self, f: Array) -> None:
         """Apply a force in configuration space, (n,) rad/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
-        self._client = self._checked("force", f, len(self.robot.motor_table))
+        self._client = _checked("force", f, len(self.robot.motors))
 
     def push(self, marker: str, f: Array) -> None:
         """Apply a force (3,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
@@ -87,22 +102,19 @@ class Controller:
         Per unit mass: J^T f is in rad/s^2 before it is squashed.
         """
         self.robot.marker(marker)
-        self._pushes[marker] = self._checked(f"push on {marker}", f, 3)
+        self._pushes[marker] = _checked(f"push on {marker}", f, 3)
 
     def clear(self) -> None:
         """End all forces of the client."""
-        self._client = np.zeros(len(self.robot.motor_table))
-        self._pushes.clear()
+        self._client = np.zeros(len(self.robot.motors))
+        self._pushes: dict[str, Array] = {}
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
-        q = self._checked("q", q, len(self.robot.motor_table))
-        self._attractor = q.copy()
-        self._reference = q.copy()
-        self.velocity = np.zeros(len(q))
-        self.acceleration = np.zeros(len(q))
+        q = _checked("q", q, len(self.robot.motors))
+        self._attractor = q
+        self._state = self._at_rest(q)
         self.last_forces = Forces(np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
-        self._sent = np.zeros(len(q))
 
     def hold(self, part: str, q: Array) -> None:
         """Stay where the part is: own velocity 0 and attractor at its measured q (n_part,) rad.
@@ -110,71 +122,57 @@ class Controller:
         The commanded velocity follows as fast as the acceleration limit lets it.
         """
         self.set_attractor(part, q)
-        still = np.zeros(len(self.velocity), dtype=bool)
-        still[self.robot.part(part).slice] = True
-        self.velocity = np.where(still, 0.0, self.velocity)
-        self.acceleration = np.where(still, 0.0, self.acceleration)
+        self._state[[OWN_VELOCITY, OWN_ACCELERATION], self.robot.part(part).slice] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
         """Have a part that something else keeps still begin anew, as `reset` does for all; q (n_part,) rad measured.
 
         Unlike `hold` the commanded velocity starts from 0 and the position reference from q.
         """
-        self.hold(part, q)
+        self.set_attractor(part, q)
         where = self.robot.part(part).slice
-        self._sent, self._reference = self._sent.copy(), self._reference.copy()
-        self._sent[where], self._reference[where] = 0.0, self._attractor[where]
+        self._state[:, where] = self._at_rest(self._attractor)[:, where]
 
     def forces(self, pose: Pose) -> Forces:
         """The constraint forces at a pose, as `step` computes them when it is given none."""
-        return constraint_forces(pose, self.gains, self.propagate, self.contact_forces)
+        return forces_of(self._packed, pose, self.propagate)
 
     def step(self, q: Array, dt: float, forces: Forces | None = None) -> Command:
         """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model.
 
-        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above) and for a q that is
+        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), and for a q or forces that are
         not finite.
         """
-        if not dt < self.max_dt or dt <= 0:
-            require_stable(self.gains, dt)
-        q = self._checked("q", q, len(self.robot.motor_table))
+        if not 0 < dt < self.max_dt:
+            require_stable(self.robot, self.gains, dt)
+        n = len(self._attractor)
+        q = _checked("q", q, n)
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
-        a = acceleration(q, self.velocity, self._attractor, forces.total + self._client_forces(q), self.gains)
-        wanted = (self.weight * (self.velocity + a * dt)).clip(-self._max_velocity, self._max_velocity)
-        change = self._max_acceleration * dt
-        velocity = self._sent + (wanted - self._sent).clip(-change, change)
-        self.acceleration = (velocity - self.velocity) / dt
-        self.velocity = velocity
-        self._sent = velocity
+        total = _checked("forces", forces.total, n)
+        if self._pushes or self._client.any():
+            self._add_client(q, total)
+        packed = self._packed
+        commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
         self.last_forces = forces
-        return self._command(q, dt)
+        return Command(*commands)
 
-    def _command(self, q: Array, dt: float) -> Command:
-        lead = self._reference - q
-        blocked = (np.abs(lead) > LEASH * self._max_velocity) & (lead * self.velocity > 0)
-        reference = self._reference + np.where(blocked, 0.0, self.velocity * dt)
-        self._reference = reference.clip(self.robot.limits[:, 0], self.robot.limits[:, 1])
-        limited = torque(self.velocity, self.acceleration).clip(-self._max_torque, self._max_torque)
-        return Command(self._reference, self.velocity, limited)
+    def _at_rest(self, q: Array) -> Array:
+        state: Array = self._compiled.at_rest(self._packed.integers, self._packed.floats, q)
+        return state
 
-    def _client_forces(self, q: Array) -> Array:
-        """f_config and f_work (thesis eqs. 5.9-5.10)."""
-        total = self._bounded(self._client) if self._client.any() else np.zeros(len(q))
+    def _add_client(self, q: Array, total: Array) -> None:
+        """Add f_config and f_work (thesis eqs. 5.9-5.10)."""
+        integers, floats = self._packed.integers, self._packed.floats
+        self._compiled.add_client(integers, floats, self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[:3].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
-            total = total + self._bounded(projected)
-        return total
+            self._compiled.add_client(integers, floats, projected, total)
 
-    def _bounded(self, f: Array) -> Array:
-        g = self.gains
-        if g.law == "default":
-            return squash(f, g.max_client, g.client_slope)
-        return np.concatenate([squash_norm(f[p.slice], g.max_client, g.client_slope) for p in self.robot.parts.values()])
 
-    @staticmethod
-    def _checked(what: str, value: Array, length: int) -> Array:
-        array = np.array(value, dtype=float)
-        if array.shape != (length,) or not np.isfinite(array).all():
-            raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
-        return array
+def _checked(what: str, value: Array, length: int) -> Array:
+    """A copy of what must be that many finite numbers."""
+    array = np.array(value, dtype=np.float64)
+    if array.shape != (length,) or not math.isfinite(array.dot(array)):
+        raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
+    return array

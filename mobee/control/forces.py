@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from mobee.control.collision import Propagate, collision_forces
-from mobee.control.constraints import ClauseRows, clause_forces, clause_forces_2014, stack_clauses
 from mobee.control.gains import Gains
-from mobee.control.limits import limit_forces
+from mobee.control.load import law
+from mobee.control.pack import Law, pack
+from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array, Robot
 
 if TYPE_CHECKING:
     from mobee.model import Pose
+
+# "tree": a contact is felt down to the base, so that a hand on the table also stops the torso; "part": by the part's own motors.
+Propagate = Literal["tree", "part"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,18 +39,19 @@ def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", c
     `propagate`: how far down the body a contact is felt.  `contact_forces` False leaves f_coll
     at zero, for the control experiment in which touching has no effect.
     """
-    robot = pose.robot
-    clauses = clause_forces_2014 if gains.law == "published_2014" else clause_forces
-    collision = np.zeros(len(pose.q))
-    if contact_forces:
-        collision = collision_forces(robot, pose.projection if propagate == "tree" else pose.projection_of_part, gains)
-    return Forces(
-        limit_forces(pose.q, robot.limits, gains.limit_width, gains.max_limit),
-        clauses(_rows(robot), pose.q, gains.constraint_width, gains.max_constraint),
-        collision,
-    )
+    return forces_of(_packed(pose.robot, gains, contact_forces), pose, propagate)
+
+
+def forces_of(packed: Law, pose: Pose, propagate: Propagate) -> Forces:
+    """The constraint forces at one pose, of a packed law."""
+    if pose.q.ndim != 1:
+        raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")
+    if propagate not in ("tree", "part"):
+        raise UnknownName("propagation", propagate, ("tree", "part"))
+    torque = pose.projection if propagate == "tree" else pose.projection_of_part
+    return Forces(*law().forces_at(packed.integers, packed.floats, pose.q, torque))
 
 
 @lru_cache(maxsize=8)
-def _rows(robot: Robot) -> ClauseRows:
-    return stack_clauses(robot.clauses, len(robot.motor_table))
+def _packed(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
+    return pack(robot, gains, contact_forces=contact_forces)

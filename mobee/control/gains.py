@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Literal
 
@@ -13,6 +13,10 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array
 
 Law = Literal["default", "published_2014"]
+ClientSquash = Literal["each", "direction"]
+
+_OF_MOTORS = ("damping", "stiffness", "max_spring", "limit_width", "max_limit", "client_slope", "max_client", "weight")
+Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor names; value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +27,9 @@ class Gains:
     `stiffness` K in 1/s^2, each of the `max_` in rad/s^2.  `limit_width` in rad; `constraint_width` in rad along the
     row's normal (published law: in units of a.q + b).  `contact_gain`: default law, rad/s^2 for a lever
     and penetration of 1 m; published law, deg/s^2 before it is squared.  `contact_slope`, `client_slope`: the slope
-    of the squash at 0.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
-    none does; a motor of weight 0 is never moved.
+    of the squash at 0.  `client_squash`: whether a client's force is bounded motor by motor (eq. 5.8 as printed), or in each part
+    by its norm, which keeps its direction.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
+    none does; a motor of weight 0 is never moved.  `motors`: (pattern, gains of these motors), see `with_motors`.
     """
 
     law: Law
@@ -41,14 +46,24 @@ class Gains:
     client_slope: float
     max_client: float
     settle: Settle
+    client_squash: ClientSquash = "each"
     weights: tuple[tuple[str, float], ...] = ()
+    motors: tuple[tuple[str, Changes], ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if isinstance(value, float) and not (value > 0 and np.isfinite(value)):
-                raise InvalidValue(f"gain {name} {value}: must be a finite number above 0")
-        for pattern, weight in self.weights:
+            if isinstance(value, float):
+                _require_positive(name, value)
+        if self.client_squash not in ("each", "direction"):
+            raise UnknownName("client_squash", self.client_squash, ("each", "direction"))
+        for pattern, changes in self.motors:
+            for name, value in changes:
+                if name not in _OF_MOTORS:
+                    raise UnknownName("gain of single motors", name, _OF_MOTORS)
+                if name != "weight":
+                    _require_positive(f"{name} of the motors {pattern!r}", value)
+        for pattern, weight in (*self.weights, *self._changed("weight")):
             if weight not in (0, 1):
                 raise InvalidValue(f"weight {weight} of the motors {pattern!r}: must be 0 (never moved) or 1")
 
@@ -96,6 +111,7 @@ class Gains:
             max_contact=np.deg2rad(1200.0),
             client_slope=50.0,
             max_client=np.deg2rad(1000.0),
+            client_squash="direction",
             settle=Settle(speed=np.deg2rad(1.0), acceleration=np.deg2rad(50.0)),
             weights=tuple((p, 0.0) for p in ("eyes_*", "?_hand_*", "?_thumb_*", "?_index_*", "?_middle_*", "?_pinky")),
         )
@@ -108,6 +124,35 @@ class Gains:
             raise UnknownName("gain set", name, sets)
         return sets[name]()
 
+    def with_motors(self, pattern: str, **gains: float) -> Gains:
+        """Give the motors that match a pattern gains of their own, as `gains.with_motors("*_elbow", stiffness=50.0)`.
+
+        What is set last counts first.  Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
+        client_slope, max_client and weight; clauses and contacts bind several motors and have one set of gains.
+        """
+        return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
+
+    def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
+        """A gain of each of the motors, shape (n,); raises UnknownName for a pattern of `with_motors` that matches none."""
+        for pattern, _ in self.motors:
+            if not any(fnmatchcase(m, pattern) for m in motors):
+                raise UnknownName("motor pattern", pattern, motors)
+        common: float = getattr(self, name)
+        return _first_match(self._changed(name), motors, common)
+
     def weight(self, motors: tuple[str, ...]) -> Array:
         """The weight of each of the motors, shape (n,)."""
-        return np.array([next((w for pattern, w in self.weights if fnmatchcase(m, pattern)), 1.0) for m in motors])
+        return _first_match((*self._changed("weight"), *self.weights), motors, 1.0)
+
+    def _changed(self, name: str) -> Changes:
+        """The patterns that change a gain, with its value."""
+        return tuple((pattern, value) for pattern, changes in self.motors for changed, value in changes if changed == name)
+
+
+def _first_match(values: Changes, motors: tuple[str, ...], common: float) -> Array:
+    return np.array([next((value for pattern, value in values if fnmatchcase(m, pattern)), common) for m in motors])
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (value > 0 and np.isfinite(value)):
+        raise InvalidValue(f"gain {name} {value}: must be a finite number above 0")

@@ -1,19 +1,28 @@
-"""The force that keeps a motor inside its limits (thesis eqs. 5.12-5.13)."""
+"""The force that keeps a motor inside its limits (thesis eqs. 5.12-5.13).  Compiled."""
 
 from __future__ import annotations
 
-import numpy as np
+from mobee.control.layout import F_MOTOR, FELT, HIGH, I_FELT, LIMIT_WIDTH, LOW, MAX_LIMIT, MOTOR
+from mobee.engine.compiled import inner_exact
+from mobee.robot.robot import Array, Ints
 
-from mobee.robot.robot import Array
 
+@inner_exact
+def limit_force(q: float, low: float, high: float, width: float, maximum: float) -> float:
+    """Zero inside [low + width, high - width], a linear ramp inward to `maximum` at the limit and on beyond it (eq. 5.12).
 
-def limit_forces(q: Array, limits: Array, width: float, maximum: float) -> Array:
-    """Zero inside [min + width, max - width], a linear ramp inward to `maximum` at the limit and on beyond it.
-
-    `q` (..., n) and `limits` (n, 2) rad; `width` rad; `maximum` and the result (..., n) in rad/s^2.  The thesis prints
-    the ranges of eq. 5.12 wrong: continuity and the direction (inward) decide.  Where a motor's range is
-    narrower than two widths the two ramps add up, to zero in the middle.
+    Angles in rad, forces in rad/s^2.  The thesis prints the ranges wrong: continuity and the direction (inward) decide.  Where a
+    motor's range is narrower than two widths the two ramps add up, to zero in the middle.
     """
-    below = np.maximum(limits[:, 0] + width - q, 0.0)
-    above = np.maximum(q - limits[:, 1] + width, 0.0)
+    below = max(low + width - q, 0.0)
+    above = max(q - high + width, 0.0)
     return maximum / width * (below - above)
+
+
+@inner_exact
+def limit_forces(integers: Ints, floats: Array, q: Array, force: Array) -> None:
+    """Fill `force` (n,) with the force of every motor that is felt (eq. 5.13)."""
+    for k in range(integers[FELT]):
+        i = integers[integers[I_FELT] + k]
+        o = F_MOTOR + i * MOTOR
+        force[i] = limit_force(q[i], floats[o + LOW], floats[o + HIGH], floats[o + LIMIT_WIDTH], floats[o + MAX_LIMIT])

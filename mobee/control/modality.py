@@ -21,8 +21,3 @@ class Command:
     position: Array  # rad
     velocity: Array  # rad/s
     torque: Array  # N m
-
-
-def torque(velocity: Array, acceleration: Array) -> Array:
-    """The torque [N m] that gives a motor this velocity [rad/s] and acceleration [rad/s^2]; gravity is not compensated yet."""
-    return INERTIA * acceleration + FRICTION * velocity

@@ -7,11 +7,13 @@ from typing import Literal
 
 import numpy as np
 
+from mobee.control.layout import MOVING, SETTLED, TIMED_OUT
+from mobee.control.load import law
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 
 Verdict = Literal["moving", "settled", "timeout"]
-ROUNDING = 1e-9  # s, times are sums of ticks
+_VERDICTS: dict[int, Verdict] = {MOVING: "moving", SETTLED: "settled", TIMED_OUT: "timeout"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,11 @@ class Settle:
             if not getattr(self, name) > 0:
                 raise InvalidValue(f"settle {name} {getattr(self, name)}: must be above 0")
 
+    @property
+    def numbers(self) -> Array:
+        """As the compiled test reads them, (5,)."""
+        return np.array([self.speed, self.acceleration, self.first_look, self.interval, self.timeout])
+
 
 class SettleTest:
     """One action's test: looks at the commanded motion now and then, as the original's poll did."""
@@ -39,18 +46,12 @@ class SettleTest:
     def __init__(self, settle: Settle, start: float) -> None:
         """Begin at time `start` [s]."""
         self.settle = settle
-        self.start = start
-        self._next_look = start + settle.first_look
+        self._numbers = settle.numbers
+        self._memory = np.array([start, start + settle.first_look])
 
     def look(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
         """Judge the part's motion at time t [s]; between two looks the answer is always "moving".
 
         `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,).
         """
-        if t >= self._next_look - ROUNDING:
-            missed = np.floor((t - self._next_look + ROUNDING) / self.settle.interval)
-            self._next_look += (missed + 1) * self.settle.interval
-            slow = np.all(np.abs(speeds) <= self.settle.speed)
-            if slow and np.all(np.abs(accelerations) <= self.settle.acceleration):
-                return "settled"
-        return "timeout" if t - self.start >= self.settle.timeout - ROUNDING else "moving"
+        return _VERDICTS[law().look(self._numbers, self._memory, t, np.array([speeds, accelerations], dtype=np.float64))]

@@ -1,22 +1,31 @@
-"""The sigmoid that bounds a force (thesis eq. 5.8): L(v) = m v / (m/k + |v|), maximum m, slope k at 0."""
+"""The sigmoid that bounds a force (thesis eq. 5.8): L(v) = m v / (m/k + |v|), maximum m, slope k at 0.  Compiled."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
+from mobee.engine.compiled import inner_exact
 from mobee.robot.robot import Array
 
 
-def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
-    """Bound every dimension by itself; the direction of v is not preserved (thesis eq. 5.8).
-
-    `v`: (..., n); `maximum` in the unit of the result, `slope` in that unit per unit of v, both scalar or (n,).
-    """
-    return maximum * v / (maximum / slope + np.abs(v))
+@inner_exact
+def squash(v: float, maximum: float, slope: float) -> float:
+    """One dimension (eq. 5.8); `maximum` in the unit of the result, `slope` in that unit per unit of v."""
+    return maximum * v / (maximum / slope + abs(v))
 
 
-def squash_norm(v: Array, maximum: float, slope: float) -> Array:
-    """Bound the Euclidean norm of v (..., n) over its last axis and keep its direction."""
-    norm = np.sqrt((v * v).sum(axis=-1, keepdims=True))
-    squashed: Array = maximum * v / (maximum / slope + norm)
-    return squashed
+@inner_exact
+def squash_norm(v: Array, first: int, stop: int, maximum: float, slope: float) -> None:
+    """Bound the Euclidean norm of v[first:stop] and keep its direction."""
+    length = norm(v, first, stop)
+    for i in range(first, stop):
+        v[i] = maximum * v[i] / (maximum / slope + length)
+
+
+@inner_exact
+def norm(v: Array, first: int, stop: int) -> float:
+    """The Euclidean norm of v[first:stop]."""
+    squares = 0.0
+    for i in range(first, stop):
+        squares += v[i] * v[i]
+    return math.sqrt(squares)

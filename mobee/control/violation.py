@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.control.constraints import stack_clauses
+from mobee.control.clauses import stack_clauses
 from mobee.errors import InvalidValue
 from mobee.pose import Pose
 from mobee.robot.robot import Robot

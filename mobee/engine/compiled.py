@@ -20,6 +20,7 @@ FOLDER = cache_folder()
 # Not `nnan`/`ninf`: the engine tells NaN from numbers.
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 _AS_WRITTEN = {"contract"}
+_EXACT: set[str] = set()  # also no multiplication joined to an addition, which depends on what the compiler sees around it
 
 
 def entry(*signatures: str) -> Callable[[F], F]:
@@ -55,6 +56,20 @@ def inner_with_memory(function: F) -> F:
 def inner_as_written(function: F) -> F:
     """Like `inner`, for sums whose rounding depends on their order: no term is moved."""
     return _njit(function, (), _AS_WRITTEN, counting=False)
+
+
+def entry_exact(*signatures: str) -> Callable[[F], F]:
+    """Like `entry`, rounded as Python would: the result is the same to the last bit wherever the function is made part of another."""
+
+    def compile_now(function: F) -> F:
+        return _njit(function, signatures, _EXACT, counting=True)
+
+    return compile_now
+
+
+def inner_exact(function: F) -> F:
+    """Like `inner`, rounded as Python would, see `entry_exact`."""
+    return _njit(function, (), _EXACT, counting=False)
 
 
 def _njit(function: F, signatures: tuple[str, ...], fast: set[str], counting: bool) -> F:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mobee.collision.touch import touched
 from mobee.control import Command, Controller, Gains, SettleTest
-from mobee.control.collision import Propagate
+from mobee.control.forces import Propagate
 from mobee.control.modality import Modality
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome

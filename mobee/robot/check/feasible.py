@@ -7,7 +7,7 @@ from itertools import chain, islice, product
 
 import numpy as np
 
-from mobee.control.constraints import stack_clauses
+from mobee.control.clauses import stack_clauses
 from mobee.robot.robot import Array, Clause
 
 CHOICES = 64  # ways of choosing a row of every clause that are tried, after those that are nearly satisfied

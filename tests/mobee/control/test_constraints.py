@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.constraints import clause_forces, clause_forces_2014, stack_clauses
+from mobee.control import Gains
 from mobee.robot.robot import Clause
+from tests.mobee.control.oracle import compiled_forces
+from tests.mobee.control.two_parts import two_part_arm
 
 WIDTH, MAXIMUM = 0.2, 30.0
 PLANE = Clause("arm", np.array([[1.71, -1.71, 0.0]]), np.array([0.5]))
@@ -15,7 +19,8 @@ angles = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3).map(np.array)
 
 
 def force(clauses: list[Clause], q: np.ndarray) -> np.ndarray:
-    return clause_forces(stack_clauses(clauses, 3), q, WIDTH, MAXIMUM)
+    gains = replace(Gains.default(), constraint_width=WIDTH, max_constraint=MAXIMUM)
+    return compiled_forces(replace(two_part_arm(), clauses=tuple(clauses)), gains, q).constraints
 
 
 def on_plane(depth: float) -> np.ndarray:
@@ -54,12 +59,12 @@ def test_clauses_add_up() -> None:
 
 def test_a_robot_without_constraints_feels_none() -> None:
     assert np.array_equal(force([], np.zeros(3)), np.zeros(3))
-    assert np.array_equal(clause_forces_2014(stack_clauses([], 3), np.zeros(3), 1.0, 1.0), np.zeros(3))
+    assert np.array_equal(published([0.0, 0.0, 0.0], []), np.zeros(3))
 
 
 def published(degrees: list[float], clauses: list[Clause]) -> np.ndarray:
-    q, width, maximum = np.deg2rad(degrees), np.deg2rad(40.0), np.deg2rad(1500.0)
-    return np.rad2deg(clause_forces_2014(stack_clauses(clauses, 3), q, width, maximum))
+    robot = replace(two_part_arm(), clauses=tuple(clauses))
+    return np.rad2deg(compiled_forces(robot, Gains.published_2014(), np.deg2rad(degrees)).constraints)
 
 
 def test_the_published_law_counts_in_units_of_the_row() -> None:

@@ -1,66 +1,42 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.dynamics import acceleration, largest_step, require_stable
+from mobee.control.dynamics import acceleration, bounded, led
 from mobee.control.gains import Gains
-from mobee.errors import InvalidValue
 
-ZERO = np.zeros(1)
+
+def accelerated(error: float, velocity: float, force: float, gains: Gains) -> float:
+    return acceleration(0.0, velocity, error, force, gains.stiffness, gains.max_spring, gains.damping)
 
 
 def test_the_published_spring_by_hand() -> None:
     """1000 e / (1000/50 + |e|) deg/s^2 at e = 30 deg is 600; damping 50 a degree per second."""
-    a = acceleration(ZERO, np.deg2rad([2.0]), np.deg2rad([30.0]), ZERO, Gains.published_2014())
-    assert np.rad2deg(a) == pytest.approx([600.0 - 100.0])
+    a = accelerated(np.deg2rad(30.0), np.deg2rad(2.0), 0.0, Gains.published_2014())
+    assert np.rad2deg(a) == pytest.approx(600.0 - 100.0)
 
 
 def test_forces_add_to_the_acceleration() -> None:
-    gains = Gains.default()
-    free = acceleration(ZERO, ZERO, ZERO, ZERO, gains)
-    assert free == pytest.approx([0.0])
-    assert acceleration(ZERO, ZERO, ZERO, np.array([3.0]), gains) == pytest.approx([3.0])
+    assert accelerated(0.0, 0.0, 0.0, Gains.default()) == 0.0
+    assert accelerated(0.0, 0.0, 3.0, Gains.default()) == pytest.approx(3.0)
 
 
-def integrate(damping: float, stiffness: float, dt: float, steps: int = 3000) -> float:
-    q, v = 1.0, 0.0
-    for _ in range(steps):
-        v += dt * (-stiffness * q - damping * v)
-        q += dt * v
-    return abs(q) + abs(v) * dt
+@given(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0))
+def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> None:
+    told = bounded(wanted, sent, 1.0, 0.1)
+    assert abs(told - sent) <= 0.1 + 1e-12
+    assert abs(told) <= max(1.0, abs(sent) - 0.1 + 1e-12)
+    if abs(wanted) <= 1.0 and abs(wanted - sent) <= 0.1:
+        assert told == pytest.approx(wanted, abs=1e-12)
 
 
-@given(st.floats(5.0, 60.0), st.floats(10.0, 500.0))
-def test_the_bound_divides_stable_from_unstable_steps(damping: float, stiffness: float) -> None:
-    gains = replace(Gains.default(), damping=damping, stiffness=stiffness)
-    stiffest = stiffness + gains.max_limit / gains.limit_width + gains.max_constraint / gains.constraint_width
-    step = largest_step(gains)
-    with np.errstate(over="ignore"):
-        assert integrate(damping, stiffest, 0.97 * step) < 1.0
-        assert integrate(damping, stiffest, 1.03 * step, 1000) > 10.0
-
-
-def test_both_sets_are_stable_at_100_hz_even_when_a_tick_is_missed() -> None:
-    for gains in (Gains.default(), Gains.published_2014()):
-        require_stable(gains, 0.02)
-
-
-def test_the_published_damping_at_40_ms_is_refused_with_the_bound_it_breaks() -> None:
-    with pytest.raises(InvalidValue, match=r"damping \* dt = 2, must be below 2"):
-        require_stable(Gains.published_2014(), 0.04)
-
-
-def test_too_stiff_is_refused_with_the_other_bound() -> None:
-    with pytest.raises(InvalidValue, match=r"stiffness \* dt\^2"):
-        require_stable(replace(Gains.default(), stiffness=1e5), 0.01)
-
-
-@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf])
-def test_a_step_that_is_no_time_is_refused(dt: float) -> None:
-    with pytest.raises(InvalidValue, match="time step"):
-        require_stable(Gains.default(), dt)
+@pytest.mark.parametrize(
+    ("reference", "q", "velocity", "then"),
+    [(0.1, 0.0, 1.0, 0.11), (0.4, 0.0, 1.0, 0.4), (0.4, 0.0, -1.0, 0.39), (-0.4, 0.0, -1.0, -0.4), (0.995, 0.9, 1.0, 1.0)],
+    ids=["goes on", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
+)
+def test_the_position_reference(reference: float, q: float, velocity: float, then: float) -> None:
+    assert led(reference, q, velocity, 0.01, 0.3, -1.0, 1.0) == pytest.approx(then)

@@ -40,3 +40,40 @@ def test_named_sets() -> None:
 def test_nonsense_is_refused_with_its_name(change: dict[str, object]) -> None:
     with pytest.raises(InvalidValue, match=next(iter(change)).rstrip("s")):
         replace(Gains.default(), **change)
+
+
+def test_motors_can_have_gains_of_their_own_the_last_set_counts_first() -> None:
+    gains = Gains.default().with_motors("*_elbow", stiffness=50.0, weight=0.0).with_motors("l_*", stiffness=70.0)
+    motors = ("l_elbow", "r_elbow", "torso_yaw")
+    assert gains.of_motors("stiffness", motors).tolist() == [70.0, 50.0, 100.0]
+    assert gains.of_motors("damping", motors).tolist() == [40.0] * 3
+    assert gains.weight(motors).tolist() == [0, 0, 1]
+
+
+def test_gains_with_motors_are_values() -> None:
+    first, second = (Gains.default().with_motors("*_elbow", stiffness=50, damping=30) for _ in range(2))
+    assert first == second and hash(first) == hash(second) and first != Gains.default()
+    assert "('*_elbow', (('damping', 30), ('stiffness', 50)))" in repr(first)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"stifness": 1.0}, "Did you mean 'stiffness'"),
+        ({"damping": -1.0}, r"damping of the motors '\*_elbow' -1"),
+        ({"weight": 2}, "weight 2"),
+    ],
+)
+def test_nonsense_for_some_motors_is_refused(changes: dict[str, float], said: str) -> None:
+    with pytest.raises((InvalidValue, UnknownName), match=said):
+        Gains.default().with_motors("*_elbow", **changes)
+
+
+def test_a_pattern_that_matches_no_motor_is_refused_where_the_robot_is_known() -> None:
+    with pytest.raises(UnknownName, match="motor pattern 'l_elbw'.*Did you mean 'l_elbow'"):
+        Gains.default().with_motors("l_elbw", damping=30.0).of_motors("damping", ("l_elbow", "r_elbow"))
+
+
+def test_an_unknown_squash_is_refused() -> None:
+    with pytest.raises(UnknownName, match="'norm'.*Valid: direction, each"):
+        replace(Gains.default(), client_squash="norm")

@@ -1,17 +1,14 @@
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.limits import limit_forces
-
-LIMITS = np.array([[-3.0, 3.0]])
+from mobee.control.limits import limit_force
 
 
 def at(q: float, width: float = 1.0, maximum: float = 1.0) -> float:
-    return float(limit_forces(np.array([q]), LIMITS, width, maximum)[0])
+    return limit_force(q, -3.0, 3.0, width, maximum)
 
 
 @given(st.floats(-2.0, 2.0))
@@ -38,6 +35,5 @@ def test_the_ramp_goes_on_beyond_the_limit(beyond: float) -> None:
 
 
 def test_a_range_narrower_than_the_ramps_is_pushed_to_its_middle() -> None:
-    limits = np.array([[0.0, 0.5]])
-    force = [float(limit_forces(np.array([q]), limits, 1.0, 1.0)[0]) for q in (0.1, 0.25, 0.4)]
+    force = [limit_force(q, 0.0, 0.5, 1.0, 1.0) for q in (0.1, 0.25, 0.4)]
     assert force[0] > 0 and force[1] == pytest.approx(0.0) and force[2] < 0

@@ -29,7 +29,7 @@ def test_one_fast_or_accelerated_motor_keeps_the_part_moving() -> None:
 
 def test_a_part_that_never_rests_times_out() -> None:
     test = SettleTest(SETTLE, 1.0)
-    verdicts = [test.look(1.0 + 0.01 * k, np.ones(1), REST) for k in range(2001)]
+    verdicts = [test.look(1.0 + 0.01 * k, np.ones(3), REST) for k in range(2001)]
     assert verdicts.count("timeout") == 1 and verdicts[-1] == "timeout"
 
 
@@ -40,7 +40,7 @@ def test_ticks_that_add_up_to_almost_a_second_count_as_one() -> None:
 
 def test_looks_missed_by_a_late_caller_are_not_made_up_for() -> None:
     test = SettleTest(SETTLE, 0.0)
-    assert test.look(1.55, np.ones(1), REST) == "moving"
+    assert test.look(1.55, np.ones(3), REST) == "moving"
     assert test.look(1.59, REST, REST) == "moving"
     assert test.look(1.6, REST, REST) == "settled"
 

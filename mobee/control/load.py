@@ -1,0 +1,17 @@
+"""The compiled law, imported when it is first needed: `import mobee` compiles and loads no machine code."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import ModuleType
+
+
+@cache
+def law() -> ModuleType:
+    """The module `mobee.control.law`, after the whole engine: a process compiles all of it at once, with progress, or nothing."""
+    from mobee.engine.load import load
+
+    load()
+    from mobee.control import law as compiled
+
+    return compiled

@@ -1,0 +1,83 @@
+"""Up to which time step the law is stable, motor by motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from mobee.control.clauses import stack_clauses
+from mobee.control.gains import Gains
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """The largest step, and the motion that becomes unstable there."""
+
+    step: float  # s
+    motor: str  # that moves most in it
+    damping: float  # 1/s, along that motion
+    stiffness: float  # 1/s^2
+
+
+def largest_step(robot: Robot, gains: Gains) -> float:
+    """The time step [s] at which the semi-implicit Euler step of the law stops being stable."""
+    return stability_bound(robot, gains).step
+
+
+def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
+    """Raise InvalidValue if the law cannot be integrated with steps of dt [s], naming the motor and the bound that is broken."""
+    if not (dt > 0 and np.isfinite(dt)):
+        raise InvalidValue(f"time step {dt} s: must be a finite time above 0")
+    bound = stability_bound(robot, gains)
+    if dt < bound.step:
+        return
+    c, k = bound.damping, bound.stiffness
+    broken = (
+        f"damping * dt = {c * dt:.3g}, must be below 2"
+        if c * dt >= 2
+        else f"stiffness * dt^2 = {k * dt * dt:.3g} with limits and clauses, must be below 4 - 2 damping dt = {4 - 2 * c * dt:.3g}"
+    )
+    raise InvalidValue(
+        f"gains unstable at steps of {dt:.4g} s: at {bound.motor}, {broken}. Use steps below {bound.step:.4g} s or less damping."
+    )
+
+
+@lru_cache(maxsize=8)
+def stability_bound(robot: Robot, gains: Gains) -> Bound:
+    """Where all springs act at once (attractor, limits, all clauses), at their steepest.
+
+    With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive
+    definite: with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular.  Contacts are not in the bound: their
+    stiffness depends on the pose and on how many there are, and their force is bounded (docs/control.md).
+    """
+    moved = np.flatnonzero(gains.weight(robot.motors) > 0)
+    if not len(moved):
+        return Bound(np.inf, "no motor", 0.0, 0.0)
+    damping = gains.of_motors("damping", robot.motors)[moved]
+    stiffness = _stiffness(robot, gains)[np.ix_(moved, moved)]
+    one = np.eye(len(moved))
+    values, vectors = np.linalg.eig(np.block([[np.diag(damping) / 2.0, stiffness / 4.0], [one, 0.0 * one]]))
+    most = int(values.real.argmax())
+    motion = vectors[len(moved) :, most].real
+    motion = motion / np.linalg.norm(motion)
+    motor = robot.motors[moved[int(np.abs(motion).argmax())]]
+    return Bound(float(1.0 / values[most].real), motor, float(damping @ motion**2), float(motion @ stiffness @ motion))
+
+
+def _stiffness(robot: Robot, gains: Gains) -> Array:
+    """The steepest springs of all motors, symmetric, (n, n) in 1/s^2."""
+    width = gains.of_motors("limit_width", robot.motors)
+    ramps = np.where(robot.limits[:, 1] - robot.limits[:, 0] < 2.0 * width, 2.0, 1.0)  # in a narrow range both act
+    single = gains.of_motors("stiffness", robot.motors) + ramps * gains.of_motors("max_limit", robot.motors) / width
+    rows = stack_clauses(robot.clauses, len(robot.motors))
+    slope = gains.max_constraint / gains.constraint_width
+    if gains.law == "published_2014":
+        steep = slope * rows.norms
+    else:  # all rows of a clause push by what one of them lacks: by at most the root of their number more than if each were alone
+        steep = slope * np.sqrt(np.bincount(rows.clause))[rows.clause] if len(rows.b) else rows.norms
+    found: Array = np.diag(single) + (rows.normals.T * steep) @ rows.normals
+    return found
