@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from services.common.session import NAMESPACE
+
 MODES = ("off", "one", "two")
 TITLES = {"off": "without MoBeE", "one": "MoBeE 1.0", "two": "MoBeE 2.0"}
 RATE = 50.0  # Hz, the published control period
+FILTERED = "icub_filtered"  # namespace of the robot that MoBeE 1.0 offers
 SPEED = 0.2  # of the motors' top speed, thesis 4.1.1
 
 _ROBOT = """title = "Babbling {title}"
@@ -23,13 +26,12 @@ rate = {rate:g}
 ticks = {ticks}
 record = {record}
 """
-_BABBLER = """
-[services.babbler]
-module = "experiments.babbling.babbler"
-at = "{at}"
-ticks = {ticks}
-speed = {speed:g}
-run_dir = {folder}
+_ONE = """participants = ["port_filter"]
+
+[services.port_filter]
+module = "services.port_filter"
+clients = "icub_filtered"
+participants = ["babbler"]
 """
 _TWO = """
 [services.model]
@@ -37,17 +39,25 @@ _TWO = """
 [services.controller]
 speed_scale = {speed:g}
 """
+_BABBLER = """
+[services.babbler]
+module = "experiments.babbling.babbler"
+at = "{at}"
+ticks = {ticks}
+robot_of = "{robot_of}"
+speed = {speed:g}
+run_dir = {folder}
+"""
 
 
 def scenario(mode: str, folder: Path, seed: int, minutes: float) -> str:
     """The scenario's text; what is measured goes to the folder."""
-    ticks = round(60.0 * minutes * RATE)
-    at = "goals" if mode == "two" else "drives"
+    ticks, where = round(60.0 * minutes * RATE), _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
-    text = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=_quoted(folder))
-    if mode == "two":
-        text += _TWO.format(speed=SPEED)
-    return text + _BABBLER.format(at=at, ticks=ticks, speed=SPEED, folder=_quoted(folder))
+    at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
+    between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
+    robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where)
+    return robot + between + _BABBLER.format(at=at, robot_of=robot_of, ticks=ticks, speed=SPEED, folder=where)
 
 
 def _quoted(path: Path) -> str:

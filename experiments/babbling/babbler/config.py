@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from services.common.config import ServiceConfig
+from services.common.session import NAMESPACE
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
@@ -14,6 +15,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     at: Literal["drives", "goals"] = "drives"
     """Whom it commands: the drives of the robot, or the goals of the controller."""
+    robot_of: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
+    """Namespace of the robot that it commands: the robot's own, or that of a filter in front of it."""
     ticks: Annotated[int, Meta(gt=0)] = 15_000
     """It ends after so many."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.2

@@ -16,10 +16,10 @@ from services.common.service import Service
 
 
 class BabblerNode:
-    """Counts the ticks, writes down every command, and answers the barrier."""
+    """Counts the ticks, writes down every command, and answers the barrier; the process ends when its ticks are over."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        self._service, self._ticks = service, config.ticks
+        self._ticks = config.ticks
         self._log = CommandLog(Path(config.run_dir) / COMMANDS)
         self._participant = Participant(service)
         self._commands = 0
@@ -29,11 +29,6 @@ class BabblerNode:
         else:
             self._mover = AtGoals(service, robot, targets, self._note, self._tick)
         service.describe = lambda: (f"{self._commands} commands", {"commands": self._commands})
-
-    def run(self) -> None:
-        """Babble until its ticks are over; the process then ends."""
-        self._service.ready()
-        self._service.run()
 
     def _tick(self, clock: Clock) -> None:
         is_over = clock.k >= self._ticks

@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from experiments.babbling.contacts import Touch, depth_histogram, read_touches, touches
+
+HAND, ELBOW = "l_hand table", "chest l_elbow"
+
+
+def test_ticks_in_contact_are_one_event_until_the_pair_was_apart_for_long_enough() -> None:
+    rows = [(5, HAND, 0.001), (6, HAND, 0.003), (10, HAND, 0.002), (16, HAND, 0.004)]
+    assert touches(rows, apart=5) == [Touch(HAND, 5, 10, 0.003), Touch(HAND, 16, 16, 0.004)]
+
+
+def test_pairs_are_events_of_their_own_in_order_of_time() -> None:
+    rows = [(5, HAND, 0.001), (5, ELBOW, 0.002), (6, HAND, 0.001), (7, ELBOW, 0.001)]
+    assert touches(rows, apart=5) == [Touch(ELBOW, 5, 7, 0.002), Touch(HAND, 5, 6, 0.001)]
+
+
+def test_a_record_is_read_up_to_the_last_tick_and_not_what_a_kill_has_cut(tmp_path: Path) -> None:
+    (tmp_path / "contacts.csv").write_text(f"k,pair,depth\n3,{HAND},0.001\n9,{ELBOW},0.002\n90,{HAND},0.003\n91,l_ha")
+    assert read_touches(tmp_path / "contacts.csv", dt=0.02, last=20) == [Touch(HAND, 3, 3, 0.001), Touch(ELBOW, 9, 9, 0.002)]
+
+
+def test_every_event_is_in_one_range_of_the_histogram() -> None:
+    depths = [0.0001, 0.0005, 0.0015, 0.002, 0.007, 0.02]
+    histogram = depth_histogram(Touch(HAND, i, i, depth) for i, depth in enumerate(depths))
+    assert histogram == {"<0.5": 1, "0.5-1": 1, "1-2": 1, "2-5": 1, "5-10": 1, ">10": 1}

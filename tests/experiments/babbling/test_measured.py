@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.babbling.command_log import COMMANDS, Commanded, CommandLog, finished_at, read_commands
+from experiments.babbling.measured import CONTACTS, POSITIONS, TOLERANCE, judge, measure, read_trial, write_trial
+from experiments.babbling.moved import moved_motors
+from mobee import load_robot
+from mobee.errors import MobeeError
+
+ROBOT = load_robot("icub")
+DT = 0.02
+TICKS = 100
+ENDINGS = dict.fromkeys(ROBOT.parts, "over")
+
+
+def part(name: str) -> slice:
+    return ROBOT.parts[name].slice
+
+
+def ramp(target: np.ndarray) -> np.ndarray:
+    """From home to a posture in all ticks, (ticks, n)."""
+    return ROBOT.home + np.linspace(0.0, 1.0, TICKS)[:, None] * (target - ROBOT.home)
+
+
+def commanded(target: np.ndarray) -> Commanded:
+    return Commanded(2, TICKS + 1, target.tolist(), ENDINGS)
+
+
+def test_a_command_is_completed_deflected_or_returned_part_by_part() -> None:
+    target = ROBOT.home.copy()
+    target[[part("torso").start, part("head").start, part("left_arm").start]] += 0.3
+    end = target.copy()
+    end[part("torso").start] -= 0.9 * TOLERANCE
+    end[part("head").start] -= 1.1 * TOLERANCE
+    end[part("left_arm").start] = ROBOT.home[part("left_arm").start] + 0.5 * TOLERANCE
+    judged = judge(commanded(target), ramp(end), ROBOT, DT)
+    assert judged.outcomes == {"torso": "completed", "head": "deflected", "left_arm": "returned", "right_arm": "completed"}
+    assert judged.duration == pytest.approx((TICKS - 1) * DT)
+    assert judged.way == pytest.approx(0.9)
+    assert judged.path == pytest.approx(0.9 - 2.0 * TOLERANCE - (0.3 - 0.5 * TOLERANCE))
+
+
+def test_the_hands_do_not_count() -> None:
+    target = ROBOT.home.copy()
+    target[part("left_arm").stop - 1] += 0.5
+    assert set(judge(commanded(target), ramp(ROBOT.home), ROBOT, DT).outcomes.values()) == {"completed"}
+
+
+def left_by_a_trial(folder: Path, ticks: int = TICKS) -> None:
+    target = ROBOT.home.copy()
+    target[0] = ROBOT.limits[0, 1] + np.deg2rad(2.0)
+    ramp(target)[:ticks].tofile(folder / POSITIONS)
+    (folder / CONTACTS).write_text("k,pair,depth\n5,l_hand table,0.004\n")
+    log = CommandLog(folder / COMMANDS)
+    log.note(commanded(target))
+    log.finish(TICKS)
+
+
+def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
+    left_by_a_trial(tmp_path)
+    trial = measure(tmp_path, ROBOT, DT)
+    assert trial.seconds == pytest.approx(TICKS * DT)
+    assert trial.motor == ROBOT.motors[0]
+    assert np.rad2deg(trial.beyond) == pytest.approx(2.0)
+    assert [(touch.pair, touch.depth) for touch in trial.touches] == [("l_hand table", 0.004)]
+    assert len(trial.commands) == 1
+    assert trial.jerk_squared == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_trial_whose_record_is_not_whole_is_refused(tmp_path: Path) -> None:
+    left_by_a_trial(tmp_path, ticks=50)
+    with pytest.raises(MobeeError, match="50 of 100 ticks"):
+        measure(tmp_path, ROBOT, DT)
+    (tmp_path / COMMANDS).write_text((tmp_path / COMMANDS).read_text().splitlines()[0] + "\n")
+    with pytest.raises(MobeeError, match="did not come to its end"):
+        measure(tmp_path, ROBOT, DT)
+
+
+def test_what_is_kept_of_a_trial_is_read_as_it_was_written(tmp_path: Path) -> None:
+    left_by_a_trial(tmp_path)
+    trial = measure(tmp_path, ROBOT, DT)
+    write_trial(tmp_path / "trial.json", trial)
+    assert read_trial(tmp_path / "trial.json") == trial
+    assert not list(tmp_path.glob("*.new"))
+
+
+def test_the_log_says_when_it_is_over_and_only_then(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / COMMANDS
+    assert finished_at(path) is None
+    log = CommandLog(path)
+    assert finished_at(path) is None
+    log.note(commanded(ROBOT.home))
+    assert finished_at(path) is None
+    log.finish(77)
+    assert finished_at(path) == 77
+    assert read_commands(path) == [commanded(ROBOT.home)]
+
+
+def test_only_the_babbling_motors_are_judged_against_their_limits(tmp_path: Path) -> None:
+    left_by_a_trial(tmp_path)
+    q = np.fromfile(tmp_path / POSITIONS).reshape(-1, len(ROBOT.motors))
+    still = np.setdiff1d(np.arange(len(ROBOT.motors)), moved_motors(ROBOT))
+    q[:, still] += 9.0
+    q.tofile(tmp_path / POSITIONS)
+    assert measure(tmp_path, ROBOT, DT).motor == ROBOT.motors[0]
