@@ -28,6 +28,7 @@ _ENTRIES = {
     "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, needs={"pybullet": "sim", "icub_models": "sim"}),
     "model": Entry("services.model", "services.model.config:Config", 1),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
+    "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
     "renderer": Entry(
         "services.robot_sim.renderer",
         "services.robot_sim.renderer_config:RendererConfig",

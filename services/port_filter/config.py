@@ -1,0 +1,51 @@
+"""What the port filter is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from mobee.control.reflex import ReflexSettings
+from services.common.config import ServiceConfig
+
+_SETTINGS = ReflexSettings()
+Seconds = Annotated[float, Meta(ge=0, le=60)]
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """The port filter's settings; times in simulated seconds."""
+
+    clients: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = "icub_filtered"
+    """Namespace in which its clients find the robot."""
+    participants: list[str] = []
+    """Lockstep: clients whose answers every tick waits for."""
+    world: str = "table"
+    """Shipped world, or path to a world file."""
+    contacts: Literal["solid", "field", "both"] = "both"
+    """Kinds of contact that call the reflex: bodies, or the larger volumes around them."""
+    tolerance: Annotated[float, Meta(ge=0)] = math.radians(1.0)
+    """By how much a motor limit or a clause may be exceeded, rad."""
+    history: Annotated[float, Meta(gt=0, le=3600)] = _SETTINGS.history
+    """How long poses are remembered, s."""
+    confirm: Seconds = _SETTINGS.confirm
+    """How long a violation must last before it counts, s; 0: the first one counts, as in the original."""
+    release: Seconds = _SETTINGS.release
+    """How long it must be away before it is over, s."""
+    brake: Annotated[float, Meta(ge=0.05, le=60)] = _SETTINGS.brake
+    """How long the robot brakes before it is rewound, s; the safety gate refuses to reverse it in full motion."""
+    dead_time: Seconds = _SETTINGS.dead_time
+    """How long it rests where the rewinding ended, before control goes back to the client, s; 0: as in the original."""
+    pace: Annotated[float, Meta(gt=0, le=10)] = _SETTINGS.pace
+    """Recorded poses that are rewound a tick."""
+    must_be_clear: bool = _SETTINGS.must_be_clear
+    """Go back further from a waypoint that is in contact itself; false: as in the original."""
+    ttl: Annotated[int, Meta(ge=20, le=200)] = 100
+    """Milliseconds after which robot_sim holds a part that it hears nothing for while it is rewound."""
+
+    @property
+    def reflex(self) -> ReflexSettings:
+        """The part of it that is the reflex's."""
+        names = ("history", "confirm", "release", "brake", "dead_time", "pace", "must_be_clear")
+        return ReflexSettings(**{name: getattr(self, name) for name in names})

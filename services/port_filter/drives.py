@@ -1,0 +1,101 @@
+"""Ownership of the drives: the filter owns them at robot_sim, and a client owns them at the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from bus_schema import keys
+from bus_schema.rpc import Driven, Take, Taken, WithEpoch
+from mobee.robot.robot import Robot
+from services.common.rpc import CallFailed
+from services.common.service import CallRefused, Service
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """A client, as long as its token lives."""
+
+    who: str
+    instance: str
+
+
+class DriveDesk:
+    """Passes drive calls on, unless the clients are cut off; robot_sim's epochs are the clients' too."""
+
+    def __init__(self, service: Service, twin: Service, robot: Robot, why_cut: Callable[[], str], on_arm: Callable[[str], None]) -> None:
+        """`why_cut`: why no client may drive now, "" when they may; `on_arm(part)`: a client has just got control."""
+        self._service, self._twin, self._why_cut, self._on_arm = service, twin, why_cut, on_arm
+        self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
+        self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
+        twin.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
+        for verb in ("arm", "release", "hold"):
+            twin.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
+        twin.on_alive(self._note_alive)
+
+    def forget(self) -> None:
+        """A new run: nobody owns anything."""
+        self._owners = dict.fromkeys(self._owners)
+        self.epochs = dict.fromkeys(self.epochs, 0)
+
+    def hold(self, part: str) -> None:
+        """Have robot_sim hold the part; whoever owns it must arm it again."""
+        try:
+            self._call(part, "hold")
+        except CallFailed as failed:
+            self._service.log.warning("%s cannot be held: %s", part, failed)
+
+    def _call(self, part: str, verb: str) -> Driven:
+        return self._service.call(keys.drive(part, verb), WithEpoch, Driven, epoch=self.epochs[part])
+
+    def _take(self, request: Take, key: str) -> Taken:
+        part = key.split("/")[0]
+        self._refuse_while_cut(part)
+        owner = self._owners[part]
+        if owner is not None and owner.instance != request.instance and owner.instance in self._twin.alive.get(owner.who, ()):
+            raise CallRefused("owned", f"{part} belongs to {owner.who}, which lives; it must release the part first")
+        with _passed_on():
+            taken = self._service.call(keys.drive(part, "take"), Take, Taken, instance=self._service.instance)
+        self._owners[part], self.epochs[part] = Owner(request.who, request.instance), taken.epoch
+        return taken
+
+    def _drive(self, request: WithEpoch, key: str) -> Driven:
+        part, verb = key.split("/")[0], key.split("/")[-1]
+        owner = self._owners[part]
+        if owner is None or request.epoch != self.epochs[part]:
+            raise CallRefused("epoch", f"{part}: epoch {request.epoch} does not own it; take it first")
+        if verb == "arm":
+            self._refuse_while_cut(part)
+            if owner.instance not in self._twin.alive.get(owner.who, ()):
+                raise CallRefused("no_token", f"{part}: alive/{owner.who}/{owner.instance} is not there; declare it, then arm")
+        if verb == "release":
+            self._owners[part] = None
+        if self._why_cut():
+            return Driven(v=request.v, gate="hold")  # which is what it looks like; the reflex keeps the drive
+        with _passed_on():
+            driven = self._call(part, verb)
+        if driven.gate == "armed":
+            self._on_arm(part)
+        return driven
+
+    def _refuse_while_cut(self, part: str) -> None:
+        if why := self._why_cut():
+            raise CallRefused("reflex", f"{part}: {why}")
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        for part, owner in self._owners.items():
+            if not up and owner == Owner(who, instance):
+                self._twin.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
+                self._owners[part] = None
+                if not self._why_cut():
+                    self.hold(part)
+
+
+@contextmanager
+def _passed_on() -> Iterator[None]:
+    """What robot_sim refuses is refused to the client, in the same words."""
+    try:
+        yield
+    except CallFailed as failed:
+        raise CallRefused(failed.code, str(failed)) from None

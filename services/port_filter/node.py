@@ -1,0 +1,233 @@
+"""The port filter's tick: states through, judgement, clock through, and the reflex's commands when the clients are cut off."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from bus_schema import VERSION, keys
+from bus_schema.messages import Clock, Command, State
+from bus_schema.rpc import Done, Empty
+from mobee.robot.robot import Array, Robot
+from services.common.lockstep import Barrier, Participant
+from services.common.service import CallRefused, Service
+from services.port_filter.commands import Commands
+from services.port_filter.config import Config
+from services.port_filter.drives import DriveDesk
+from services.port_filter.moves import Moves
+from services.port_filter.switch import Switch
+from services.port_filter.twin import HandThrough
+
+STALE = 100_000_000  # ns: a part whose state is older cannot be judged
+WAIT = 0.2  # s for clients that have not answered any tick yet
+
+
+class FilterNode:
+    """`service` is a client of the robot, `twin` is the robot of the filter's clients."""
+
+    def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
+        self._service, self._twin, self._config, self._robot = service, twin, config, robot
+        self._switch = Switch(config, robot)
+        self._states: dict[str, State] = {}
+        self._driven: list[str] = []  # parts that the reflex moves
+        self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
+        self._last_k = -1
+        self._is_stale = False
+        self._complete = False  # lockstep: every client that takes part has come
+        self._commands = {part: Commands(service.bus, part) for part in robot.parts}
+        self._moves = {part: Moves() for part in robot.parts}
+        self._drives = DriveDesk(service, twin, robot, self._why_cut, self._armed)
+        HandThrough(service, twin, robot)
+        self._clock = twin.bus.publisher(keys.CLOCK, Clock, twin.bus.control)
+        self._streams = {part: twin.bus.publisher(keys.state(part), State, twin.bus.control) for part in robot.parts}
+        self._participant = Participant(service)
+        self._barrier = Barrier(twin, config.participants, lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"))
+        self._declare()
+
+    def _declare(self) -> None:
+        service, twin = self._service, self._twin
+        service.describe = self._describe
+        twin.describe = self._describe
+        for part in self._robot.parts:
+            twin.on_newest(keys.command(part), Command, lambda command, part=part: self._pass_down(part, command), part=part)
+            service.on_newest(keys.state(part), State, lambda state, part=part: self._pass_up(part, state), part=part)
+        twin.on_request(keys.waypoint("*"), Empty, self._waypoint, part_of_key=True)
+        service.on_run(self._new_run)
+        service.on_clock(self._tick)
+
+    def _why_cut(self) -> str:
+        """Why the clients are cut off; "" when they are not."""
+        if self._is_stale:
+            return "the robot's states are too old to be judged"
+        state = self._switch.reflex.state
+        if state == "stuck":
+            return f"{self._where()}, and there is no way back; if this pose is safe, say so by the call rpc/waypoint of any part"
+        return "" if state == "forward" else f"the reflex takes the robot back ({state}); wait, then arm again"
+
+    def _pass_down(self, part: str, command: Command) -> None:
+        """A client's command."""
+        epoch, seq = self._newest[part]
+        if why := self._why_cut():
+            self._twin.bus.reject("reflex", f"{part}: {why}")
+        elif command.epoch != self._drives.epochs[part]:
+            self._twin.bus.reject("epoch", f"{part}: epoch {command.epoch}, in force is {self._drives.epochs[part]}")
+        elif command.epoch == epoch and command.seq <= seq:
+            self._twin.bus.reject("seq", f"{part}: seq {command.seq} after {seq}")
+        else:
+            self._newest[part] = (command.epoch, command.seq)
+            if self._moves[part].begins(command, self._service.bus.t):
+                self._switch.reflex.mark()
+            self._commands[part].forward(command)
+
+    def _pass_up(self, part: str, state: State) -> None:
+        """The robot's state, as the client's own robot would be in."""
+        self._states[part] = state
+        twin = self._twin.bus
+        twin.run = self._service.bus.run
+        is_cut = state.gate == "armed" and bool(self._why_cut())
+        seq = -1 if is_cut else self._commands[part].theirs(state.cmd_seq)
+        self._streams[part].put(
+            k=state.k,
+            t=state.t,
+            q=state.q,
+            dq=state.dq,
+            tau=state.tau,
+            mode="hold" if is_cut else state.mode,
+            gate="hold" if is_cut else state.gate,
+            faults=state.faults,
+            epoch=state.epoch,
+            cmd_seq=seq,
+            cmd_age=state.cmd_age if seq >= 0 else -1,
+        )
+
+    def _tick(self, clock: Clock) -> None:
+        twin = self._twin.bus
+        twin.run, twin.k, twin.t = clock.run, clock.k, clock.t
+        if clock.mode != "paused" and clock.k != self._last_k and len(self._states) == len(self._robot.parts):
+            if self._last_k < 0:
+                self._switch.restart(clock.dt * 1e-9)
+            self._last_k = clock.k
+            self._judge(clock)
+        self._clock.put(dt=clock.dt, mode=clock.mode, rate=clock.rate)
+        if clock.mode == "lock":
+            self._answer(clock.k)
+
+    def _judge(self, clock: Clock) -> None:
+        self._is_stale = clock.t - min(state.t for state in self._states.values()) > STALE
+        if self._is_stale:
+            return
+        reflex = self._switch.reflex
+        before = reflex.state
+        if before not in ("forward", "stuck") and not all(self._obeys(part) for part in self._driven):
+            reflex.give_up()
+        target = self._switch.tick(self._measured())
+        if before == "forward" and reflex.state != "forward":
+            self._cut_off()
+        if before != "stuck" and reflex.state == "stuck":
+            self._get_stuck()
+        if before not in ("forward", "stuck") and reflex.state == "forward":
+            self._hand_back()
+        if target is not None and reflex.state != "stuck":
+            self._command(clock.k, target, moving=reflex.state != "brake")
+
+    def _measured(self) -> Array:
+        q = np.empty(len(self._robot.motors))
+        for name, part in self._robot.parts.items():
+            q[part.slice] = self._states[name].q
+        return q
+
+    def _obeys(self, part: str) -> bool:
+        state = self._states[part]
+        return state.gate == "armed" and state.epoch == self._drives.epochs[part]
+
+    def _command(self, k: int, target: Array, moving: bool) -> None:
+        for part in self._driven:
+            where = self._robot.part(part).slice
+            reference = target[where].clip(self._robot.limits[where, 0], self._robot.limits[where, 1]).tolist()
+            self._commands[part].put(self._drives.epochs[part], k, "position" if moving else "hold", reference, self._config.ttl)
+
+    def _cut_off(self) -> None:
+        self._driven = [part for part in self._robot.parts if self._obeys(part)]
+        for moves in self._moves.values():
+            moves.forget()
+        if self._driven:
+            self._tell("warning", "reflex", f"{self._where()}: clients are cut off, {', '.join(self._driven)} go back the way they came")
+        else:
+            self._switch.reflex.give_up()  # nobody drives the robot, so there is nothing to rewind
+
+    def _hand_back(self) -> None:
+        self._rest()
+        recovery = self._switch.reflex.recovery
+        if recovery is not None:
+            self._tell(
+                "warning",
+                "motion_failed",
+                f"the motion failed and was undone to the {recovery.outcome}; arm to go on",
+                deepest=recovery.deepest,
+                ticks=float(recovery.ticks),
+                again=float(recovery.again),
+                passed=float(recovery.passed),
+            )
+
+    def _get_stuck(self) -> None:
+        self._rest()
+        self._tell("error", "stuck", f"the motion failed: {self._why_cut()}")
+
+    def _rest(self) -> None:
+        for part in self._driven:
+            self._drives.hold(part)
+        self._driven = []
+
+    def _where(self) -> str:
+        """What is wrong, in a few words."""
+        recovery = self._switch.reflex.recovery
+        worst = next(iter(self._switch.violations or (recovery.cause if recovery else ())), None)
+        if worst is None:
+            return "in violation"
+        size = f"{1e3 * worst.depth:.0f} mm deep" if worst.kind == "contact" else f"by {np.rad2deg(worst.depth):.1f} degrees"
+        return f"{worst.kind} {worst.what} {size}"
+
+    def _tell(self, level: str, code: str, text: str, **values: float) -> None:
+        for bus in (self._service.bus, self._twin.bus):
+            bus.event(level, code, text, **values)
+
+    def _armed(self, part: str) -> None:
+        """A client has got control of the part: what it does from now on can be undone to here."""
+        self._switch.reflex.mark()
+
+    def _waypoint(self, request: Empty, key: str) -> Done:
+        reflex = self._switch.reflex
+        if reflex.state == "stuck":
+            reflex.accept(self._switch.q, self._switch.violations)
+            self._tell("info", "accepted", f"{request.who} answers for the pose as it is")
+        elif reflex.state != "forward":
+            raise CallRefused("reflex", f"no waypoint while the reflex is in control ({reflex.state})")
+        elif not reflex.mark():
+            raise CallRefused("empty", "no pose without a violation has been seen yet")
+        return Done(v=VERSION)
+
+    def _answer(self, k: int) -> None:
+        """Lockstep: the clients first, as robot_sim waits for its own."""
+        if not self._complete:
+            self._service.spin(time.monotonic() + WAIT, lambda: not self._barrier.absent())
+            self._complete = not self._barrier.absent()
+        if self._complete:
+            self._participant.done(k, ok=not self._barrier.wait(k))
+
+    def _new_run(self) -> None:
+        self._states.clear()
+        self._drives.forget()
+        self._barrier.begin()
+        self._driven, self._last_k, self._complete = [], -1, False
+        self._newest = dict.fromkeys(self._newest, (0, -1))
+        self._switch.restart(0.01)
+        for moves in self._moves.values():
+            moves.forget()
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        reflex = self._switch.reflex
+        counts = reflex.counts
+        text = f"{reflex.state}, {counts.reflexes} reflexes, {counts.recovered} recovered, {counts.stuck} stuck"
+        numbers = {"reflexes": counts.reflexes, "recovered": counts.recovered, "stuck": counts.stuck, "flips": counts.flips}
+        return text, {**numbers, "recorded": reflex.recorded}
