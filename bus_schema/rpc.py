@@ -180,6 +180,7 @@ class Stat(Reply, frozen=True, kw_only=True):
     text: Text  # one line for the status screen
     numbers: dict[str, float]
     rejected: dict[str, int]  # refused messages and calls by reason
+    words: dict[str, Text] = {}  # what is no number, such as a hash
 
 
 class Config(Reply, frozen=True, kw_only=True):

@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a setting: services.model.contact_forces=false",
     )
     parser.add_argument("--headless", action="store_true", help="leave the monitor out")
-    parser.add_argument("--duration", type=_seconds, metavar="S", help="seconds to run, from when all services are ready")
+    parser.add_argument("--duration", type=_seconds, metavar="S", help="seconds of real time to run, from when all services are ready")
+    parser.add_argument("--ticks", type=_whole, metavar="N", help="lockstep: end after so many ticks of the robot (shared.mode=lock)")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     parser.add_argument("--endpoint", metavar="ADDRESS", help="where the router listens (default: the scenario's, or tcp/127.0.0.1:7447)")
     parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="where the run's folder is made (default: runs)")
@@ -40,11 +41,18 @@ def run(arguments: argparse.Namespace) -> int:
             settings=tuple(arguments.settings),
             headless=arguments.headless,
             duration=arguments.duration,
+            ticks=arguments.ticks,
             json=arguments.json,
             endpoint=arguments.endpoint,
             runs=arguments.runs,
         )
     )
+
+
+def _whole(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number of ticks")
+    return int(text)
 
 
 def _seconds(text: str) -> float:

@@ -34,9 +34,10 @@ class AgentNode:
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config = service, config
         self._store = TransitionStore(Path(config.run_dir) / "transitions.sqlite", config.part) if config.run_dir else None
+        self._plant = BusPlant(service, robot, (config.part,))
         self._agent = CuriousAgent(
             published_space(robot, config),
-            BusPlant(service, robot, (config.part,)),
+            self._plant,
             explorer=config.explorer,
             seed=config.seed,
             discount=config.discount,
@@ -59,6 +60,8 @@ class AgentNode:
                 self._interrupted += 1
                 self._service.bus.event("warning", "interrupted", str(interruption))
             self._service.spin(time.monotonic())
+        if self._service.locked:
+            self._plant.leave()
 
     def _step(self) -> None:
         state = self._agent.state

@@ -9,11 +9,12 @@ from collections.abc import Callable
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Motion
+from bus_schema.messages import Clock, Motion, StepDone
 from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.plant import Outcome
 from mobee.robot.robot import Array, Robot
+from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
@@ -23,7 +24,11 @@ OWNED = 3.0  # s for which a goal may belong to somebody else: the tokens of the
 
 
 class BusPlant:
-    """A Plant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile."""
+    """A Plant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile.
+
+    In lockstep it takes part for its service: a tick of which the controller says that this service may have something to decide is
+    answered when the service waits again, so what it decides falls into that tick however long it takes.
+    """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
         self._service, self.robot = service, robot
@@ -32,6 +37,11 @@ class BusPlant:
         self._motion: dict[str, Motion] = {}
         self._tick = 0.0  # s
         self._runs = 0
+        self._participant = Participant(service)
+        self._wanted: set[str] = set()  # parts that somebody measured
+        self._to_answer: int | None = None  # lockstep: a tick that waits for this service
+        if service.locked:
+            service.on_newest(keys.done("controller"), StepDone, self._note_step)
         for part in parts:
             robot.part(part)
             service.on_newest(keys.motion(part), Motion, self._noter(part), part=part)
@@ -40,10 +50,11 @@ class BusPlant:
 
     def measure(self, part: str) -> Array:
         """The part's motor positions, (n_part,) rad, as soon as the part is under control and its goal is ours."""
+        self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
             self._service.check_router()
             self._take(part)
-            self._service.spin(time.monotonic() + POLL, lambda: self._owns(part) and self._is_free(part))
+            self._wait(lambda: self._owns(part) and self._is_free(part))
         return np.array(self._motion[part].q)
 
     def act(self, part: str, target: Array) -> Outcome:
@@ -57,7 +68,7 @@ class BusPlant:
         asked = self._ask(part, action_id, target)
         while True:
             self._service.check_router()
-            self._service.spin(time.monotonic() + POLL, lambda: run != self._runs or self._is_over(part, action_id, asked))
+            self._wait(lambda: run != self._runs or self._is_over(part, action_id, asked))
             if run != self._runs:
                 raise ActionInterrupted(f"{part}: robot_sim started a new run")
             if self._is_over(part, action_id, asked):
@@ -71,6 +82,35 @@ class BusPlant:
         epoch = self._epochs.pop(part, None)
         if epoch is not None:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
+
+    def leave(self) -> None:
+        """Give back all goals and, in lockstep, take part no longer."""
+        for part in list(self._epochs):
+            self.release(part)
+        self._participant.done(self._service.bus.k, last=True)
+
+    def _wait(self, enough: Callable[[], bool]) -> None:
+        """Handle what comes for a while, or until it was enough; before it waits, the tick is answered."""
+
+        def may_go_on() -> bool:
+            if enough():
+                return True
+            self._answer()
+            return False
+
+        self._service.spin(time.monotonic() + POLL, may_go_on)
+
+    def _answer(self) -> None:
+        """Tick 0 is answered only when what can be owned is: it is repeated until everybody has answered it."""
+        if self._to_answer is None:
+            return
+        if self._to_answer > 0 or all(self._owns(part) or self._is_held(part) for part in self._wanted):
+            self._participant.done(self._to_answer)
+        self._to_answer = None
+
+    def _note_step(self, done: StepDone) -> None:
+        if done.re_k == 0 or self._service.who not in done.busy:
+            self._to_answer = done.re_k
 
     def _ask(self, part: str, action_id: str, target: Array) -> int:
         """Start the action; returns the tick at which it began."""
@@ -103,6 +143,10 @@ class BusPlant:
     def _is_free(self, part: str) -> bool:
         motion = self._motion.get(part)
         return motion is not None and motion.status != "held"
+
+    def _is_held(self, part: str) -> bool:
+        motion = self._motion.get(part)
+        return motion is not None and motion.status == "held"
 
     def _owns(self, part: str) -> bool:
         motion = self._motion.get(part)
@@ -140,3 +184,4 @@ class BusPlant:
     def _new_run(self) -> None:
         self._runs += 1
         self._motion.clear()
+        self._to_answer = None

@@ -14,6 +14,7 @@ from bus_schema.rpc import Empty, Failure, Reply, Request
 
 _R = TypeVar("_R", bound=Reply)
 TIMEOUT = 0.5  # s
+LOCKED_TIMEOUT = 1.5  # s, in lockstep: within its ceiling, so that a busy machine makes no difference
 
 
 class CallFailed(Exception):

@@ -73,12 +73,14 @@ class Service:
         self.bus = Bus(session, self.who, self.log)
         self.locked = self.config.mode == "lock"
         self.bus.control = STEP if self.locked else LATEST
+        self.patience = rpc.LOCKED_TIMEOUT if self.locked else rpc.TIMEOUT  # s that a call waits for its answer
         if robot is not None:
             self.bus.robot_size = len(robot.motors)
             self.bus.part_sizes = {name: len(part) for name, part in robot.parts.items()}
         self.alive: dict[str, set[str]] = {}
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
+        self.words: Callable[[], Mapping[str, str]] = dict  # of `stat`: what is no number
         self.mark: Callable[[], None] = lambda: None  # zero the counters of `describe`: a measurement begins
         self.end: Callable[[], None] = _leave  # what a shutdown call leads to
         self._kept: list[Any] = []  # tokens die with their handles
@@ -177,10 +179,10 @@ class Service:
         self._kept.append(self.bus.session.declare_queryable(key, enqueue))
 
     def call(
-        self, key: str, request: type[Request], reply: type[_R], *, timeout: float = rpc.TIMEOUT, tries: int = 1, **fields: object
+        self, key: str, request: type[Request], reply: type[_R], *, timeout: float | None = None, tries: int = 1, **fields: object
     ) -> _R:
         """Ask another service, as rpc.call; raises rpc.CallFailed."""
-        return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout, tries=tries, **fields)
+        return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout or self.patience, tries=tries, **fields)
 
     def ask(
         self,
@@ -297,6 +299,7 @@ class Service:
             ready=self._is_ready,
             text=text,
             numbers={name: float(value) for name, value in numbers.items()},
+            words=dict(self.words()),
             rejected={**self.bus.rejected, **({"flood": self.inbox.dropped} if self.inbox.dropped else {})},
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bus_schema.messages import MotionStatus
@@ -59,3 +60,12 @@ class Action:
     def _become(self, status: MotionStatus, k: int) -> None:
         if status != self.status:
             self.status, self.since_k = status, k
+
+
+def busy_owners(actions: Iterable[Action]) -> list[str]:
+    """Services with nothing to decide: every part that they own is moving."""
+    owners: dict[str, bool] = {}
+    for action in actions:
+        if action.owner is not None:
+            owners[action.owner.who] = owners.get(action.owner.who, True) and action.status == "moving"
+    return sorted(who for who, busy in owners.items() if busy)

@@ -14,10 +14,10 @@ from mobee.control import Forces
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
-from services.common.delivery import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
+from services.common.lockstep import Participant
 from services.common.service import Service
-from services.controller.action import Action
+from services.controller.action import Action, busy_owners
 from services.controller.config import Config
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
@@ -40,8 +40,11 @@ class ControllerNode:
         self._clock: Clock | None = None  # of the tick that still waits for its forces
         self._last_k = -1
         bus = service.bus
-        self._commands = {part: bus.publisher(keys.command(part), Command, LATEST) for part in robot.parts}
-        self._motions = {part: bus.publisher(keys.motion(part), Motion, LATEST) for part in robot.parts}
+        self._commands = {part: bus.publisher(keys.command(part), Command, bus.control) for part in robot.parts}
+        self._motions = {part: bus.publisher(keys.motion(part), Motion, bus.control) for part in robot.parts}
+        self._step_to_answer: tuple[int, bool] | None = None  # lockstep: tick, whether nothing was lacking
+        self._participant = Participant(service)
+        self._drives.answered = self._answer
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
@@ -50,6 +53,8 @@ class ControllerNode:
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
         service.on_each(keys.ESTOP, EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_clock(self._tick)
+        if service.locked:
+            service.on_alive(self._note_alive)
 
     def _check_posture(self) -> None:
         """Raise what the library says of a posture that the robot cannot take."""
@@ -67,9 +72,12 @@ class ControllerNode:
         if clock.dt * 1e-9 >= self._law.max_dt:
             self._service.bus.reject("rate", f"ticks of {clock.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
             return
-        self._clock = clock
+        self._clock, self._step_to_answer = clock, None
         if self._forces is not None and self._forces.re_k >= clock.k:
             self._step()
+            return
+        if clock.mode == "lock":
+            self._go_without_model()
             return
         k = clock.k
         self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt / clock.rate, lambda: self._wait_is_over(k))
@@ -78,6 +86,16 @@ class ControllerNode:
         self._forces = forces
         if self._clock is not None and forces.re_k >= self._clock.k:
             self._step()
+
+    def _go_without_model(self) -> None:
+        """Lockstep: a tick waits for its forces as long as there is somebody to send them."""
+        if self._clock is not None and not self._service.alive.get("model"):
+            self._forces = None
+            self._step()
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        if who == "model" and not up:
+            self._go_without_model()
 
     def _wait_is_over(self, k: int) -> None:
         if self._clock is not None and self._clock.k == k:
@@ -90,13 +108,32 @@ class ControllerNode:
             return
         fresh = self._forces is not None and self._are_fresh(self._forces, clock.k)
         self._supervise(clock, fresh)
+        if clock.k > 0:
+            self._control(clock, fresh)
+        self._publish_motion(clock)
+        if clock.mode == "lock" and (clock.k > 0 or (fresh and self._has_begun())):
+            self._step_to_answer = clock.k, fresh
+            self._answer()
+
+    def _control(self, clock: Clock, fresh: bool) -> None:
         gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
         if fresh and self._forces is not None:
             self._advance(clock, min(gap, OLDEST), self._forces)
         else:
             self._starve(clock.k)
-        self._publish_motion(clock)
         self._ticks += 1
+
+    def _has_begun(self) -> bool:
+        """Lockstep, tick 0: whether all is under control that can be, and somebody hears the commands."""
+        ready = (self._drives.armed(part, state) or not self._drives.can_arm(state) for part, state in self._body.states.items())
+        return all(ready) and all(stream.heard for stream in self._commands.values())
+
+    def _answer(self) -> None:
+        """Lockstep: the tick is answered when no part is being armed any more."""
+        if self._step_to_answer is not None and not self._drives.asking:
+            k, ok = self._step_to_answer
+            self._step_to_answer = None
+            self._participant.done(k, ok=ok, busy=busy_owners(self._actions.values()))
 
     def _are_fresh(self, forces: ForcesMessage, k: int) -> bool:
         """Whether they answer a tick near k, and were formed of states of all parts near that tick: a contact concerns many."""
@@ -178,7 +215,7 @@ class ControllerNode:
     def _new_run(self) -> None:
         self._body.forget()
         self._drives.forget()
-        self._forces, self._clock, self._last_k = None, None, -1
+        self._forces, self._clock, self._last_k, self._step_to_answer = None, None, -1, None
         self._law.reset(self._robot.home)
         for part, action in self._actions.items():
             action.hold(self._service.bus.k)

@@ -18,6 +18,8 @@ class Entry:
     after: tuple[str, ...] = ()  # who must be ready before it is started
     nice: int = 0
     vital: bool = True  # when it is given up, the robot is stopped
+    steps: bool = True  # lockstep: every tick waits for it
+    looks: bool = False  # what it sees depends on the clock on the wall, so lockstep does without it
     needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
     given: Mapping[str, str] = field(default_factory=dict)  # settings that make it this service
 
@@ -25,7 +27,9 @@ class Entry:
 _PICTURES = 10  # nice value of whatever may come late
 
 _ENTRIES = {
-    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, needs={"pybullet": "sim", "icub_models": "sim"}),
+    "robot_sim": Entry(
+        "services.robot_sim", "services.robot_sim.config:Config", 0, steps=False, needs={"pybullet": "sim", "icub_models": "sim"}
+    ),
     "model": Entry("services.model", "services.model.config:Config", 1),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
@@ -36,6 +40,8 @@ _ENTRIES = {
         after=("robot_sim", "controller"),
         nice=_PICTURES,
         vital=False,
+        steps=False,
+        looks=True,
         needs={"pybullet": "sim", "icub_models": "sim"},
     ),
     "vision": Entry(
@@ -45,6 +51,8 @@ _ENTRIES = {
         after=("model", "controller"),
         nice=_PICTURES,
         vital=False,
+        steps=False,
+        looks=True,
         needs={"cv2": "vision"},
     ),
     "monitor": Entry(
@@ -54,6 +62,7 @@ _ENTRIES = {
         after=("robot_sim", "controller"),
         nice=_PICTURES,
         vital=False,
+        steps=False,
         needs={"rerun": "viz", "icub_models": "viz"},
     ),
 }

@@ -72,6 +72,21 @@ def check_gains(scenario: Scenario) -> None:
         raise ConfigError(f"{scenario.where('shared.gains')}: gains differ: {said}. They share one law: set it once, as shared.gains.")
 
 
+def check_lockstep(scenario: Scenario) -> None:
+    """Raise ConfigError when only some services keep step, or a number of ticks is asked for where none is exact."""
+    modes = {part.who: part.config.mode for part in scenario.parts}
+    if len(set(modes.values())) > 1:
+        said = ", ".join(f"{who} {mode}" for who, mode in modes.items())
+        raise ConfigError(
+            f"{scenario.where('shared.mode')}: modes differ: {said}. All keep step or none does: set it once, as shared.mode."
+        )
+    for part in scenario.parts:
+        if getattr(part.config, "ticks", 0) and not scenario.is_locked:
+            raise ConfigError(
+                f"{scenario.where('services.robot_sim.ticks')}: a number of ticks is exact in lockstep only: shared.mode=lock"
+            )
+
+
 def check_robots(scenario: Scenario) -> None:
     """Raise ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored."""
     from mobee.robot.load import load_robot, load_world

@@ -20,7 +20,7 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
-from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_lockstep, check_ports, check_robots
 from services.launcher.child import Program
 from services.launcher.engine import EngineMissing, compile_engine
 from services.launcher.run_directory import make_run_directory
@@ -44,6 +44,7 @@ class Options:
     settings: tuple[str, ...] = ()  # table.field=value
     headless: bool = False  # without the monitor
     duration: float | None = None  # s from readiness; None: until told to stop
+    ticks: int | None = None  # lockstep: the run ends after so many
     json: bool = False
     endpoint: str | None = None
     runs: Path = Path("runs")
@@ -53,8 +54,10 @@ def launch(options: Options) -> int:
     """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C."""
     started = time.monotonic()
     try:
-        scenario = read_scenario(options.scenario, options.settings, leave_out=["monitor"] if options.headless else [])
+        settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
+        scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
         check_gains(scenario)
+        check_lockstep(scenario)
         check_robots(scenario)
         check_extras(scenario)
         check_ports(scenario)
@@ -110,9 +113,10 @@ class _Run:
                 self._starting = False
                 ready = time.monotonic() - started
                 self._tell(f"all ready after {ready:.1f} s" if not self._supervisor.faults else "running without what was given up")
-                self._mark()
+                if not self._scenario.is_locked:  # in lockstep all count from tick 1 on: the clock on the wall must not show
+                    self._mark()
                 begun = time.monotonic()
-                self._spin(self._options.duration or _FOREVER)
+                self._spin(self._options.duration or _FOREVER, self._supervisor.has_arrived)
                 self._ask_last()
             duration = 0.0 if begun is None else time.monotonic() - begun
             self._tell("stopping")

@@ -6,7 +6,7 @@ import importlib
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,11 @@ class Scenario:
     shared: Mapping[str, Any]
     parts: tuple[Part, ...]
     where: Callable[[str], str]  # place of a field, for messages
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether it runs in lockstep."""
+        return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
 
     def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
         """The scenario as its file would give it, with every setting of every service."""
@@ -88,7 +93,7 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
     if not parts:
         raise ConfigError(f"{path}: no services: name at least one as [services.<name>]. Valid: {', '.join(NAMES)}.")
     _check_shared(file.shared, parts, where)
-    kept = [part for part in parts if part.who not in leave_out]
+    kept = _in_step([part for part in parts if part.who not in leave_out])
     return Scenario(path.stem, file.title, file.shared, tuple(sorted(kept, key=lambda part: part.entry.stage)), where)
 
 
@@ -156,6 +161,19 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
     cls = _config_class(entry, where(place))
     given = {key: value for key, value in [*shared.items(), *entry.given.items()] if key in cls.__struct_fields__} | own
     return Part(who, entry, convert(given, cls, where, f"{place}."), frozenset(given))
+
+
+def _in_step(parts: list[Part]) -> list[Part]:
+    """In lockstep robot_sim waits for all who compute what the robot does, and nobody looks at it in his own time."""
+    if all(part.who != "robot_sim" or part.config.mode == "free" for part in parts):
+        return parts
+    kept = [part for part in parts if not part.entry.looks]
+    return [_awaiting(part, kept) if part.who == "robot_sim" and "participants" not in part.given else part for part in kept]
+
+
+def _awaiting(sim: Part, parts: Sequence[Part]) -> Part:
+    who = tuple(part.who for part in parts if part.entry.steps and part.config.namespace == sim.config.namespace)
+    return replace(sim, config=structs.replace(sim.config, participants=who))
 
 
 def _config_class(entry: Entry, where: str) -> type[ServiceConfig]:

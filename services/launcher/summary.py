@@ -32,6 +32,7 @@ def summarise(children: Iterable[Child]) -> dict[str, Any]:
         "ticks": sim.count("ticks"),
         "hold_ticks": sim.count("hold_ticks"),
         "missed_ticks": sim.count("missed_ticks"),
+        "lockstep": None if sim.number("flaws") is None else _lockstep(sim, stats["robot_sim"]),
         "restarts": {child.who: child.restarts for child in children},
         "services": {who: {"rejected": stat.rejected, **stat.numbers} for who, stat in stats.items()},
     }
@@ -50,6 +51,15 @@ class _Numbers:
     def count(self, name: str) -> int | None:
         value = self.number(name)
         return None if value is None else round(value)
+
+
+def _lockstep(sim: _Numbers, stat: Stat) -> dict[str, Any]:
+    return {
+        "ticks": sim.count("tick"),
+        "speed": sim.number("speed"),
+        "repeatable": sim.count("flaws") == 0,
+        "states_sha256": stat.words.get("states"),
+    }
 
 
 def _agent(numbers: _Numbers) -> dict[str, Any]:
@@ -76,6 +86,8 @@ def as_text(summary: dict[str, Any]) -> str:
         )
     if summary["ticks"] is not None:
         lines += _robot_lines(summary)
+    if summary["lockstep"] is not None:
+        lines += _lockstep_lines(summary["lockstep"])
     restarts = {who: count for who, count in summary["restarts"].items() if count}
     lines.append(f"  restarts        {_counts(restarts)}")
     lines += [f"  FAULT           {fault}" for fault in summary["faults"]]
@@ -90,6 +102,14 @@ def _robot_lines(summary: dict[str, Any]) -> list[str]:
         f"  command age     p50 {_say(age['p50'], '', 0)}, p99 {_say(age['p99'], '', 0)}, worst {_say(age['max'], '', 0)} ticks",
         f"  ticks           {summary['ticks']}, {_say(summary['hold_ticks'])} in hold, {_say(summary['missed_ticks'])} missed",
         f"  rejected        {_counts(summary['rejected_commands'])}",
+    ]
+
+
+def _lockstep_lines(lockstep: dict[str, Any]) -> list[str]:
+    verdict = "can be repeated" if lockstep["repeatable"] else "cannot be repeated, see the events"
+    return [
+        f"  lockstep        {lockstep['ticks']} ticks at {_say(lockstep['speed'], '', 1)} x real time; {verdict}",
+        f"  states          sha256 {lockstep['states_sha256']}",
     ]
 
 

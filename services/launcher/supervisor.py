@@ -48,6 +48,11 @@ class Supervisor:
         """Whether every service is ready, has done its work, or was given up."""
         return all(child.phase in ("ready", "ended", "fault") for child in self.children.values())
 
+    def has_arrived(self) -> bool:
+        """Whether robot_sim has made the ticks it was asked for."""
+        sim = self.children.get("robot_sim")
+        return sim is not None and sim.stat is not None and sim.stat.numbers.get("arrived", 0.0) > 0.0
+
     def stop(self) -> None:
         """End all services, the last started first."""
         self._stopping = True

@@ -10,6 +10,7 @@ from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, ContactItem, Contacts, Forces, MarkerPose, Pose
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model, load_world
+from mobee.collision.contact import Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
 from mobee.errors import MobeeError
@@ -19,6 +20,7 @@ from mobee.robot.robot import Array, Robot
 from services.common.body import Body
 from services.common.delivery import LATEST
 from services.common.figures import Percentiles
+from services.common.lockstep import Participant
 from services.common.service import CallRefused, Service
 from services.model.config import Config
 from services.model.world import WorldDesk
@@ -39,7 +41,8 @@ class ModelNode:
         self._q: Array = robot.home
         self._desk = WorldDesk(service, self._model)
         bus = service.bus
-        self._forces = bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
+        self._forces = bus.publisher(keys.MODEL_FORCES, Forces, bus.control)
+        self._participant = Participant(service)
         self._pose = bus.publisher(keys.MODEL_POSE, Pose, LATEST)
         self._contacts = bus.publisher(keys.MODEL_CONTACTS, Contacts, LATEST)
         self._last_k = -1
@@ -74,20 +77,20 @@ class ModelNode:
             touched=touching,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
+        self._participant.done(clock.k)
         self._publish_pose(clock.k, pose)
         self._count(clock.k, pose, touching)
 
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
-        markers = [
-            MarkerPose(name=name, position=pose.position(name).tolist(), quaternion=from_matrix(pose.rotation(name)).tolist())
-            for name in self._robot.markers
-        ]
-        self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)
-        items = [
-            ContactItem(first=c.first, second=c.second, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
-            for c in pose.contacts
-        ]
-        self._contacts.put(re_k=k, contacts=items)
+        """What is dear to make is made only if somebody listens."""
+        if self._pose.heard:
+            markers = [
+                MarkerPose(name=name, position=pose.position(name).tolist(), quaternion=from_matrix(pose.rotation(name)).tolist())
+                for name in self._robot.markers
+            ]
+            self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)
+        if self._contacts.heard:
+            self._contacts.put(re_k=k, contacts=[_item(contact) for contact in pose.contacts])
 
     def _count(self, k: int, pose: ModelPose, touching: dict[str, list[str]]) -> None:
         self._ticks += 1
@@ -122,3 +125,7 @@ class ModelNode:
         except MobeeError as error:
             raise CallRefused("marker", str(error)) from None
         return JacobianReply(v=VERSION, rows=jacobian.shape[0], columns=jacobian.shape[1], data=jacobian.ravel().tolist())
+
+
+def _item(c: Contact) -> ContactItem:
+    return ContactItem(first=c.first, second=c.second, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())

@@ -37,5 +37,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Standard deviation of a part's sampling time, share of a tick."""
     truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
     """Messages a second of what only the simulator knows."""
+    participants: tuple[str, ...] = ()
+    """Lockstep: who must be there before tick 1; the launcher names every service that computes what the robot does."""
+    ticks: Annotated[int, Meta(ge=0)] = 0
+    """Lockstep: stop after so many ticks; 0: go on for ever."""
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.record); empty: none."""

@@ -16,6 +16,7 @@ from services.robot_sim.shaper import Shaper
 
 MAX_AGE = 0.1  # s between the tick a command answers and the tick it arrives in
 MAX_TTL = 1000  # ms
+LOCKED_TTL = 3  # ticks after which a part holds in lockstep, where the clock on the wall means nothing
 MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
 START = math.radians(2.0)  # rad between the measured position and the first position commanded
 STEP = 2.0  # times the distance that full speed covers, by which a position reference may move
@@ -51,9 +52,14 @@ class Gate:
     armed again: nothing is ever replayed.
     """
 
-    def __init__(self, part: str, limits: Limits, dt: float, epoch: int = 0, tell: Tell | None = None) -> None:
-        """Idle; `epoch`: every later one is larger.  `tell` hears why a part holds."""
-        self.part, self.epoch = part, epoch
+    def __init__(
+        self, part: str, limits: Limits, dt: float, epoch: int = 0, tell: Tell | None = None, ttl_ticks: int | None = None
+    ) -> None:
+        """Idle; `epoch`: every later one is larger.  `tell` hears why a part holds.
+
+        `ttl_ticks`: age [ticks] beyond which no command is in force; None: a command's own ttl, on the clock on the wall.
+        """
+        self.part, self.epoch, self._ttl_ticks = part, epoch, ttl_ticks
         self.state: GateState = "idle"
         self.owner: tuple[str, str] | None = None  # service, instance of its token
         self.faults = 0
@@ -153,10 +159,7 @@ class Gate:
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
         """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): where they are."""
         current = self._in_force
-        if current is not None and now > current.expires:
-            late = (now - current.expires) / 1e6
-            ttl = float(current.command.ttl)
-            self._enter("hold", f"no valid command for {ttl + late:.0f} ms, ttl {ttl:g} ms", late_ms=late, ttl_ms=ttl)
+        if current is not None and self._has_expired(current, k, now):
             current = None
         if current is None:
             self.mode, self.seq, self.age = "hold", -1, -1
@@ -166,6 +169,16 @@ class Gate:
             self._shaper.start(q, velocity)
         self.mode, self.seq, self.age = command.mode, command.seq, k - command.re_k
         return self._shaped(command.mode, current.reference, q, velocity)
+
+    def _has_expired(self, current: InForce, k: int, now: int) -> bool:
+        """Whether it is too old; then the part holds."""
+        age, ttl, late = k - current.command.re_k, float(current.command.ttl), (now - current.expires) / 1e6
+        if self._ttl_ticks is not None:
+            if age > self._ttl_ticks:
+                self._enter("hold", f"no valid command for {age} ticks, limit {self._ttl_ticks}", age=float(age))
+        elif late > 0:
+            self._enter("hold", f"no valid command for {ttl + late:.0f} ms, ttl {ttl:g} ms", late_ms=late, ttl_ms=ttl)
+        return self._in_force is None
 
     def _shaped(self, mode: Mode, reference: Array, q: Array, velocity: Array) -> Drive:
         if mode == "velocity":
@@ -205,7 +218,10 @@ class Gate:
     def _check_time(self, command: Command, k: int) -> None:
         if command.re_k > k:
             raise Refused("future", f"{self.part}: answers tick {command.re_k}, it is {k}")
-        age = (k - command.re_k) * self._dt
+        ticks = k - command.re_k
+        if self._ttl_ticks is not None and ticks > self._ttl_ticks:
+            raise Refused("age", f"{self.part}: answers a tick {ticks} ticks ago, limit {self._ttl_ticks}")
+        age = ticks * self._dt
         if age > MAX_AGE:
             raise Refused("age", f"{self.part}: answers a tick {age * 1e3:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
         if not 0 < command.ttl <= MAX_TTL:  # 0 must not mean "for ever"

@@ -12,7 +12,7 @@ from services.common.delivery import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
 from services.robot_sim.backend import Backend
-from services.robot_sim.gate import Gate
+from services.robot_sim.gate import LOCKED_TTL, Gate
 from services.robot_sim.limits import Limits
 from services.robot_sim.refuse import refused_as_call, rejected
 
@@ -26,6 +26,7 @@ class Guard:
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float) -> None:
         self._service, self._robot, self._backend, self._dt = service, robot, backend, dt
         self._estop_reason = ""
+        self._waiting: list[tuple[str, Command]] = []  # lockstep: commands for the next tick
         self._estop = service.bus.publisher(keys.ESTOP, EStop, LATEST)
         # Epochs grow over restarts too: what a controller holds from before never fits again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
@@ -34,6 +35,7 @@ class Guard:
     def renew(self) -> None:
         """A new run: idle, nobody owns anything; a latched emergency stop stays."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
+        self._waiting.clear()
         if self._estop_reason:
             self._stop_all()
 
@@ -46,27 +48,48 @@ class Guard:
             drive = gate.tick(k, now, motors.q[where], motors.motor_velocities[where])
             motors.command(where, drive.mode, drive.reference)
 
+    def obey(self) -> None:
+        """Lockstep: admit what came in answer to this tick, in the order of the names, whichever came first."""
+        for part, command in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
+            self._admit(part, command)
+        self._waiting.clear()
+
+    def do_without(self, who: str) -> None:
+        """It is late: what depends on it holds."""
+        if who in INDISPENSABLE:
+            self.hold_all(f"{who} is late")
+        for gate in self.gates.values():
+            if gate.owner is not None and gate.owner[0] == who:
+                gate.force_hold(f"its owner {who} is late")
+
     def hold_all(self, why: str) -> None:
         """Every part holds at once."""
         for gate in self.gates.values():
             gate.force_hold(why)
 
     def _gate(self, part: str, epoch: int) -> Gate:
-        bus = self._service.bus
-        return Gate(
-            part, Limits.of(self._robot, part), self._dt, epoch, lambda code, text, values: bus.event("warning", code, text, **values)
-        )
+        def tell(code: str, text: str, values: dict[str, float]) -> None:
+            self._service.bus.event("warning", code, text, **values)
+
+        ttl_ticks = LOCKED_TTL if self._service.locked else None
+        return Gate(part, Limits.of(self._robot, part), self._dt, epoch, tell, ttl_ticks)
 
     def _declare(self) -> None:
         service = self._service
         for part in self.gates:
-            service.on_newest(keys.command(part), Command, lambda command, part=part: self._admit(part, command), part=part)
+            self._listen(part)
         service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
         for verb in ("arm", "release", "hold"):
             service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
         service.on_each(keys.ESTOP, EStop, self._on_estop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_request(keys.ESTOP_RESET, Empty, self._reset_estop)
         service.on_alive(self._on_alive)
+
+    def _listen(self, part: str) -> None:
+        if self._service.locked:
+            self._service.on_each(keys.command(part), Command, lambda command: self._waiting.append((part, command)), part=part)
+        else:
+            self._service.on_newest(keys.command(part), Command, lambda command: self._admit(part, command), part=part)
 
     def _admit(self, part: str, command: Command) -> None:
         where = self._robot.parts[part].slice

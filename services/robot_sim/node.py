@@ -1,10 +1,11 @@
-"""robot_sim's tick: gate, clock, physics, then each part's state at its own time."""
+"""robot_sim's tick: gate, clock, physics, then each part's state at its own time; in lockstep the states first, the answers last."""
 
 from __future__ import annotations
 
 import secrets
 import time
 from collections.abc import Mapping
+from typing import NoReturn
 
 import numpy as np
 
@@ -14,18 +15,20 @@ from bus_schema.rpc import Done, Empty, PartMeta, Place
 from mobee.errors import MobeeError
 from mobee.kinematics.quaternion import from_matrix
 from mobee.robot.robot import Robot
-from services.common.delivery import DATA, LATEST
+from services.common.delivery import DATA
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
 from services.robot_sim.backend import Backend, SolidContact
 from services.robot_sim.config import Config
 from services.robot_sim.counters import Counters
 from services.robot_sim.guard import Guard
+from services.robot_sim.lockstep import GATHERING, Lockstep
 from services.robot_sim.meta import part_meta
 from services.robot_sim.sensors import Sensors
 from services.robot_sim.streams import Phases
 
 SPREAD = 0.002  # s, a tick shorter than this has its parts one after the other without waiting between them
+IDLE = 1.0  # s, lockstep: between looks when there is nothing to do
 NOT_FINITE = 1  # fault bit
 
 
@@ -43,13 +46,14 @@ class Node:
         self._guard = Guard(service, robot, backend, self._dt)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
-        self._clock = self._bus.publisher(keys.CLOCK, Clock, LATEST)
+        self._clock = self._bus.publisher(keys.CLOCK, Clock, self._bus.control)
         self._truth = self._bus.publisher(keys.SIM_TRUTH, Truth, DATA)
         self._truth_period = max(1, round(config.rate / config.truth_rate))  # ticks
         self._deepest = SolidContact()  # since the last truth message
         self._rate = Rate(self._period)
         self._counters = Counters()
-        service.describe = self._describe
+        self._lockstep = Lockstep(service, config.participants, self._guard, config.ticks) if service.locked else None
+        service.describe, service.words = self._describe, self._words
         service.mark = self._mark
         for verb, handler in (("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
             service.on_request(keys.sim(verb), Empty, handler)
@@ -59,6 +63,8 @@ class Node:
 
     def run(self) -> None:
         """Tick until the process is told to end."""
+        if self._lockstep is not None:
+            self._run_locked(self._lockstep)
         self._rate = Rate(self._period)
         router_check = time.monotonic()
         while True:
@@ -71,6 +77,40 @@ class Node:
                 router_check = now + 1.0
             if not self._paused:
                 self._tick(now)
+
+    def _run_locked(self, lockstep: Lockstep) -> NoReturn:
+        router_check = 0.0
+        while True:
+            if (now := time.monotonic()) >= router_check:
+                self._service.check_router()
+                router_check = now + 1.0
+            if self._bus.k == 0 and not lockstep.is_complete():
+                self._publish_start("lock")
+                self._service.spin(now + GATHERING, lockstep.is_complete)
+            elif self._paused or lockstep.is_over():
+                self._service.spin(now + IDLE)
+            else:
+                self._tick_locked(lockstep)
+                if lockstep.limps():
+                    self._service.spin(now + self._period)
+
+    def _tick_locked(self, lockstep: Lockstep) -> None:
+        begin = time.monotonic()
+        self._bus.k += 1
+        self._bus.t += self._dt_ns
+        self._guard.tick(self._bus.k)
+        self._publish_start("lock")
+        self._backend.step(self._dt)
+        self._counters.tick_time.add((time.monotonic() - begin) * 1e3)
+        self._count()
+        if self._bus.k % self._truth_period == 0:
+            self._publish_truth()
+        lockstep.wait(self._bus.k)
+
+    def _publish_start(self, mode: str) -> None:
+        """How everything is at the beginning of the tick, and that it begins."""
+        self._sensors.publish_now(self._backend.motors, self._guard.gates)
+        self._publish_clock(mode)
 
     def _tick(self, start: float) -> None:
         bus, backend = self._bus, self._backend
@@ -137,7 +177,14 @@ class Node:
     def _describe(self) -> tuple[str, Mapping[str, float]]:
         states = [gate.state for gate in self._guard.gates.values()]
         text = f"{self._config.backend} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
-        return text, self._counters.numbers(self._rate.missed, self._backend.pairs_watched)
+        numbers = self._counters.numbers(self._rate.missed, self._backend.pairs_watched)
+        if self._lockstep is None:
+            return text, numbers
+        speed = self._lockstep.speed(self._dt)
+        return f"{text}, lockstep at {speed:.1f} x real time", {**numbers, **self._lockstep.numbers(), "speed": speed}
+
+    def _words(self) -> Mapping[str, str]:
+        return {} if self._lockstep is None else {"states": self._sensors.hash}
 
     def _mark(self) -> None:
         self._counters = Counters()
@@ -149,6 +196,9 @@ class Node:
         self._guard.renew()
         self._phases = Phases(tuple(self._robot.parts), self._config.jitter, self._config.seed)
         self._counters.stops.forget()
+        self._sensors.forget()
+        if self._lockstep is not None:
+            self._lockstep.begin()
         self._paused = False
         self._bus.event("info", "new_run", f"reset by {request.who}: run {self._bus.run}")
         return Done(v=VERSION)
@@ -157,6 +207,7 @@ class Node:
         if not self._paused:
             self._paused = True
             self._guard.hold_all(f"paused by {request.who}")
+            self._disturb("paused")
             self._publish_clock("paused")
         return Done(v=VERSION)
 
@@ -170,7 +221,12 @@ class Node:
             self._backend.place(request.name, (x, y, z))
         except MobeeError as error:
             raise CallRefused("object", str(error)) from None
+        self._disturb(f"{request.name} placed by {request.who}")
         return Done(v=VERSION)
+
+    def _disturb(self, why: str) -> None:
+        if self._lockstep is not None and self._bus.k > 0:
+            self._lockstep.spoil(why)
 
     def _meta(self, request: Empty, key: str) -> PartMeta:
         return part_meta(self._robot, key.split("/")[0])

@@ -1,0 +1,69 @@
+"""robot_sim's side of lockstep: it owns the ticks, gathers who takes part, waits for them, and says whether the run can be repeated."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from services.common.lockstep import Barrier
+from services.common.service import Service
+from services.robot_sim.guard import Guard
+
+GATHERING = 0.05  # s between two calls to come
+
+
+class Lockstep:
+    """The barrier of a run, and what was wrong with it."""
+
+    def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
+        """`last_tick`: where the run ends, 0: nowhere."""
+        self._service, self._guard = service, guard
+        self._barrier = Barrier(service, participants, self._note)
+        self._last_tick = last_tick
+        self.flaws = 0
+        self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
+
+    def begin(self) -> None:
+        """A new run."""
+        self._barrier.begin()
+        self.flaws = 0
+
+    def is_complete(self) -> bool:
+        """Whether everybody has answered tick 0; until then it is repeated."""
+        self._began = time.monotonic()
+        return not self._barrier.absent()
+
+    def wait(self, k: int) -> None:
+        """Until tick k is answered; then its commands are admitted, whatever the order in which they came.
+
+        What depends on somebody who is late holds, and while anybody is away the ticks keep to the clock on the wall.
+        """
+        for who in self._barrier.wait(k):
+            self._guard.do_without(who)
+        self._guard.obey()
+        self._answered = time.monotonic()
+
+    def is_over(self) -> bool:
+        """Whether the run has made its ticks."""
+        return self._service.bus.k == self._last_tick > 0
+
+    def limps(self) -> bool:
+        """Whether it goes on without somebody who should be there."""
+        return bool(self._barrier.absent())
+
+    def spoil(self, why: str) -> None:
+        """Something happened that will not happen again at the same tick."""
+        self.flaws += 1
+        self._service.bus.event("warning", "not_repeatable", f"this run cannot be repeated: {why}", k=float(self._service.bus.k))
+
+    def speed(self, dt: float) -> float:
+        """Simulated seconds a second since tick 1."""
+        return self._service.bus.k * dt / max(self._answered - self._began, 1e-9)
+
+    def numbers(self) -> Mapping[str, float]:
+        """For `stat`."""
+        return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
+
+    def _note(self, who: str, why: str) -> None:
+        if self._service.bus.k > 0:  # before, it will be waited for
+            self.spoil(f"{who} {why}")
