@@ -11,12 +11,13 @@ from msgspec import Struct
 
 from experiments.babbling.command_log import COMMANDS, Commanded, Ending, finished_at, read_commands
 from experiments.babbling.contacts import Touch, read_touches
-from experiments.babbling.motion import beyond_limits, dimensionless_jerk, jerk, path_length
+from experiments.babbling.motion import beyond_limits, jerk, path_length, speed
 from experiments.babbling.moved import moved_motors
 from mobee.errors import MobeeError
 from mobee.robot.robot import Array, Robot
 
-TOLERANCE = float(np.deg2rad(5.0))  # rad, of every motor of a part, within which a posture is reached
+REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the limits' own zone, less than half a cell of the thesis' lattices
+RETURNED = float(np.deg2rad(5.0))  # rad, likewise
 POSITIONS, CONTACTS = "q.f64", "contacts.csv"  # as services.robot_sim.record writes them
 
 Outcome = Literal["completed", "deflected", "returned"]
@@ -27,10 +28,10 @@ class Judged(Struct, frozen=True):
 
     outcomes: dict[str, Outcome]  # by part
     endings: dict[str, Ending]  # by part
+    left: dict[str, float]  # by part: rad, how far its worst motor ended from where it should
     duration: float  # s
     path: float  # rad, all motors together
     way: float  # rad, the straight way from begin to target, all motors together
-    jerk: float | None  # ln of the dimensionless jerk; None when nothing moved
 
 
 class Trial(Struct, frozen=True):
@@ -41,6 +42,7 @@ class Trial(Struct, frozen=True):
     touches: list[Touch]
     beyond: float  # rad, the furthest beyond a limit; negative: inside
     motor: str  # that went there
+    speed_squared: float  # (rad/s)^2, mean over ticks and motors
     jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
     jerk_max: float  # rad/s^3
     path: float  # rad
@@ -64,6 +66,7 @@ def measure(folder: Path, robot: Robot, dt: float) -> Trial:
         touches=read_touches(folder / CONTACTS, dt, last),
         beyond=float(worst.max()),
         motor=robot.motors[moved[int(worst.argmax())]],
+        speed_squared=float((speed(q, dt) ** 2).mean()),
         jerk_squared=float((third**2).mean()),
         jerk_max=float(np.abs(third).max()),
         path=path_length(q),
@@ -76,24 +79,23 @@ def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged
     target = np.array(commanded.target)
     course = q_all[max(commanded.begin - 2, 0) : max(commanded.end - 1, 1)]  # from the beginning of tick `begin` to that of `end`
     first, last = course[0], course[-1]
-    outcomes = {}
-    for name, part in robot.parts.items():
-        own = moved[(moved >= part.slice.start) & (moved < part.slice.stop)]
-        outcomes[name] = _outcome(first[own], last[own], target[own])
+    own = {name: moved[(moved >= part.slice.start) & (moved < part.slice.stop)] for name, part in robot.parts.items()}
+    left = {name: float(np.abs(last - target)[motors].max()) for name, motors in own.items()}
     return Judged(
-        outcomes=outcomes,
+        outcomes={name: _outcome(left[name], float(np.abs(last - first)[motors].max())) for name, motors in own.items()},
         endings=commanded.endings,
+        left=left,
         duration=(commanded.end - commanded.begin) * dt,
         path=path_length(course[:, moved]),
         way=float(np.abs(target - first)[moved].sum()),
-        jerk=dimensionless_jerk(course[:, moved], dt),
     )
 
 
-def _outcome(first: Array, last: Array, target: Array) -> Outcome:
-    if np.abs(last - target).max() <= TOLERANCE:
+def _outcome(left: float, gone: float) -> Outcome:
+    """From how far a part ended from its target, and from where it began, rad."""
+    if left <= REACHED:
         return "completed"
-    return "returned" if np.abs(last - first).max() <= TOLERANCE else "deflected"
+    return "returned" if gone <= RETURNED else "deflected"
 
 
 def write_trial(path: Path, trial: Trial) -> None:

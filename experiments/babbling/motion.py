@@ -6,8 +6,6 @@ import numpy as np
 
 from mobee.robot.robot import Array
 
-STILL = 1e-9  # rad/s, a peak speed below it is no motion
-
 
 def beyond_limits(q: Array, limits: Array) -> Array:
     """The furthest that each motor was beyond its limits, (m,) rad, negative inside; q (ticks, m), limits (m, 2) rad."""
@@ -20,23 +18,13 @@ def path_length(q: Array) -> float:
     return float(np.abs(np.diff(q, axis=0)).sum())
 
 
+def speed(q: Array, dt: float) -> Array:
+    """First difference of q (ticks, m) rad over dt [s], (ticks - 1, m) rad/s."""
+    first: Array = np.diff(q, axis=0) / dt
+    return first
+
+
 def jerk(q: Array, dt: float) -> Array:
     """Third difference of q (ticks, m) rad over dt [s] cubed, (ticks - 3, m) rad/s^3."""
     third: Array = np.diff(q, n=3, axis=0) / dt**3
     return third
-
-
-def dimensionless_jerk(q: Array, dt: float) -> float | None:
-    """Jerk of one motion of all motors, freed of its size and duration, as a natural logarithm; q (ticks, m) rad.
-
-    Integral of the squared jerk, times duration cubed, over the squared peak speed (Hogan and Sternad 2009, "Sensitivity of
-    smoothness measures to movement duration, amplitude, and arrests"): ln 205 for a minimum-jerk motion, more for a rougher one.
-    None when nothing moved.
-    """
-    if len(q) < 4:
-        return None
-    speed = np.linalg.norm(np.diff(q, axis=0), axis=1).max() / dt
-    if speed < STILL:
-        return None
-    duration = (len(q) - 1) * dt
-    return float(np.log((jerk(q, dt) ** 2).sum() * dt * duration**3 / speed**2))

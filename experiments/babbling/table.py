@@ -9,6 +9,7 @@ from experiments.babbling.modes import TITLES
 from experiments.babbling.results import OUTCOMES, share
 
 LABEL, COLUMN = 38, 14
+LIMITS = {"completed": ", within 10 deg", "deflected": "", "returned": ", within 5 deg"}
 PAIRS = 8  # that are told, the most frequent first
 
 _Row = Mapping[str, Any]
@@ -32,14 +33,17 @@ def as_table(rows: Mapping[str, _Row]) -> str:
     plain("furthest beyond a joint limit [deg]", "worst_beyond_limit_deg", 2)
     plain("commands (postures of a part)", "commands")
     for outcome in OUTCOMES:
-        add(f"  {outcome}", {mode: f"{share(row, outcome):.0%}" for mode, row in rows.items()})
+        add(f"  {outcome}{LIMITS[outcome]}", {mode: f"{share(row, outcome):.0%}" for mode, row in rows.items()})
+    add("  within 5 deg", {mode: f"{share(row, 'within_5_deg'):.0%}" for mode, row in rows.items()})
+    plain("  left to go, median [deg]", "left_median_deg", 1)
     add("postures of all parts completed", {mode: f"{row['postures_completed']} of {row['postures']}" for mode, row in rows.items()})
     plain("time a posture [s]", "seconds_a_posture", 1)
     plain("path a posture [rad, all motors]", "path_rad", 1)
     plain("  straight way to it [rad]", "straight_way_rad", 1)
+    plain("speed, rms [rad/s]", "speed_rms", 3)
     plain("jerk, rms [rad/s^3]", "jerk_rms", 1)
     plain("  largest [rad/s^3]", "jerk_max", 0)
-    plain("  dimensionless, ln, median", "jerk_dimensionless", 1)
+    plain("  over speed, rms [1/s^2]", "jerk_over_speed", 0)
     return "\n".join([*lines, *_pairs(rows)])
 
 

@@ -19,7 +19,7 @@ from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 
 LOOK = 0.05  # s between looks at how far it is
-BEGINS = 120.0  # s within which the first tick must come: the engine may have to be compiled
+BEGINS = 60.0  # s within which the first tick must come
 STANDS = 30.0  # s without a tick after which a trial is given up
 ENDS = 30.0  # s
 
@@ -31,12 +31,13 @@ class TrialFailed(MobeeError):
 def run_trial(folder: Path, mode: str, robot: Robot, seed: int, minutes: float, show: Callable[[float], None]) -> None:
     """Leave commands, positions and contacts in the folder; `show` is told which share is done.  Raises TrialFailed."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / COMMANDS).unlink(missing_ok=True)  # of a trial that was broken off
+    for left in (COMMANDS, POSITIONS):  # of a trial that was broken off
+        (folder / left).unlink(missing_ok=True)
     file = folder / f"{mode}.toml"
     file.write_text(scenario(mode, folder.resolve(), seed, minutes))
     due = minutes * 60.0 * RATE * 8 * len(robot.motors)  # bytes of a whole record
     with _launched(file, folder) as process:
-        written, stands_at = -1, time.monotonic() + BEGINS
+        written, stands_at = 0, time.monotonic() + BEGINS
         while process.poll() is None:  # robot_sim counts the ticks, and the launcher ends with it
             time.sleep(LOOK)
             size = _size(folder / POSITIONS)

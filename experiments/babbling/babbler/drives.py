@@ -40,40 +40,37 @@ class AtDrives:
         self._commands = {part: service.bus.publisher(keys.command(part), Command, service.bus.control) for part in robot.parts}
         self._epochs = dict.fromkeys(robot.parts, 0)
         self._retry_at = 0  # tick
-        self._move: PositionMove | None = None
-        self._begin = 0  # tick
-        self._reference = robot.home
-        self._target = robot.home
+        self._reference = self._target = robot.home
+        self._move = PositionMove(robot.home, robot.home, self._speed)
+        self._begin = 0  # tick of the command under way, 0: none
+        self._is_refused = True  # it was ended by what guards the robot
         service.on_run(self._forget)
 
     def move(self, clock: Clock) -> None:
         """One tick."""
         states = self._states.newest
         if not all(states[part].gate == "armed" and states[part].epoch == epoch for part, epoch in self._epochs.items()):
-            self._end(clock.k, "refused")
-            self._move = None
+            self._is_refused = True
             self._arm(clock)
             return
-        since = (clock.k - self._begin) * clock.dt * 1e-9
-        if self._move is not None and since >= self._move.duration + REST:
+        if self._is_refused:  # only now is it known where what guards the robot has left it
+            self._end(clock.k, "refused")
+            self._start(clock.k, np.concatenate([states[part].q for part in self._robot.parts]))
+        elif (clock.k - self._begin) * clock.dt * 1e-9 >= self._move.duration + REST:
             self._end(clock.k, "over")
             self._start(clock.k, self._reference)
-        elif self._move is None:
-            self._start(clock.k, np.concatenate([states[part].q for part in self._robot.parts]))
         self._send(clock)
 
     def _start(self, k: int, here: Array) -> None:
         limits = self._robot.limits
-        self._target, self._begin = self._targets.next(), k
+        self._target, self._begin, self._is_refused = self._targets.next(), k, False
         self._move = PositionMove(here.clip(limits[:, 0], limits[:, 1]), self._target, self._speed)
 
     def _end(self, k: int, ending: Ending) -> None:
-        if self._move is not None:
+        if self._begin:
             self._note(Commanded(self._begin, k, self._target.tolist(), dict.fromkeys(self._robot.parts, ending)))
 
     def _send(self, clock: Clock) -> None:
-        if self._move is None:
-            return
         self._reference = self._move.at((clock.k - self._begin) * clock.dt * 1e-9)
         for part, publisher in self._commands.items():
             where = self._robot.parts[part].slice
@@ -93,8 +90,8 @@ class AtDrives:
                 self._epochs[part] = taken.epoch
             except CallFailed as failed:
                 self._service.log.info("%s cannot be armed yet: %s", part, failed)
+                return  # whoever refuses one part now refuses them all
 
     def _forget(self) -> None:
-        self._move = None
         self._epochs = dict.fromkeys(self._epochs, 0)
-        self._retry_at = 0
+        self._retry_at = self._begin = 0

@@ -20,9 +20,10 @@ PARTS = ("torso", "head", "left_arm", "right_arm")
 
 def trial(depths: tuple[float, ...] = (), completed: int = 4, jerk: float = 4.0, beyond: float = -0.1, seconds: float = 60.0) -> Trial:
     outcomes = {part: "completed" if i < completed else "deflected" for i, part in enumerate(PARTS)}
-    command = Judged(outcomes, dict.fromkeys(PARTS, "over"), 10.0, 12.0, 11.0, 6.0)
+    left = {part: 0.1 if i < completed else 0.5 for i, part in enumerate(PARTS)}
+    command = Judged(outcomes, dict.fromkeys(PARTS, "over"), left, 10.0, 12.0, 11.0)
     touches = [Touch("l_forearm table", 10 * i, 10 * i, depth) for i, depth in enumerate(depths)]
-    return Trial(seconds, [command], touches, beyond, "torso_yaw", jerk**2, 50.0, 12.0)
+    return Trial(seconds, [command], touches, beyond, "torso_yaw", 0.25, jerk**2, 50.0, 12.0)
 
 
 GOOD = {"off": trial((0.001, 0.003)), "one": trial(completed=1, jerk=9.0), "two": trial(completed=3)}
@@ -64,7 +65,9 @@ def test_trials_add_up() -> None:
     row = summarise([trial((0.001,), jerk=3.0, seconds=60.0), trial((0.004, 0.0), completed=1, jerk=5.0, seconds=120.0, beyond=0.0)])
     assert (row["minutes"], row["collisions"], row["deepest_mm"], row["worst_beyond_limit_deg"]) == (3.0, 3, 4.0, 0.0)
     assert (row["commands"], row["completed"], row["deflected"], row["postures_completed"]) == (8, 5, 3, 1)
+    assert (row["within_5_deg"], row["left_median_deg"]) == (0, 5.73)
     assert row["jerk_rms"] == pytest.approx(((9.0 + 2 * 25.0) / 3.0) ** 0.5, abs=0.01)
+    assert row["jerk_over_speed"] == pytest.approx(row["jerk_rms"] / 0.5, abs=0.1)
     assert row["path_a_minute_rad"] == 8.0
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.babbling.command_log import COMMANDS, Commanded, CommandLog, finished_at, read_commands
-from experiments.babbling.measured import CONTACTS, POSITIONS, TOLERANCE, judge, measure, read_trial, write_trial
+from experiments.babbling.measured import CONTACTS, POSITIONS, REACHED, RETURNED, judge, measure, read_trial, write_trial
 from experiments.babbling.moved import moved_motors
 from mobee import load_robot
 from mobee.errors import MobeeError
@@ -34,14 +34,15 @@ def test_a_command_is_completed_deflected_or_returned_part_by_part() -> None:
     target = ROBOT.home.copy()
     target[[part("torso").start, part("head").start, part("left_arm").start]] += 0.3
     end = target.copy()
-    end[part("torso").start] -= 0.9 * TOLERANCE
-    end[part("head").start] -= 1.1 * TOLERANCE
-    end[part("left_arm").start] = ROBOT.home[part("left_arm").start] + 0.5 * TOLERANCE
+    end[part("torso").start] -= 0.9 * REACHED
+    end[part("head").start] -= 1.1 * REACHED
+    end[part("left_arm").start] = ROBOT.home[part("left_arm").start] + 0.5 * RETURNED
     judged = judge(commanded(target), ramp(end), ROBOT, DT)
     assert judged.outcomes == {"torso": "completed", "head": "deflected", "left_arm": "returned", "right_arm": "completed"}
     assert judged.duration == pytest.approx((TICKS - 1) * DT)
     assert judged.way == pytest.approx(0.9)
-    assert judged.path == pytest.approx(0.9 - 2.0 * TOLERANCE - (0.3 - 0.5 * TOLERANCE))
+    assert judged.path == pytest.approx(0.6 - 2.0 * REACHED + 0.5 * RETURNED)
+    assert judged.left == pytest.approx({"torso": 0.9 * REACHED, "head": 1.1 * REACHED, "left_arm": 0.3 - 0.5 * RETURNED, "right_arm": 0.0})
 
 
 def test_the_hands_do_not_count() -> None:
