@@ -96,15 +96,44 @@ def _check_lengths(message: Struct, **lengths: int | None) -> None:
             raise Refused("length", f"{type(message).__name__}.{name}: {len(value)} numbers, expected {expected}")
 
 
+@cache
+def _numbers(cls: type[Struct]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of the fields that are a float, a list of floats, or something with a float in it; the rest is always finite."""
+    kinds = {name: _number_kind(hint) for name, hint in get_type_hints(cls).items()}
+    return (
+        tuple(name for name, kind in kinds.items() if kind == "float"),
+        tuple(name for name, kind in kinds.items() if kind == "floats"),
+        tuple(name for name, kind in kinds.items() if kind == "mixed"),
+    )
+
+
+def _number_kind(hint: Any) -> str:
+    if hint is float:
+        return "float"
+    if isinstance(hint, type) and issubclass(hint, Struct):
+        return "mixed" if any(_numbers(hint)) else ""
+    inner = [kind for kind in map(_number_kind, get_args(hint)) if kind]
+    return "" if not inner else "floats" if get_origin(hint) is list and inner == ["float"] else "mixed"
+
+
 def _finite(value: Any) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
     if isinstance(value, list):
-        if value and isinstance(value[0], float):
-            return math.isfinite(sum(value)) or all(map(math.isfinite, value))  # the sum is quicker, but may overflow
-        return all(_finite(item) for item in value)
+        return _all_finite(value) if value and isinstance(value[0], float) else all(map(_finite, value))
     if isinstance(value, dict):
-        return all(_finite(item) for item in value.values())
+        return all(map(_finite, value.values()))
     if isinstance(value, Struct):
-        return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
+        singles, lists, mixed = _numbers(type(value))
+        for name in singles:
+            if not math.isfinite(getattr(value, name)):
+                return False
+        for name in lists:
+            if not _all_finite(getattr(value, name)):
+                return False
+        return all(_finite(getattr(value, name)) for name in mixed) if mixed else True
     return True
+
+
+def _all_finite(values: list[float]) -> bool:
+    return math.isfinite(sum(values)) or all(map(math.isfinite, values))  # the sum is quicker, but may overflow

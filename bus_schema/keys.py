@@ -52,6 +52,11 @@ def done(who: str) -> str:
     return f"done/{chunk(who)}"
 
 
+def turn(who: str) -> str:
+    """Lockstep: a tick waits for that participant."""
+    return f"turn/{chunk(who)}"
+
+
 def meta(part: str) -> str:
     """What a part is made of: robot_sim, on request."""
     return f"{chunk(part)}/meta"

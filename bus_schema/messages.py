@@ -56,6 +56,12 @@ class StepDone(Message, frozen=True, kw_only=True):
     last: bool = False  # it takes part no longer
 
 
+class Turn(Message, frozen=True, kw_only=True):
+    """Lockstep: tick k waits for one participant, which may have something to decide."""
+
+    dt: Count  # ns a tick
+
+
 class State(Message, frozen=True, kw_only=True):
     """Motor state of a part, at the part's own sampling time t."""
 

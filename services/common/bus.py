@@ -77,6 +77,7 @@ class Bus:
     def __init__(self, session: zenoh.Session, who: str, log: logging.Logger) -> None:
         self.session, self.who, self.log = session, who, log
         self.run, self.k, self.t = NO_RUN, 0, 0
+        self.dt = 0  # ns a tick
         self.part_sizes: dict[str, int] = {}
         self.robot_size: int | None = None
         self.rejected: Counter[str] = Counter()

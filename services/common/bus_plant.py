@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Motion, StepDone
+from bus_schema.messages import Clock, Motion, Turn
 from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.plant import Outcome
@@ -40,12 +40,13 @@ class BusPlant:
         self._participant = Participant(service)
         self._wanted: set[str] = set()  # parts that somebody measured
         self._to_answer: int | None = None  # lockstep: a tick that waits for this service
-        if service.locked:
-            service.on_newest(keys.done("controller"), StepDone, self._note_step)
         for part in parts:
             robot.part(part)
             service.on_newest(keys.motion(part), Motion, self._noter(part), part=part)
-        service.on_clock(self._note_clock)
+        if service.locked:
+            service.on_turn(self._note_turn)
+        else:
+            service.on_clock(self._note_clock)
         service.on_run(self._new_run)
 
     def measure(self, part: str) -> Array:
@@ -108,9 +109,9 @@ class BusPlant:
             self._participant.done(self._to_answer)
         self._to_answer = None
 
-    def _note_step(self, done: StepDone) -> None:
-        if done.re_k == 0 or self._service.who not in done.busy:
-            self._to_answer = done.re_k
+    def _note_turn(self, turn: Turn) -> None:
+        self._tick = turn.dt * 1e-9
+        self._to_answer = turn.k
 
     def _ask(self, part: str, action_id: str, target: Array) -> int:
         """Start the action; returns the tick at which it began."""

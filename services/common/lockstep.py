@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 
 from bus_schema import keys
-from bus_schema.messages import StepDone
+from bus_schema.messages import StepDone, Turn
 from services.common.delivery import STEP
 from services.common.service import Service
 
@@ -24,7 +24,7 @@ class Participant:
     """One who answers every tick, or every tick at which there is something to decide."""
 
     def __init__(self, service: Service) -> None:
-        self._locked = service.config.mode == "lock"
+        self._locked = service.keeps_step = service.locked
         self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
         if self._locked:
             self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
@@ -46,7 +46,8 @@ class Barrier:
     """Who must answer, and who has.
 
     A participant counts from its first answer on until its token goes, until it is dropped for being late, or until its last
-    answer; when it answers again it counts again.  Who is named busy by the controller's answer need not answer that tick.
+    answer; when it answers again it counts again.  Who is named busy by the controller's answer need not answer that tick; the
+    others are told by then that it is their turn, so that an agent need not listen to every tick.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Barrier:
         self._expected = set(participants)
         self._present: set[str] = set()
         self._answers: dict[str, StepDone] = {}
+        self._turns = {who: service.bus.publisher(keys.turn(who), Turn, STEP) for who in sorted(self._expected - {referee})}
         service.on_each(keys.ALL_DONE, StepDone, self._note)
         service.on_alive(self._note_alive)
 
@@ -79,6 +81,8 @@ class Barrier:
 
     def wait(self, k: int) -> list[str]:
         """Handle what comes until tick k is answered by all, or until those who have not are late: these are dropped, and named."""
+        if self._referee not in self._present:
+            self._give_turns(())
         self._service.spin(time.monotonic() + CEILING, lambda: not self.missing(k))
         late = self.missing(k)
         for who in late:
@@ -89,6 +93,15 @@ class Barrier:
         if who in self._present:
             self._present.discard(who)
             self._tell(who, why)
+            if who == self._referee:
+                self._give_turns(())
+
+    def _give_turns(self, busy: Sequence[str]) -> None:
+        k = self._service.bus.k
+        for who, turn in self._turns.items():
+            answer = self._answers.get(who)
+            if k == 0 or (who not in busy and (answer is None or answer.re_k < k)):
+                turn.put(dt=self._service.bus.dt)
 
     def _note(self, done: StepDone) -> None:
         self._answers[done.src] = done
@@ -97,6 +110,8 @@ class Barrier:
             self._expected.discard(done.src)
             return
         self._present.add(done.src)
+        if done.src == self._referee and done.re_k == self._service.bus.k:
+            self._give_turns(done.busy)
         if not done.ok:
             self._tell(done.src, f"lacked something at tick {done.re_k}")
 

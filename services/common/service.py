@@ -18,7 +18,7 @@ import zenoh.ext
 from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
-from bus_schema.messages import Clock, Message
+from bus_schema.messages import Clock, Message, Turn
 from bus_schema.rpc import Config, Done, Empty, Failure, Reply, Request, Stat
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
@@ -32,6 +32,7 @@ from services.common.session import open_client
 _M = TypeVar("_M", bound=Message)
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
+_T = TypeVar("_T", Clock, Turn)
 
 ORPHANED = 10.0  # s without a router after which a service ends
 REMEMBERED = 256  # replies kept, so that a repeated call is harmless
@@ -72,6 +73,7 @@ class Service:
     def _begin(self, session: zenoh.Session, robot: Robot | None) -> None:
         self.bus = Bus(session, self.who, self.log)
         self.locked = self.config.mode == "lock"
+        self.keeps_step = False  # a Participant of lockstep says otherwise
         self.bus.control = STEP if self.locked else LATEST
         self.patience = rpc.LOCKED_TIMEOUT if self.locked else rpc.TIMEOUT  # s that a call waits for its answer
         if robot is not None:
@@ -112,8 +114,7 @@ class Service:
 
     def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
         """Have the newest message of a stream handled; older ones waiting are overwritten."""
-        slot = Newest(self.inbox, lambda sample: self._deliver(cls, sample, handler, part))
-        self._subscribe(key, slot.offer)
+        self._subscribe(key, self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
 
     def on_each(
         self,
@@ -140,27 +141,45 @@ class Service:
         else:
             self._subscribe(key, enqueue)
 
+    def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
+        """The newest sample only; one after the other for who keeps step, since a slot would mix up the order of two streams."""
+        slot = Newest(self.inbox, handle)
+
+        def offer(sample: zenoh.Sample) -> None:
+            if self.keeps_step:
+                self.inbox.put(lambda: handle(sample))
+            else:
+                slot.offer(sample)
+
+        return offer
+
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
         """Each subscriber has a thread of its own, which in lockstep would mix up what one service put on two keys."""
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self.locked else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
+        self._on_time(keys.CLOCK, Clock, handler)
 
+    def on_turn(self, handler: Callable[[Turn], None]) -> None:
+        """Lockstep, instead of `on_clock`: have only those ticks handled that wait for this service."""
+        self._on_time(keys.turn(self.who), Turn, handler)
+
+    def _on_time(self, key: str, cls: type[_T], handler: Callable[[_T], None]) -> None:
         def tick(sample: zenoh.Sample) -> None:
-            clock = self.bus.receive(Clock, sample, any_run=True)
-            if clock is None:
+            time = self.bus.receive(cls, sample, any_run=True)
+            if time is None:
                 return
-            self.bus.k, self.bus.t = clock.k, clock.t
-            if clock.run != self.bus.run:
-                known, self.bus.run = self.bus.run, clock.run
+            self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
+            if time.run != self.bus.run:
+                known, self.bus.run = self.bus.run, time.run
                 if known != NO_RUN:
-                    self.bus.event("warning", "new_run", f"robot_sim started run {clock.run} after {known}")
+                    self.bus.event("warning", "new_run", f"robot_sim started run {time.run} after {known}")
                 for announce in self._on_run:
                     announce()
-            handler(clock)
+            handler(time)
 
-        self._subscribe(keys.CLOCK, Newest(self.inbox, tick).offer)
+        self._subscribe(key, self._newest(tick))
 
     def on_run(self, handler: Callable[[], None]) -> None:
         """Have it called at the first tick of every run."""

@@ -17,12 +17,13 @@ from services.common.body import Body
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.lockstep import Participant
 from services.common.service import Service
-from services.controller.action import Action, busy_owners
+from services.controller.action import Action, Owner, busy_owners
 from services.controller.config import Config
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 
 OLDEST = 3  # ticks: with forces older than that the robot holds
+SOMETIMES = 10  # ticks: so often a part under way tells of its motion in lockstep
 STALE = 100_000_000  # ns: a part whose state is older than that is not under control
 
 
@@ -44,6 +45,7 @@ class ControllerNode:
         self._motions = {part: bus.publisher(keys.motion(part), Motion, bus.control) for part in robot.parts}
         self._step_to_answer: tuple[int, bool] | None = None  # lockstep: tick, whether nothing was lacking
         self._participant = Participant(service)
+        self._told: dict[str, tuple[str, Owner | None]] = {}  # lockstep: of each part's last motion message
         self._drives.answered = self._answer
         self._mark()
         service.mark, service.describe = self._mark, self._describe
@@ -181,6 +183,8 @@ class ControllerNode:
     def _publish_motion(self, clock: Clock) -> None:
         touched = self._forces.touched if self._forces is not None else {}
         for part, action in self._actions.items():
+            if clock.mode == "lock" and self._goes_without_saying(part, clock.k):
+                continue
             where = self._robot.part(part).slice
             self._motions[part].put(
                 k=clock.k,
@@ -196,6 +200,12 @@ class ControllerNode:
                 goal=self._law.attractor[where].tolist(),
                 touched=touched.get(part, []),
             )
+
+    def _goes_without_saying(self, part: str, k: int) -> bool:
+        """Lockstep: whether the part is under way as it was, which is told only now and then."""
+        action = self._actions[part]
+        known, self._told[part] = self._told.get(part), (action.id, action.owner)
+        return action.status == "moving" and known == self._told[part] and action.since_k < k and k % SOMETIMES > 0
 
     def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)

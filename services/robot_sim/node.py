@@ -41,7 +41,7 @@ class Node:
         self._dt_ns = round(1e9 / config.rate)
         self._dt = self._dt_ns / 1e9
         self._period = self._dt / config.speed  # s of real time a tick
-        self._bus.run = _new_run()
+        self._bus.run, self._bus.dt = _new_run(), self._dt_ns
         self._paused = False
         self._guard = Guard(service, robot, backend, self._dt)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
@@ -162,6 +162,8 @@ class Node:
     def _publish_truth(self) -> None:
         gap = self._backend.gap()
         self._counters.count_gap(gap)
+        if not self._truth.heard:
+            return
         self._truth.put(
             q=self._backend.motors.q.tolist(),
             depth=self._deepest.depth,
