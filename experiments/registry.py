@@ -10,9 +10,13 @@ from typing import Any, Protocol, cast
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
+    "babbling": "experiments.babbling",
     "clauses": "experiments.clauses",
     "flood": "experiments.flood",
     "settle": "experiments.settle",
+    "shove": "experiments.shove",
+    "tune": "experiments.tune",
+    "wall": "experiments.wall",
 }
 
 

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             for kind, tries in (("attractors", arguments.tries), ("forced", arguments.forced_tries)):
                 path = folder / f"{gains}-{kind}.json"
                 state = load(path, gains, kind == "forced", arguments.seed)
-                for state in search(state, tries):
+                for _ in search(state, tries):
                     keep(path, state)
                     progress.show(state.tries / tries, f"{gains}, {kind}: worst {state.worst:.2f} degrees after {state.tries} tries")
                 found.setdefault(gains, {})[kind] = results(state)

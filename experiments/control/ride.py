@@ -11,6 +11,7 @@ from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 GAINS = ("default", "published_2014")
+CALM = 0.4  # s, for motors with a lag of 50 ms
 PERIOD = {"default": 0.01, "published_2014": 0.02}  # s, the tick at which each set is used
 
 
@@ -48,6 +49,10 @@ def ride(plant: OfflinePlant, seconds: float, before: Callable[[int], None] | No
 
 
 def place(plant: OfflinePlant, q: Array) -> None:
-    """Put a plant that has not ticked yet at rest at q (n,) rad, its attractor there."""
+    """Put a plant at rest at q (n,) rad, its attractor there: the joints are held until the motors have calmed down."""
+    plant.controller.reset(q)
+    for _ in range(round(CALM / plant.dt)):
+        plant.motors.adopt(q)
+        plant.tick()
     plant.motors.adopt(q)
     plant.controller.reset(q)

@@ -23,7 +23,7 @@ from experiments.options import positive_number, positive_whole
 from experiments.progress import Progress
 from experiments.records import Records, read_records
 from experiments.settle.figure import draw
-from experiments.settle.responses import COLUMNS, Response, postures, responses
+from experiments.settle.responses import Response, postures, responses
 
 NAME = "settle"
 CLAIM = "every motor and whole postures settle in about a second without overshoot, at control periods of 1 to 20 ms"
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     path = folder / RECORDS
     done = {(r.gains, r.period_ms, r.step) for r in read_responses(path)}
     targets = postures(arguments.postures, arguments.seed)
-    with Records(path, COLUMNS) as records, Progress() as progress:
+    with Records(path, Response.columns()) as records, Progress() as progress:
         for number, gains in enumerate(arguments.gains):
             for place, period in enumerate(arguments.periods):
                 share = (number + place / len(arguments.periods)) / len(arguments.gains)
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def read_responses(path: Path) -> list[Response]:
     """What a run has so far."""
-    return [Response.of_record(row) for row in read_records(path, COLUMNS)]
+    return [Response.of_record(row) for row in read_records(path, Response.columns())]
 
 
 def results(found: Sequence[Response]) -> dict[str, Any]:
@@ -72,14 +72,18 @@ def results(found: Sequence[Response]) -> dict[str, Any]:
                 table.setdefault(gains, {})[f"{period:g} ms"] = {
                     "steps": len(mine),
                     "never_settled": sum(not r.is_settled for r in mine),
-                    "settling_time_s": [round(f([r.settling for r in mine]), 2) for f in (np.median, np.max)],
-                    "overshoot": [round(f([r.overshoot for r in mine]), 4) for f in (np.median, np.max)],
-                    "error_deg": [round(f([r.error_deg for r in mine]), 2) for f in (np.median, np.max)],
-                    "rest_deg": [round(f([r.rest_deg for r in mine]), 3) for f in (np.median, np.max)],
+                    "settling_time_s": _median_and_worst([r.settling for r in mine]),
+                    "overshoot": _median_and_worst([r.overshoot for r in mine]),
+                    "error_deg": _median_and_worst([r.error_deg for r in mine]),
+                    "rest_deg": _median_and_worst([r.rest_deg for r in mine]),
                 }
     judged = [r for r in found if r.gains == "default"]
     passed = all(r.is_settled and r.overshoot <= OVERSHOOT and r.settling <= SETTLED for r in judged)
     return {"passed": passed, "each": "median and worst", **table}
+
+
+def _median_and_worst(values: Sequence[float]) -> list[float]:
+    return [round(float(np.median(values)), 4), round(max(values), 4)]
 
 
 def figure(folder: Path) -> Path:

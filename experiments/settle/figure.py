@@ -39,6 +39,8 @@ def draw(found: Sequence[Response], path: Path) -> Path:
                 )  # fmt: skip
     for axes, label in ((time, "settling time to 5 % [s]"), (overshoot, "overshoot [% of the step]")):
         axes.set(xlabel="control period [ms]", ylabel=label, xscale="log", ylim=(0.0, None), title="median, least and most")
+        axes.set_xticks(ticks := sorted({r.period_ms for r in found}), [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
     time.legend(fontsize=7)
     for gains in GAINS:
         numbers = Gains.named(gains)
@@ -47,7 +49,8 @@ def draw(found: Sequence[Response], path: Path) -> Path:
             done = step_ride(numbers, 1e3 * PERIOD[gains], start, end, seed=i)
             joint = model().robot.motors.index(motor)
             share = (done.q[:, joint] - start[joint]) / (end - start)[joint]
-            steps.plot(done.times, share, color=COLORS[gains], alpha=0.5, linewidth=1.0, label=f"{gains}: {', '.join(SHOWN)}" if not i else None)
+            label = f"{gains}: {', '.join(SHOWN)}" if i == 0 else None
+            steps.plot(done.times, share, color=COLORS[gains], alpha=0.5, linewidth=1.0, label=label)
     steps.axhline(1.0, color="0.5", linewidth=0.8)
     steps.set(xlabel="time [s]", ylabel="share of the step", title="Steps of single motors", xlim=(0.0, 5.0))
     steps.legend(fontsize=6, loc="lower right")

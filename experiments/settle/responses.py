@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from experiments.control.margins import clause_violations
 from experiments.control.ride import Ride, place, ride
+from experiments.control.row import Row
 from mobee import Gains, Model, load_robot
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
@@ -25,7 +26,7 @@ MARGIN = np.deg2rad(15.0)  # from every constraint, of a posture
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class Response(Row):
     """A row of settle.csv."""
 
     gains: str
@@ -36,19 +37,6 @@ class Response:
     error_deg: float  # between rest and attractor
     rest_deg: float  # standard deviation at rest
     is_settled: bool
-
-    def record(self) -> dict[str, object]:
-        """For the file."""
-        return {key: round(value, 6) if isinstance(value, float) else value for key, value in asdict(self).items()}
-
-    @classmethod
-    def of_record(cls, row: Mapping[str, str]) -> Response:
-        """From the file."""
-        settling, overshoot, error, rest = (float(row[key]) for key in ("settling", "overshoot", "error_deg", "rest_deg"))
-        return cls(row["gains"], float(row["period_ms"]), row["step"], settling, overshoot, error, rest, row["is_settled"] == "True")
-
-
-COLUMNS = tuple(field.name for field in fields(Response))
 
 
 @lru_cache(maxsize=1)
@@ -115,8 +103,7 @@ def judge(done: Ride, start: Array, end: Array, gains: str, period_ms: float, st
     moved = np.abs(end - start) >= WORTH
     rest = done.last(REST).q[:, moved]
     final = rest.mean(axis=0)
-    size = final - start[moved]
-    beyond = (done.q[:, moved] - final) / size
+    beyond = (done.q[:, moved] - final) / (end - start)[moved]
     outside = np.abs(beyond) > BAND
     settling = done.dt * max(int(np.flatnonzero(row)[-1]) + 1 if row.any() else 0 for row in outside.T)
     return Response(

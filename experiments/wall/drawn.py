@@ -1,0 +1,115 @@
+"""A hand is drawn to a target by J^T (thesis Algorithm 5) and watched: does it stop dead, does it oscillate?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from experiments.control.depths import oscillation
+from experiments.control.ride import PERIOD, place, ride
+from experiments.control.row import Row
+from mobee import Gains, Model, load_robot
+from mobee.robot.robot import Array
+from mobee.simulation import OfflinePlant
+
+MARKER, ARM = "left_palm", "left_arm"
+PULL, STRONGEST = 200.0, 60.0  # 1/s^2 and m/s^2: the force on the hand per m of distance, and its bound
+SECONDS = {"default": 20.0, "published_2014": 30.0}
+REST = 3.0  # s, the end of the ride
+SLOW, NEAR = 1e-3, 0.01  # m/s, m: slower than this, farther than that from where it comes to rest, the hand has stopped dead
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn(Row):
+    """What came of it."""
+
+    gains: str
+    target: str
+    oscillation_mm: float  # at rest
+    dead_s: float  # the longest time without motion before it was at rest
+    from_target_mm: float  # at rest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """The hand over time."""
+
+    times: Array  # (T,) s
+    place: Array  # (T, 3) m
+    target: Array  # (T, 3) m
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """First motors of the left arm at the start [deg], and targets one after the other: from the palm at home [m], root frame."""
+
+    start: tuple[float, ...]
+    targets: tuple[tuple[float, float, float], ...]
+
+
+HOME = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)
+STRETCHED = (-70.0, 30.0, 0.0, 16.0, 0.0, -40.0, 0.0)
+ALIGNED = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)  # the axes of prosup and wrist yaw: at wrist pitch 0
+DRAWN = {
+    "in reach": Goal(HOME, ((-0.05, 0.0, 0.15),)),
+    "stretched, ahead": Goal(HOME, ((-0.5, 0.0, 0.1),)),
+    "stretched, aside": Goal(HOME, ((0.1, -0.6, 0.1),)),
+    "stretched, above": Goal(HOME, ((0.0, 0.0, 0.8),)),
+    "behind the robot": Goal(HOME, ((0.8, -0.1, 0.2),)),
+    "out of a stretched arm": Goal(STRETCHED, ((-0.02, 0.05, 0.05),)),
+    "stretched and back": Goal(HOME, ((-0.5, 0.0, 0.15), (0.0, 0.0, 0.1))),
+    "wrist axes aligned": Goal(ALIGNED, ((-0.05, 0.1, 0.1), (-0.05, -0.1, 0.1))),
+}
+
+
+@lru_cache(maxsize=1)
+def model() -> Model:
+    """The iCub alone."""
+    return Model(load_robot("icub"))
+
+
+def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
+    """Draw the hand to the targets of a goal, each for its share of the time."""
+    goal, robot = DRAWN[name], model().robot
+    plant = OfflinePlant(model(), seed, Gains.named(gains), dt=PERIOD[gains])
+    start = robot.home.copy()
+    first = robot.parts[ARM].start
+    start[first : first + len(goal.start)] = np.deg2rad(goal.start)
+    place(plant, start)
+    home = model().evaluate(robot.home).position(MARKER)
+    targets = [home + np.array(target) for target in goal.targets]
+    ticks = round(SECONDS[gains] / plant.dt / len(targets))
+
+    def pull(tick: int) -> None:
+        _pull(plant, targets[min(tick // ticks, len(targets) - 1)])
+
+    done = ride(plant, ticks * plant.dt * len(targets), pull)
+    hand = model().evaluate(done.q).position(MARKER)
+    target = np.repeat(targets, ticks, axis=0)
+    dead = max(_dead(hand[i * ticks : (i + 1) * ticks], plant.dt) for i in range(len(targets)))
+    restless = oscillation(model(), done.last(REST), MARKER)
+    left = float(np.linalg.norm(hand[-1] - targets[-1]))
+    return Drawn(gains, name, 1e3 * restless, dead, 1e3 * left), Way(done.times, hand, target)
+
+
+def _pull(plant: OfflinePlant, target: Array) -> None:
+    """The arm gives way and the hand is drawn by a bounded spring, from where the encoders say that it is."""
+    q = plant.controller.attractor
+    where = plant.robot.parts[ARM].slice
+    q[where] = plant.measure(ARM)
+    distance = target - plant.model.evaluate(q).position(MARKER)
+    force = PULL * distance
+    plant.controller.set_attractor(ARM, q[where])
+    plant.controller.push(MARKER, force * min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9)))
+
+
+def _dead(hand: Array, dt: float) -> float:
+    """The longest time [s] in which the hand (T, 3) m was SLOW although NEAR where it ends it was not."""
+    window = max(1, round(0.1 / dt))  # the play of the motors makes single ticks count for nothing
+    speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
+    stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
+    begins = np.flatnonzero(stopped & ~np.r_[False, stopped[:-1]])
+    ends = np.flatnonzero(stopped & ~np.r_[stopped[1:], False])
+    return float((ends - begins + 1).max() * dt) if len(begins) else 0.0
