@@ -9,6 +9,8 @@ from mobee_cli.errors import ENVIRONMENT, UserError
 
 # One module of this package a benchmark: `add_arguments(parser)`, and `run(arguments)`, which returns the exit code.
 BENCHES = {
+    "lockstep": "the live processes in lockstep, in multiples of real time",
+    "live": "the live processes in real time: how late commands are",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
@@ -27,9 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     from experiments.bench.mujoco_peer import MujocoMissing
+    from experiments.launched import LaunchFailed
 
     try:
         code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
-    except MujocoMissing as error:
+    except (MujocoMissing, LaunchFailed) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     return code

@@ -14,6 +14,7 @@ from mobee.control import Forces
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
+from services.common.figures import Percentiles
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.lockstep import Participant
 from services.common.service import Service
@@ -47,6 +48,7 @@ class ControllerNode:
         self._participant = Participant(service)
         self._told: dict[str, tuple[str, Owner | None]] = {}  # lockstep: of each part's last motion message
         self._drives.answered = self._answer
+        self._jitter = Percentiles()  # ms, of the time between two steps
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
@@ -119,11 +121,19 @@ class ControllerNode:
 
     def _control(self, clock: Clock, fresh: bool) -> None:
         gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
+        self._long_gaps += gap > OLDEST
+        self._watch_period(gap * clock.dt * 1e-9 / clock.rate)
         if fresh and self._forces is not None:
             self._advance(clock, min(gap, OLDEST), self._forces)
         else:
             self._starve(clock.k)
         self._ticks += 1
+
+    def _watch_period(self, due: float) -> None:
+        """How far from due [s] after the tick before this one comes; in lockstep none is due."""
+        before, self._stepped_at = self._stepped_at, time.monotonic()
+        if before > 0.0 and not self._service.locked:
+            self._jitter.add(abs(self._stepped_at - before - due) * 1e3)
 
     def _has_begun(self) -> bool:
         """Lockstep, tick 0: whether all is under control that can be, and somebody hears the commands."""
@@ -232,9 +242,18 @@ class ControllerNode:
             self._goals.clear(part)
 
     def _mark(self) -> None:
-        self._ticks = self._late_forces = self._held_ticks = 0
+        self._ticks = self._late_forces = self._held_ticks = self._long_gaps = 0
+        self._stepped_at = 0.0  # s, monotonic clock
+        self._jitter.clear()
 
     def _describe(self) -> tuple[str, dict[str, float]]:
-        numbers: dict[str, float] = {"ticks": self._ticks, "late_forces": self._late_forces, "held_ticks": self._held_ticks}
+        numbers: dict[str, float] = {
+            "ticks": self._ticks,
+            "late_forces": self._late_forces,
+            "held_ticks": self._held_ticks,
+            "long_gaps": self._long_gaps,
+            "jitter_ms_p50": self._jitter.at(50),
+            "jitter_ms_p99": self._jitter.at(99),
+        }
         under = [part for part, action in self._actions.items() if action.status != "held"]
         return f"{len(under)} of {len(self._actions)} parts under control", numbers

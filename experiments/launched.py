@@ -1,0 +1,74 @@
+"""A whole system of real processes, launched as a user launches it, and what it sums up."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mobee.errors import MobeeError
+
+_STARTS, _ENDS = 120.0, 30.0  # s
+
+
+class LaunchFailed(MobeeError):
+    """A system that did not come to its end; the message is its last word."""
+
+
+def summary_of(
+    scenario: str,
+    settings: Sequence[str] = (),
+    *,
+    duration: float | None = None,
+    ticks: int | None = None,
+    environment: Mapping[str, str] | None = None,
+    runs: Path | None = None,
+) -> dict[str, Any]:
+    """Launch a scenario without monitor, wait for its end, and return its summary.  Raises LaunchFailed.
+
+    It ends after `duration` seconds, or in lockstep after so many `ticks`.  `runs`: where its folder stays; None: nowhere.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--json", "--endpoint", _free_endpoint()]
+        argv += ["--runs", str(runs or scratch)]
+        argv += [] if duration is None else ["--duration", str(duration)]
+        argv += [] if ticks is None else ["--ticks", str(ticks)]
+        for setting in settings:
+            argv += ["--set", setting]
+        # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
+        process = subprocess.Popen(
+            argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0, env={**os.environ, **(environment or {})}
+        )
+        try:
+            said, news = process.communicate(timeout=None if ticks else _STARTS + _ENDS + (duration or 0.0))
+        except subprocess.TimeoutExpired:
+            raise LaunchFailed(f"{scenario}: no end in sight") from None
+        finally:
+            _stop(process)
+    if process.returncode != 0:
+        raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(news.strip().splitlines() or ['it said nothing'])[-1]}")
+    return dict(json.loads(said))
+
+
+def _stop(process: subprocess.Popen[str]) -> None:
+    if process.poll() is not None:
+        return
+    process.send_signal(signal.SIGINT)
+    try:
+        process.communicate(timeout=_ENDS)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def _free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
