@@ -40,16 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Shove in every direction with ever more force."""
     path = folder / RECORDS
-    found = read_shoved(path)
-    done = {(s.law, s.direction, s.force) for s in found}
+    done = {(s.law, s.direction, s.force) for s in read_shoved(path)}
     cases = [(law, direction, force) for law in arguments.laws for direction in arguments.directions for force in FORCES]
     with Records(path, Shoved.columns()) as records, Progress() as progress:
         for number, case in enumerate(cases):
             if case not in done:
-                found.append(shove(*case, arguments.seed))
-                records.append(found[-1].record())
+                records.append(shove(*case, arguments.seed).record())
             progress.show(number / len(cases), " ".join(map(str, case)))
-    return results(found)
+    return results(read_shoved(path))
 
 
 def read_shoved(path: Path) -> list[Shoved]:

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import pytest
+
+from experiments import shove
+from experiments.shove import shoving
+from mobee.control.modality import FRICTION, INERTIA
+from mobee.simulation import OfflinePlant
+
+
+def test_a_shove_speeds_a_joint_up_as_inertia_and_friction_say() -> None:
+    plant = OfflinePlant(shoving.model())
+    push = np.array([0.0, 0.0, -1.0])
+    torque = plant.model.jacobian(plant.motors.q, shoving.MARKER)[:3].T @ push
+    before = plant.motors.q.copy()
+    step = shoving.Shove(plant, push, 0.0, 1.0)
+    step(0)
+    moved = (plant.motors.q - before) / plant.dt
+    elbow = plant.robot.motors.index("l_elbow")
+    assert moved[elbow] == pytest.approx(torque[elbow] / FRICTION * (1.0 - np.exp(-FRICTION / INERTIA * plant.dt)))
+
+
+def test_before_its_time_a_shove_moves_nothing() -> None:
+    plant = OfflinePlant(shoving.model())
+    before = plant.motors.q.copy()
+    shoving.Shove(plant, np.array([0.0, 0.0, -50.0]), 1.0, 2.0)(99)
+    assert np.array_equal(plant.motors.q, before)
+
+
+def test_with_mobee_the_hand_comes_back_and_without_it_does_not() -> None:
+    held, free = (shoving.shove(law, "outward", 10.0, seed=0) for law in ("default", "off"))
+    assert held.moved_mm > 20.0 and held.away_mm < 2.0
+    assert free.away_mm > 20.0 and free.moved_mm > held.moved_mm
+
+
+def test_a_small_run_is_told_and_drawn_and_not_done_twice(tmp_path, monkeypatch) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(shove, "FORCES", (2.0, 50.0))
+    arguments = argparse.Namespace(laws=["default"], directions=["down, to the table"], seed=0)
+    found = shove.run(arguments, tmp_path)
+    assert found["default"]["down, to the table"]["solids_touch_from_N"] == 50.0
+    assert shove.run(arguments, tmp_path) == found
+    assert shove.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
