@@ -23,7 +23,7 @@ _REPEAT, _PATIENCE = 0.1, 2.0  # s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     add_endpoint(parser)
-    parser.add_argument("--reset", action="store_true", help="release the robot; it moves when the controller arms it again")
+    parser.add_argument("--reset", action="store_true", help="release the robot: the controller arms it and the agents go on at once")
     parser.add_argument("--reason", default="asked for at the terminal", help="what the event log says (default: %(default)s)")
 
 
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
                 rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)
             except rpc.CallFailed as failed:
                 raise UserError(f"the robot was not released: {failed}") from None
-            print("released: the controller may arm the parts again")
+            print("released: the controller arms the parts again, and agents that are still there go on")
         else:
             parts = _stop(session, arguments.reason)
             print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")

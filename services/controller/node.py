@@ -9,20 +9,24 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Clock, Command, EStop, Motion
 from bus_schema.messages import Forces as ForcesMessage
+from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.figures import Percentiles
+from services.common.fingerprint import robot_hash
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.lockstep import Participant
+from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.controller.action import Action, Owner, busy_owners
 from services.controller.config import Config
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 
+BAD_INPUT = 2  # exit code: the same again would not help
 OLDEST = 3  # ticks: with forces older than that the robot holds
 SOMETIMES = 10  # ticks: so often a part under way tells of its motion in lockstep
 STALE = 100_000_000  # ns: a part whose state is older than that is not under control
@@ -73,7 +77,7 @@ class ControllerNode:
     def _tick(self, clock: Clock) -> None:
         if clock.mode == "paused":
             return
-        if clock.dt * 1e-9 >= self._law.max_dt:
+        if clock.dt / 1e9 >= self._law.max_dt:
             self._service.bus.reject("rate", f"ticks of {clock.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
             return
         self._clock, self._step_to_answer = clock, None
@@ -122,7 +126,7 @@ class ControllerNode:
     def _control(self, clock: Clock, fresh: bool) -> None:
         gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
         self._long_gaps += gap > OLDEST
-        self._watch_period(gap * clock.dt * 1e-9 / clock.rate)
+        self._watch_period(gap * clock.dt / 1e9 / clock.rate)
         if fresh and self._forces is not None:
             self._advance(clock, min(gap, OLDEST), self._forces)
         else:
@@ -173,7 +177,7 @@ class ControllerNode:
         acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
         q = self._body.q()
         for _ in range(ticks):
-            command = self._law.step(q, clock.dt * 1e-9, acting)
+            command = self._law.step(q, clock.dt / 1e9, acting)
         reference = getattr(command, self._config.modality)
         for part, action in self._actions.items():
             if action.status != "held":
@@ -232,7 +236,18 @@ class ControllerNode:
         if self._actions[part].owner is None and part in self._config.posture:
             self._law.set_attractor(part, np.array(self._config.posture[part]))
 
+    def _compare(self, answer: PartMeta | CallFailed) -> None:
+        """Commands for one robot must not reach another of as many motors: then this process ends, and nothing is armed."""
+        if isinstance(answer, CallFailed):
+            self._service.log.info("which robot robot_sim moves is not known: %s", answer)
+        elif answer.robot_hash != robot_hash(self._robot):
+            self._service.bus.event(
+                "error", "other_robot", f"robot_sim moves another robot ({answer.robot}) than {self._config.robot}: give both the same"
+            )
+            raise SystemExit(BAD_INPUT)
+
     def _new_run(self) -> None:
+        self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare)
         self._body.forget()
         self._drives.forget()
         self._forces, self._clock, self._last_k, self._step_to_answer = None, None, -1, None

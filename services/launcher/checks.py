@@ -100,6 +100,10 @@ def check_robots(scenario: Scenario) -> None:
         if name is not None and name not in robot.parts:
             place = scenario.where(f"services.{part.who}")
             raise ConfigError(f"{place}: {part.who}: the robot has no part {name!r}.{nearest(name, robot.parts)}")
+        for joint in getattr(part.config, "joints", ()):
+            if joint not in robot.part(name).motors:
+                place = scenario.where(f"services.{part.who}.joints")
+                raise ConfigError(f"{place}: joints: {name} has no motor {joint!r}.{nearest(joint, robot.part(name).motors)}")
 
 
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:

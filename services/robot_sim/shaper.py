@@ -47,7 +47,7 @@ class Shaper:
         return self._braked_within(np.maximum(q - self._limits.lower, 0.0)), self._braked_within(np.maximum(self._limits.upper - q, 0.0))
 
     def _approach(self, velocity: Array) -> None:
-        self.velocity = self.velocity + np.clip(velocity - self.velocity, -self._change, self._change)
+        self.velocity = velocity.clip(self.velocity - self._change, self.velocity + self._change)  # exactly what is asked for, if it may be
 
     def _braked_within(self, distance: Array) -> Array:
         """The largest velocity that whole ticks of full braking end within the distance."""
