@@ -9,12 +9,13 @@ import numpy as np
 
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.layout import OWN_ACCELERATION, OWN_VELOCITY
+from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
 from mobee.control.load import law
 from mobee.control.modality import Command, Modality
 from mobee.control.pack import pack
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
+from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
@@ -25,9 +26,12 @@ class Controller:
     """Eq. 5.7 over all motors of a robot, every tick a command.
 
     The velocity in the law is the controller's own state; only q comes from the encoders.  Velocity commands are the
-    original modality; position commands integrate the controller's own reference; torque commands do not
-    compensate gravity yet.  The motors' limits on velocity (times `speed_scale`, 0 to 1) and
+    original modality; position commands integrate the controller's own reference; torque commands also carry
+    the robot's weight where its file says what it is.  The motors' limits on velocity (times `speed_scale`, 0 to 1) and
     acceleration are kept here, so that the robot's safety gate has nothing to refuse.
+
+    An attractor may be outside the motors' limits: it pulls no harder than `max_spring`, and the limits push back.  The plants
+    refuse such a goal.
     """
 
     __slots__ = (
@@ -97,12 +101,12 @@ class Controller:
         self._client = _checked("force", f, len(self.robot.motors))
 
     def push(self, marker: str, f: Array) -> None:
-        """Apply a force (3,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
+        """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
 
         Per unit mass: J^T f is in rad/s^2 before it is squashed.
         """
         self.robot.marker(marker)
-        self._pushes[marker] = _checked(f"push on {marker}", f, 3)
+        self._pushes[marker] = _checked(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
         """End all forces of the client."""
@@ -153,6 +157,8 @@ class Controller:
         if self._pushes or self._client.any():
             self._add_client(q, total)
         packed = self._packed
+        if self.modality == "torque":
+            self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
         commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
         self.last_forces = forces
         return Command(*commands)
@@ -166,13 +172,16 @@ class Controller:
         integers, floats = self._packed.integers, self._packed.floats
         self._compiled.add_client(integers, floats, self._client, total)
         if self._pushes:
-            projected = sum((self.model.jacobian(q, m)[:3].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
+            projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
             self._compiled.add_client(integers, floats, projected, total)
 
 
 def _checked(what: str, value: Array, length: int) -> Array:
     """A copy of what must be that many finite numbers."""
     array = np.array(value, dtype=np.float64)
-    if array.shape != (length,) or not math.isfinite(array.dot(array)):
+    if array.shape != (length,):
         raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
+    if not math.isfinite(array.dot(array)):
+        worst = int(np.argmax(np.nan_to_num(np.abs(array), nan=np.inf)))
+        raise InvalidValue(f"{what}: number {worst} is {array[worst]}; must be {length} finite numbers")
     return array

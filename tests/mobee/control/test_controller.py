@@ -9,6 +9,7 @@ import pytest
 from mobee.control import Controller, Forces, Gains
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue, UnknownName
+from mobee.kinematics.gravity import gravity_torque
 from mobee.model import Model
 from mobee.robot.load import load_robot
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
@@ -214,3 +215,65 @@ def test_bad_input_is_refused() -> None:
         arm_controller(gains="default")
     with pytest.raises(UnknownName, match="tip"):
         controller.push("tpi", np.zeros(3))
+
+
+def test_a_misspelt_attribute_is_refused() -> None:
+    with pytest.raises(AttributeError, match="atractor"):
+        arm_controller().atractor = GOAL
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_refused_and_nothing_changes(bad: float) -> None:
+    controller = arm_controller()
+    zero, broken = np.zeros(3), np.array([0.0, bad, 0.0])
+    for give in (
+        lambda: controller.force(broken),
+        lambda: controller.push("tip", broken),
+        lambda: controller.set_attractor("arm", broken[:2]),
+        lambda: setattr(controller, "attractor", broken),
+        lambda: controller.reset(broken),
+        lambda: controller.step(broken, DT),
+        lambda: controller.step(zero, DT, Forces(zero, broken, zero)),
+    ):
+        with pytest.raises(InvalidValue, match=r"number 1 is -?(nan|inf); must be . finite numbers"):
+            give()
+    assert not controller.step(zero, DT).velocity.any()
+
+
+@BOTH
+def test_an_attractor_far_outside_the_limits_does_not_pull_a_motor_out_of_them(gains: Gains) -> None:
+    controller = arm_controller(gains=gains)
+    controller.attractor = np.array([100.0, -100.0, 0.0])
+    path = follow(controller, STRETCHED, 15.0)
+    assert np.abs(path).max() < 3.0
+
+
+def test_a_push_with_a_moment_acts_through_the_whole_jacobian() -> None:
+    controller = arm_controller()
+    controller.push("tip", np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-3]))
+    controller.step(STRETCHED, DT)
+    assert controller.acceleration == pytest.approx(1e-3 * np.ones(3), rel=1e-3)
+
+
+def test_client_forces_keep_their_direction_where_the_gains_say_so() -> None:
+    controller = arm_controller(gains=replace(Gains.default(), client_squash="direction").with_motors("m2", max_client=2.0))
+    controller.force(np.array([0.0, 300.0, 400.0]))
+    controller.step(STRETCHED, DT, Forces(np.zeros(3), np.zeros(3), np.zeros(3)))
+    a = controller.acceleration[1:]
+    assert a[1] / a[0] == pytest.approx(4.0 / 3.0)
+    assert np.linalg.norm(a) == pytest.approx(2.0, rel=0.01)
+
+
+def test_torque_commands_carry_the_robots_weight() -> None:
+    robot = load_robot("icub")
+    controller = Controller(Model(robot), modality="torque")
+    free = Forces(*np.zeros((3, len(robot.motors))))
+    assert controller.step(robot.home, DT, free).torque == pytest.approx(gravity_torque(robot, robot.home))
+    assert not Controller(Model(robot), modality="velocity").step(robot.home, DT, free).torque.any()
+
+
+def test_an_unknown_modality_or_propagation_is_refused() -> None:
+    with pytest.raises(UnknownName, match="modality 'force'.*position, torque, velocity"):
+        arm_controller(modality="force")
+    with pytest.raises(UnknownName, match="propagation 'arm'.*part, tree"):
+        arm_controller(propagate="arm").step(STRETCHED, DT)

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mobee.control.pull import checked_target, pull
+from mobee.control.reach import reach_path
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model import Model
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array
+from tests.mobee.planar import planar_arm
+
+ARM = Model(planar_arm())
+ICUB = Model(load_robot("icub"))
+BENT = np.array([0.3, 0.7, 0.4])
+poses = st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3).map(np.array)
+
+
+def errors(model: Model, marker: str, position: Array, path: Array) -> Array:
+    return np.linalg.norm(model.evaluate(path).position(marker) - position, axis=-1)
+
+
+@given(poses)
+def test_a_step_never_takes_the_marker_away_from_the_target(goal: Array) -> None:
+    position = ARM.evaluate(goal).position("tip")
+    path = reach_path(ARM, "tip", position, BENT)
+    assert np.all(np.diff(errors(ARM, "tip", position, path.q)) <= 1e-12)
+
+
+@pytest.mark.parametrize("with_normal", [False, True])
+def test_the_icubs_hand_reaches_where_it_can(with_normal: bool) -> None:
+    robot, rng = ICUB.robot, np.random.default_rng(1)
+    for _ in range(3):
+        there = ICUB.evaluate(robot.limits[:, 0] + rng.uniform(0.2, 0.8, len(robot.motors)) * np.ptp(robot.limits, axis=1))
+        normal = there.normal("left_palm") if with_normal else None
+        path = reach_path(ICUB, "left_palm", there.position("left_palm"), robot.home, normal, steps=5000)
+        assert path.end == "reached" and path.distance <= 1e-3
+        end = ICUB.evaluate(path.q[-1])
+        assert end.position("left_palm") == pytest.approx(there.position("left_palm"), abs=1e-3)
+        if normal is not None:
+            assert end.normal("left_palm") @ normal > np.cos(1.1e-3)
+        assert np.all((path.q >= robot.limits[:, 0]) & (path.q <= robot.limits[:, 1]))
+
+
+def test_out_of_reach_it_ends_stuck_at_the_nearest_point() -> None:
+    path = reach_path(ARM, "tip", np.array([0.0, 1.1, 0.0]), BENT)
+    assert path.end == "stuck"
+    assert path.distance == pytest.approx(0.2, abs=1e-4)
+
+
+def test_in_a_singular_pose_it_is_stuck_at_the_start_as_the_thesis_warns() -> None:
+    path = reach_path(ARM, "tip", np.array([0.5, 0.0, 0.0]), np.zeros(3))
+    assert path.end == "stuck" and len(path.q) == 1
+    assert path.distance == pytest.approx(0.4)
+
+
+def test_it_says_when_its_steps_are_used_up() -> None:
+    path = reach_path(ARM, "tip", np.array([-0.5, 0.3, 0.0]), BENT, steps=3)
+    assert path.end == "steps used up" and len(path.q) == 4
+
+
+def test_the_pull_is_the_jacobian_transpose_times_the_error() -> None:
+    target = checked_target(ARM, "tip", np.array([0.0, 0.4, 0.0]), None)
+    found = pull(ARM, target, BENT)
+    pose = ARM.evaluate(BENT)
+    assert found.torque == pytest.approx(ARM.jacobian(BENT, "tip")[:3].T @ (target.position - pose.position("tip")))
+    assert np.array_equal(pull(ARM, target, np.array([BENT, BENT])).torque[1], found.torque)
+
+
+def test_the_pull_of_a_normal_is_the_slope_of_its_error() -> None:
+    """Of |dx|^2 / 2 + ARM^2 (1 - n.n*)."""
+    target = checked_target(ARM, "tip", np.array([0.0, 0.4, 0.0]), np.array([0.0, 3.0, 0.0]))
+
+    def error(q: Array) -> float:
+        pose = ARM.evaluate(q)
+        way = target.position - pose.position("tip")
+        return float(way @ way / 2.0 + 0.1**2 * (1.0 - pose.normal("tip") @ [0.0, 1.0, 0.0]))
+
+    slope = [(error(BENT + step) - error(BENT - step)) / 2e-6 for step in 1e-6 * np.eye(3)]
+    assert pull(ARM, target, BENT).torque == pytest.approx(-np.array(slope), abs=1e-8)
+
+
+def test_what_is_no_target_is_refused() -> None:
+    with pytest.raises(UnknownName, match="marker 'tpi'. Did you mean 'tip'"):
+        reach_path(ARM, "tpi", np.zeros(3), BENT)
+    with pytest.raises(InvalidValue, match="position .*three finite numbers"):
+        reach_path(ARM, "tip", np.array([0.0, np.nan, 0.0]), BENT)
+    with pytest.raises(InvalidValue, match="normal .*not all 0"):
+        reach_path(ARM, "tip", np.zeros(3), BENT, normal=np.zeros(3))
+    with pytest.raises(InvalidValue, match="tolerance -1"):
+        reach_path(ARM, "tip", np.zeros(3), BENT, tolerance=-1.0)

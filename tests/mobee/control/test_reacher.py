@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from mobee.control import Controller, Gains
+from mobee.control.reach import reach_path
+from mobee.control.reacher import Reacher
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model import Model
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array
+from mobee.simulation import MotorParameters, Motors
+from tests.mobee.planar import planar_arm
+
+DT = 0.01
+BOTH = pytest.mark.parametrize("gains", [Gains.default(), Gains.published_2014()], ids=lambda g: g.law)
+EACH_MOTOR = pytest.mark.parametrize("motors", [MotorParameters(), MotorParameters.ideal()], ids=["noisy", "ideal"])
+PLANAR = Model(planar_arm())
+BENT = np.array([0.3, 0.7, 0.4])
+
+
+@dataclass
+class Drawn:
+    """What became of a reach: where the marker was at every tick, and what was said."""
+
+    path: Array  # (ticks, 3) m
+    said: list[str]
+    angle: float  # rad
+
+    def distance(self, position: Array) -> Array:
+        return np.linalg.norm(self.path - position, axis=1)
+
+    def swing(self, seconds: float) -> float:
+        """How far it is from its mean at most [m], at the end."""
+        last = self.path[-round(seconds / DT) :]
+        return float(np.linalg.norm(last - last.mean(axis=0), axis=1).max())
+
+
+def draw(
+    model: Model, marker: str, position: Array, start: Array, seconds: float, normal: Array | None = None,
+    motors: MotorParameters | None = None, gains: Gains | None = None,
+) -> Drawn:  # fmt: skip
+    """A reach with motors that have lag, delay, play and noise, their commands one tick old."""
+    parameters = motors or MotorParameters()
+    plant = Motors(model.robot, parameters, 0, start)
+    controller = Controller(model, gains)
+    controller.reset(start)
+    reacher = Reacher(controller, marker, position, normal)
+    path, said = [], []
+    velocity = np.zeros(len(start))
+    for _ in range(round(seconds / DT)):
+        plant.command(slice(None), "velocity", velocity)
+        q = plant.encoders(DT)
+        said.append(reacher.update(q, DT))
+        velocity = controller.step(q, DT).velocity
+        for _ in range(2):
+            plant.drive(DT / 2)
+            plant.integrate()
+        path.append(model.evaluate(plant.q).position(marker))
+    return Drawn(np.array(path), said, reacher.angle)
+
+
+@BOTH
+@EACH_MOTOR
+def test_a_target_in_reach_is_reached_without_overshoot(gains: Gains, motors: MotorParameters) -> None:
+    position = PLANAR.evaluate(np.array([1.0, 0.5, 0.8])).position("tip")
+    drawn = draw(PLANAR, "tip", position, BENT, 6.0, motors=motors, gains=gains)
+    assert drawn.said[-1] == "reached"
+    assert drawn.distance(position)[-1] < 2e-3
+    assert drawn.swing(1.0) < 1e-3
+    way = position - drawn.path[0]
+    assert np.all((drawn.path - drawn.path[0]) @ way < (np.linalg.norm(way) + 2e-3) * np.linalg.norm(way))
+
+
+@EACH_MOTOR
+def test_out_of_a_stretched_arm_a_target_straight_inward_is_reached(motors: MotorParameters) -> None:
+    position = np.array([0.5, 0.0, 0.0])
+    drawn = draw(PLANAR, "tip", position, np.zeros(3), 6.0, motors=motors)
+    assert drawn.said[-1] == "reached"
+    assert drawn.distance(position)[-1] < 2e-3
+
+
+@EACH_MOTOR
+def test_a_target_20_cm_out_of_reach_is_approached_and_the_marker_rests(motors: MotorParameters) -> None:
+    position = np.array([0.0, 1.1, 0.0])
+    drawn = draw(PLANAR, "tip", position, BENT, 20.0, motors=motors)
+    assert drawn.said[-1] == "stuck"
+    assert drawn.distance(position)[-1] == pytest.approx(0.2, abs=2e-3)
+    assert drawn.swing(3.0) < 1e-3
+
+
+def test_the_icubs_arm_leaves_its_stretched_pose_and_rests_at_it() -> None:
+    model = Model(load_robot("icub"))
+    home = model.robot.home
+    stretched = reach_path(model, "left_palm", np.array([-3.0, 0.0, 0.9]), home).q[-1]
+    end = model.evaluate(stretched).position("left_palm")
+    away = (np.array([-3.0, 0.0, 0.9]) - end) / np.linalg.norm(np.array([-3.0, 0.0, 0.9]) - end)
+    inward = draw(model, "left_palm", end - 0.25 * away, stretched, 6.0)
+    assert inward.distance(end - 0.25 * away)[-1] < 3e-3
+    outward = draw(model, "left_palm", end + 0.2 * away, stretched, 8.0)
+    assert outward.said[-1] == "stuck"
+    assert outward.swing(1.0) < 1e-3
+
+
+@BOTH
+def test_the_normal_is_turned_too(gains: Gains) -> None:
+    model = Model(load_robot("icub"))
+    low, high = model.robot.limits.T
+    there = model.evaluate(model.robot.home + 0.2 * np.sign((low + high) / 2 - model.robot.home))
+    drawn = draw(model, "left_palm", there.position("left_palm"), model.robot.home, 8.0, there.normal("left_palm"), gains=gains)
+    assert drawn.distance(there.position("left_palm"))[-1] < 5e-3
+    assert drawn.angle < 0.05
+
+
+def test_other_motors_stay_at_their_attractors_and_stop_ends_the_pull() -> None:
+    model = Model(load_robot("icub"))
+    controller = Controller(model)
+    q = model.robot.home.copy()
+    reacher = Reacher(controller, "left_palm", np.array([-0.3, -0.2, 0.1]))
+    reacher.update(q, DT)
+    right = model.robot.part("right_arm").slice
+    assert np.array_equal(controller.attractor[right], q[right])
+    controller.set_attractor("right_arm", q[right] + 0.1)
+    reacher.update(q + 0.05, DT)
+    assert np.array_equal(controller.attractor[right], q[right] + 0.1)
+    reacher.stop(q + 0.05)
+    inside = Controller(model)
+    inside.reset(q + 0.05)
+    inside.set_attractor("right_arm", q[right] + 0.1)
+    inside.attractor = controller.attractor
+    assert np.array_equal(controller.step(q + 0.05, DT).velocity, inside.step(q + 0.05, DT).velocity)
+
+
+def test_what_is_no_reach_is_refused() -> None:
+    controller = Controller(PLANAR)
+    with pytest.raises(UnknownName, match="tip"):
+        Reacher(controller, "tpi", np.zeros(3))
+    with pytest.raises(InvalidValue, match="tolerance"):
+        Reacher(controller, "tip", np.zeros(3), tolerance=0.0)
