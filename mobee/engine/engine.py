@@ -55,7 +55,7 @@ class Engine:
                 written.append((room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()))
             done, used = evaluate.contacts(
                 packed.integers, packed.floats, packed.vertices, here.integers, here.floats, here.carried, own, reaching, cut, q, done,
-                room.most, room.slots, room.work, room.lists, room.spare, room.numbers, room.reals, torque,
+                room.slots, room.work, room.lists, room.spare, room.flags, room.numbers, room.reals, torque,
             )  # fmt: skip
         numbers, reals = room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()
         self._rooms.append(room)

@@ -6,11 +6,11 @@ import numpy as np
 
 from mobee.engine.broad import own_pairs, world_pairs
 from mobee.engine.compiled import entry
-from mobee.engine.forces import project
+from mobee.engine.feel import feel, place
 from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
 from mobee.engine.layout import ROW
+from mobee.engine.memory import memory_of
 from mobee.engine.pack import (
-    CLUSTERS,
     DRIVES,
     F_AXIS,
     F_POINT,
@@ -23,10 +23,11 @@ from mobee.engine.pack import (
     LINKS,
     MOTORS,
     SHAPES,
+    Flags,
     UInts,
 )
-from mobee.engine.place import bound_clusters, place_shapes, settle_slots
-from mobee.engine.rows import NUMBERS, REALS, append_rows, find_contacts, push_links, sort_rows
+from mobee.engine.place import bound_clusters, settle_slots
+from mobee.engine.rows import REALS, append_rows, find_contacts
 from mobee.engine.scene import CELLS, COUNT, W_START
 from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
@@ -58,8 +59,8 @@ def link_poses(integers: UInts, floats: Array, q: Array) -> Array:
 
 @entry(
     "UniTuple(int64, 2)("
-    "uint64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], int64[::1], int64, int64, boolean, float64[:,::1], int64, int64, "
-    "float64[::1], float64[::1], uint64[::1], int64[::1], int64[::1], float64[::1], float64[:,::1])"
+    "uint64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], int64[::1], int64, int64, boolean, float64[:,::1], int64, "
+    "float64[::1], float64[::1], uint64[::1], int64[::1], boolean[::1], int64[::1], float64[::1], float64[:,::1])"
 )
 def contacts(
     integers: UInts,
@@ -73,57 +74,41 @@ def contacts(
     cut: bool,
     q: Array,
     begin: int,
-    most: int,
     slots: Array,
     work: Array,
     lists: UInts,
     spare: Ints,
+    flags: Flags,
     numbers: Ints,
     reals: Array,
     torque: Array,
 ) -> tuple[int, int]:
     """Write every contact in the poses q[begin], q[begin + 1], ... to the rows of `numbers` and `reals`, its forces to `torque` (B, n).
 
-    Returns the pose that found no room for its rows, len(q) if all did, and how many rows are written.  `most`, `slots`
-    ... `reals`: a Room settled for the scene.
+    Returns the pose that found no room for its rows, len(q) if all did, and how many rows are written.  `slots` ... `reals`: a
+    Room settled for the scene.
     """
-    joints, links, shapes = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[SHAPES])
-    objects = np.int64(world[COUNT])
-    angles, sines, cosines = work[:joints], work[joints : 2 * joints], work[2 * joints : 3 * joints]
-    frames, at = work[3 * joints : 3 * joints + 12 * links], 3 * joints + 12 * links
-    wrench, at = work[at : at + 6 * links], at + 6 * links
-    x, y, z, at = work[at : at + shapes], work[at + shapes : at + 2 * shapes], work[at + 2 * shapes : at + 3 * shapes], at + 3 * shapes
-    balls, at = work[at : at + 4 * np.int64(integers[CLUSTERS])], at + 4 * np.int64(integers[CLUSTERS])
-    near, out, found_reals = work[at : at + 4 * objects], work[at + 4 * objects : at + 4 * objects + 6], work[at + 4 * objects + 6 :]
-    near_slot, first, second = lists[:objects], lists[objects : objects + most], lists[objects + most :]
-    found_numbers, keys, order = spare[: most * NUMBERS], spare[most * NUMBERS : most * (NUMBERS + 1)], spare[most * (NUMBERS + 1) :]
-    moved = np.ones(links, dtype=np.bool_)
+    m = memory_of(integers, world, work, lists, spare, flags)
     motors, torques, used = q.ravel(), torque.ravel(), 0
-    wrench[:] = 0.0
+    m.moved[:] = True
+    m.wrench[:] = 0.0
     for b in range(begin, len(q)):
-        joint_angles(integers, floats, motors, b * q.shape[1], angles)
-        sines_cosines(angles, sines, cosines)
-        place_links(integers, floats, angles, sines, cosines, moved, frames)
-        place_shapes(integers, floats, frames, moved, slots, x, y, z)
-        bound_clusters(integers, slots, x, y, z, balls)
-        pairs = own_pairs(integers, floats, slots, x, y, z, balls, first, second)
-        pairs = world_pairs(integers, slots, balls, world, places, near, near_slot, first, second, pairs)
-        pairs = sieve(slots, first, second, pairs)
+        joint_angles(integers, floats, motors, b * q.shape[1], m.angles)
+        place(integers, floats, slots, m)
+        bound_clusters(integers, slots, m.x, m.y, m.z, m.balls)
+        pairs = own_pairs(integers, floats, slots, m.x, m.y, m.z, m.balls, m.first, m.second)
+        pairs = world_pairs(integers, slots, m.balls, world, places, m.near, m.near_slot, m.first, m.second, pairs)
+        pairs = sieve(slots, m.first, m.second, pairs)
         count = find_contacts(
-            integers, vertices, world, carried, own_shapes, reaching, slots, first, second, pairs, out, found_numbers, found_reals
+            integers, vertices, world, carried, own_shapes, reaching, slots, m.first, m.second, pairs, m.out, m.found_numbers, m.found_reals
         )
-        if count == np.uint64(0):
-            continue
         rows = np.int64(count)
         if (used + rows) * REALS > len(reals):
             return b, used
-        sort_rows(found_numbers, count, keys, order)
-        append_rows(b, found_numbers, found_reals, order, count, numbers, reals, np.uint64(used))
-        push_links(
-            numbers, reals, np.uint64(used), count, wrench
-        )  # in the order of the rows: the sum does not depend on how they were found
-        project(integers, floats, frames, wrench, cut, torques, b * q.shape[1])
-        used += rows
+        if rows > 0:
+            feel(integers, floats, count, cut, m, torques, b * q.shape[1])
+            append_rows(b, m.found_numbers, m.found_reals, m.order, count, numbers, reals, np.uint64(used))
+            used += rows
     return len(q), used
 
 

@@ -33,6 +33,31 @@ def reach_out(integers: UInts, slots: Array, arm: Array) -> None:
 
 
 @inner
+def remember(
+    angles: Array,
+    frames: Array,
+    x: Array,
+    y: Array,
+    z: Array,
+    last: Array,
+    then: Array,
+    x0: Array,
+    y0: Array,
+    z0: Array,
+    way: Array,
+) -> None:
+    """Note where everything is: from now on `way` counts from here."""
+    for j in range(np.uint64(len(angles))):
+        last[j] = angles[j]
+    for k in range(np.uint64(len(frames))):
+        then[k] = frames[k]
+    for i in range(np.uint64(len(x))):
+        x0[i], y0[i], z0[i] = x[i], y[i], z[i]
+    for i in range(np.uint64(len(way))):
+        way[i] = 0.0
+
+
+@inner
 def measure(
     integers: UInts,
     moved: Flags,

@@ -5,46 +5,55 @@ volumes have moved adds up to what was between them, and of two shapes of one ha
 turned enough.  What has not moved at all is neither placed nor tested again.  Where poses are far apart a list does not pay: every
 pose is then evaluated as any other, until the steps become short.
 
-What is remembered stands in three flat arrays, see `sizes`; nothing is allocated but the results.
+What is remembered stands in the flat arrays of a `Memory`; nothing is allocated but the results.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mobee.engine.broad import own_pairs, world_pairs
-from mobee.engine.compiled import entry, inner
-from mobee.engine.forces import project
-from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
+from mobee.engine.compiled import entry, inlined, inner
+from mobee.engine.feel import feel, place
+from mobee.engine.kinematics import joint_angles
 from mobee.engine.listed import MARGIN, gather, look
-from mobee.engine.motion import bend_links, find_moved, measure, reach_out
-from mobee.engine.pack import CLUSTERS, JOINTS, LINKS, SHAPES, UInts
-from mobee.engine.place import bound_clusters, place_shapes
-from mobee.engine.rows import NUMBERS, REALS, append_rows, push_links, sort_rows
-from mobee.engine.scene import COUNT
+from mobee.engine.memory import Memory, memory_of
+from mobee.engine.motion import bend_links, find_moved, measure, reach_out, remember
+from mobee.engine.pack import CLUSTERS, JOINTS, Flags, UInts
+from mobee.engine.place import bound_clusters
+from mobee.engine.rows import NUMBERS, REALS, append_rows
 from mobee.engine.sieve import sieve
 from mobee.robot.robot import Array, Ints
 
-# Header of `ints`: what there is, how many pairs are listed, how many poses the list has served, how many no list is made for.
+# Header of the memory: what there is, how many pairs are listed, how many poses the list has served, how many no list is made for.
 STATE, LISTED, SERVED, PAUSE = range(4)
-HEADER = 4
 EMPTY, PLACED, LIST, RENEW = range(4)  # nothing; the last pose; a list; the last pose, in a world that has changed under a useful list
 _PLAIN, _BUILD, _USE = range(3)
 
 WORTH = 4  # poses that a list must have served before an edit of the world to be made again at once, else so many go without
 SHORT = 4.0  # steps of the present length that a new list must last to be worth making
 
-_0 = np.uint64(0)
+_0, _4 = np.uint64(0), np.uint64(4)
 
 
-def sizes(joints: int, links: int, shapes: int, objects: int) -> tuple[int, int, int]:
-    """How long the arrays of floats, of unsigned and of signed integers are, in this order."""
-    most = shapes * (shapes + 1) // 2 + shapes * objects
-    return (
-        2 * joints + 24 * links + 8 * shapes + 5 * objects + most * (1 + 2 * REALS),
-        4 * most + objects,
-        HEADER + most * (3 + 2 * NUMBERS),
-    )
+class Around(NamedTuple):
+    """A robot in a scene, as `follow` is given it."""
+
+    integers: UInts
+    floats: Array
+    wide: Array
+    vertices: Array
+    world: UInts
+    places: Array
+    wide_places: Array
+    carried: Ints
+    own_shapes: int
+    reaching: int
+    skin: float
+    common: UInts
+    slots: Array
 
 
 @inner
@@ -64,10 +73,71 @@ def _choose(ints: Ints, most: float, skin: float) -> int:
     return _PLAIN
 
 
+@inlined
+def find(here: Around, q: Array, row: int, m: Memory) -> np.uint64:
+    """Find the contacts of the pose at q[row], q[row + 1], ...; returns how many are in the memory, in no order."""
+    fresh = m.header[STATE] == EMPTY or m.header[STATE] == RENEW
+    joint_angles(here.integers, here.floats, q, row, m.angles)
+    find_moved(here.integers, m.angles, m.last, fresh, m.moved)
+    place(here.integers, here.floats, here.slots, m)
+    farthest = 0.0
+    if fresh:
+        m.wrench[:] = 0.0
+        reach_out(here.integers, here.slots, m.arm)
+    else:
+        enough = 0.5 * here.skin
+        farthest = measure(here.integers, m.moved, m.frames, m.then, m.arm, m.x, m.y, m.z, m.x0, m.y0, m.z0, enough, m.turn, m.way)
+    mode = _choose(m.header, farthest, here.skin)
+    if mode == _USE:
+        return _among_listed(here, m)
+    return _among_all(here, mode == _BUILD, m)
+
+
+@inlined
+def _among_listed(here: Around, m: Memory) -> np.uint64:
+    """The contacts of listed pairs."""
+    joints = np.int64(here.integers[JOINTS])
+    spans, levers = here.wide[len(here.floats) : len(here.floats) + joints], here.wide[len(here.floats) + joints :]
+    bend_links(here.integers, m.angles, m.listed, spans, m.bend, m.sway, m.chain)
+    pairs, found = gather(
+        here.integers, m.way, here.common, levers, m.bend, m.sway, m.chain, m.first, m.second, m.gap, m.row_of,
+        np.uint64(m.header[LISTED]), m.near_first, m.near_second, m.kept_numbers, m.kept_reals, m.found_numbers, m.found_reals,
+    )  # fmt: skip
+    return _look(here, False, m.near_first, m.near_second, pairs, found, m)[0]
+
+
+@inlined
+def _among_all(here: Around, building: bool, m: Memory) -> np.uint64:
+    """The contacts of all pairs; `building`: the neighbours are listed too."""
+    bound_clusters(here.integers, here.slots, m.x, m.y, m.z, m.balls)
+    if building:
+        for c in range(here.integers[CLUSTERS]):
+            m.balls[_4 * c + np.uint64(3)] += here.skin
+    reaches, places = here.wide if building else here.floats, here.wide_places if building else here.places
+    pairs = own_pairs(here.integers, reaches, here.slots, m.x, m.y, m.z, m.balls, m.first, m.second)
+    pairs = world_pairs(here.integers, here.slots, m.balls, here.world, places, m.near, m.near_slot, m.first, m.second, pairs)
+    remember(m.angles, m.frames, m.x, m.y, m.z, m.listed, m.then, m.x0, m.y0, m.z0, m.way)
+    if not building:
+        pairs = sieve(here.slots, m.first, m.second, pairs)
+    count, listed = _look(here, building, m.first, m.second, pairs, _0, m)
+    m.header[STATE], m.header[LISTED], m.header[SERVED] = (LIST if building else PLACED), np.int64(listed), 0
+    return count
+
+
+@inlined
+def _look(
+    here: Around, building: bool, first: UInts, second: UInts, pairs: np.uint64, found: np.uint64, m: Memory
+) -> tuple[np.uint64, np.uint64]:
+    return look(
+        here.integers, here.vertices, here.world, here.carried, here.own_shapes, here.reaching, here.skin, building, here.slots,
+        first, second, m.gap, m.row_of, pairs, m.kept_numbers, m.kept_reals, m.out, m.found_numbers, m.found_reals, found,
+    )  # fmt: skip
+
+
 @entry(
     "Tuple((int64[::1], float64[::1], float64[:,::1]))("
     "uint64[::1], float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], float64[::1], int64[::1], int64, int64, "
-    "float64, float64[:,::1], float64[::1], float64[::1], uint64[::1], int64[::1], uint64[::1])"
+    "float64, uint64[::1], float64[::1], float64[:,::1], float64[::1], uint64[::1], int64[::1], boolean[::1])"
 )
 def follow(
     integers: UInts,
@@ -81,98 +151,39 @@ def follow(
     own_shapes: int,
     reaching: int,
     skin: float,
-    q: Array,
+    common: UInts,
     slots: Array,
-    memory: Array,
+    q: Array,
+    reals_memory: Array,
     pairs_memory: UInts,
     ints: Ints,
-    common: UInts,
+    flags: Flags,
 ) -> tuple[Ints, Array, Array]:
     """What `evaluate.contacts` returns for poses q (B, n) that follow each other, and what it remembers for the next call.
 
     `wide`, `wide_places`: `floats` and `places` in which every pair and object reaches farther by the skin [m]; at the end of
     `wide` stand each joint's distance from the one before and each shape's from its own [m].  `common`: the last link that
-    carries both of two links, (L L,).  `memory`, `pairs_memory` and `ints`: as long as `sizes` says, and kept for the same robot,
-    world and reaching link.
+    carries both of two links, (L L,).  The last four: as long as `memory.sizes` says, and kept for the same robot, world and
+    reaching link.
     """
-    joints, links, shapes = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[SHAPES])
-    objects, motors = np.int64(world[COUNT]), q.shape[1]
-    most = shapes * (shapes + 1) // 2 + shapes * objects
-    o, n = 2 * joints, 12 * links
-    last, angles0 = memory[:joints], memory[joints:o]
-    frames, then = memory[o : o + n], memory[o + n : o + 2 * n]
-    o, n = o + 2 * n, shapes
-    x, y, z = memory[o : o + n], memory[o + n : o + 2 * n], memory[o + 2 * n : o + 3 * n]
-    x0, y0, z0 = memory[o + 3 * n : o + 4 * n], memory[o + 4 * n : o + 5 * n], memory[o + 5 * n : o + 6 * n]
-    arm, way = memory[o + 6 * n : o + 7 * n], memory[o + 7 * n : o + 8 * n + objects]
-    o, n = o + 8 * n + objects, most
-    near, gap = memory[o : o + 4 * objects], memory[o + 4 * objects : o + 4 * objects + n]
-    o = o + 4 * objects + n
-    kept_reals, found_reals = memory[o : o + n * REALS], memory[o + n * REALS : o + 2 * n * REALS]
-    first, second, near_slot = pairs_memory[:n], pairs_memory[n : 2 * n], pairs_memory[4 * n :]
-    near_first, near_second = pairs_memory[2 * n : 3 * n], pairs_memory[3 * n : 4 * n]
-    o = HEADER
-    row_of, keys, order = ints[o : o + n], ints[o + n : o + 2 * n], ints[o + 2 * n : o + 3 * n]
-    o = o + 3 * n
-    kept_numbers, found_numbers = ints[o : o + n * NUMBERS], ints[o + n * NUMBERS : o + 2 * n * NUMBERS]
-    angles, sines, cosines = np.empty(joints), np.empty(joints), np.empty(joints)
-    moved, turn, balls = np.empty(links, dtype=np.bool_), np.empty(links), np.empty(4 * np.int64(integers[CLUSTERS]))
-    bend, sway, chain = np.empty(links), np.empty(links), np.empty(links)
-    spans, levers = wide[len(floats) : len(floats) + joints], wide[len(floats) + joints :]
-    wrench, out = np.zeros(6 * links), np.empty(6)
+    here = Around(
+        integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, common, slots
+    )  # fmt: skip
+    m = memory_of(integers, world, reals_memory, pairs_memory, ints, flags)
     room, used = 16 + 4 * len(q), 0
     numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
     given, torques = q.ravel(), torque.ravel()
     for b in range(len(q)):
-        fresh = ints[STATE] == EMPTY or ints[STATE] == RENEW
-        joint_angles(integers, floats, given, b * motors, angles)
-        sines_cosines(angles, sines, cosines)
-        find_moved(integers, angles, last, fresh, moved)
-        place_links(integers, floats, angles, sines, cosines, moved, frames)
-        place_shapes(integers, floats, frames, moved, slots, x, y, z)
-        farthest = 0.0
-        if fresh:
-            reach_out(integers, slots, arm)
-        else:
-            farthest = measure(integers, moved, frames, then, arm, x, y, z, x0, y0, z0, 0.5 * skin, turn, way)
-        mode, found, building = _choose(ints, farthest, skin), _0, False
-        one, two = first, second
-        if mode == _USE:
-            bend_links(integers, angles, angles0, spans, bend, sway, chain)
-            one, two = near_first, near_second
-            pairs, found = gather(
-                integers, way, common, levers, bend, sway, chain, first, second, gap, row_of, np.uint64(ints[LISTED]), one, two,
-                kept_numbers, kept_reals, found_numbers, found_reals,
-            )  # fmt: skip
-        else:
-            building = mode == _BUILD
-            bound_clusters(integers, slots, x, y, z, balls)
-            if building:
-                for c in range(len(balls) // 4):
-                    balls[4 * c + 3] += skin
-            pairs = own_pairs(integers, wide if building else floats, slots, x, y, z, balls, first, second)
-            pairs = world_pairs(integers, slots, balls, world, wide_places if building else places, near, near_slot, first, second, pairs)
-            angles0[:], then[:], x0[:], y0[:], z0[:] = angles, frames, x, y, z
-            way[:] = 0.0
-        if not building:
-            pairs = sieve(slots, one, two, pairs)
-        count, listed = look(
-            integers, vertices, world, carried, own_shapes, reaching, skin, building, slots, one, two, gap, row_of, pairs,
-            kept_numbers, kept_reals, out, found_numbers, found_reals, found,
-        )  # fmt: skip
-        if mode != _USE:
-            ints[STATE], ints[LISTED], ints[SERVED] = (LIST if building else PLACED), np.int64(listed), 0
+        count = find(here, given, b * q.shape[1], m)
         if count == _0:
             continue
+        feel(integers, floats, count, False, m, torques, b * q.shape[1])
         rows = np.int64(count)
         if used + rows > room:
             room = 2 * room + rows
             wider, taller = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS)
             wider[: used * NUMBERS], taller[: used * REALS] = numbers[: used * NUMBERS], reals[: used * REALS]
             numbers, reals = wider, taller
-        sort_rows(found_numbers, count, keys, order)
-        append_rows(b, found_numbers, found_reals, order, count, numbers, reals, np.uint64(used))
-        push_links(numbers, reals, np.uint64(used), count, wrench)
-        project(integers, floats, frames, wrench, False, torques, b * motors)
+        append_rows(b, m.found_numbers, m.found_reals, m.order, count, numbers, reals, np.uint64(used))
         used += rows
     return numbers[: used * NUMBERS], reals[: used * REALS], torque

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from mobee.engine.evaluate import settle
 from mobee.engine.layout import SLOT
-from mobee.engine.pack import CLUSTERS, JOINTS, LINKS, UInts
+from mobee.engine.memory import most_pairs, sizes
+from mobee.engine.pack import CLUSTERS, JOINTS, LINKS, Flags, UInts
 from mobee.engine.rows import NUMBERS, REALS
 from mobee.engine.scene import COUNT, Scene
 from mobee.robot.robot import Array, Ints
@@ -22,11 +23,11 @@ class Room:
 
     def __init__(self) -> None:
         self.scene: Scene | None = None
-        self.most = 0  # pairs, and so contacts, of a pose
         self.slots: Array = np.empty(0)
         self.work: Array = np.empty(0)
         self.lists: UInts = np.empty(0, dtype=np.uint64)
         self.spare: Ints = np.empty(0, dtype=np.int64)
+        self.flags: Flags = np.empty(0, dtype=np.bool_)
         self.numbers: Ints = np.empty(0, dtype=np.int64)
         self.reals: Array = np.empty(0)
 
@@ -35,13 +36,14 @@ class Room:
         if self.scene is scene:
             return
         packed, header = scene.packed, scene.packed.integers
-        joints, links, groups = int(header[JOINTS]), int(header[LINKS]), int(header[CLUSTERS])
         shapes, objects = len(packed.order), int(scene.integers[COUNT])
-        most = self.most = shapes * (shapes + 1) // 2 + shapes * objects
+        most = most_pairs(shapes, objects)
+        floats, lists, spare, flags = sizes(int(header[JOINTS]), int(header[LINKS]), shapes, int(header[CLUSTERS]), objects)
         self.slots = at_least(self.slots, (shapes + objects) * SLOT)
-        self.work = at_least(self.work, 3 * joints + 18 * links + 3 * shapes + 4 * groups + 6 + 4 * objects + REALS * most)
-        self.lists = at_least(self.lists, 2 * most + objects)
-        self.spare = at_least(self.spare, (NUMBERS + 2) * most)
+        self.work = at_least(self.work, floats)
+        self.lists = at_least(self.lists, lists)
+        self.spare = at_least(self.spare, spare)
+        self.flags = at_least(self.flags, flags)
         self.numbers = at_least(self.numbers, NUMBERS * max(ROWS, most))
         self.reals = at_least(self.reals, REALS * max(ROWS, most))
         settle(header, packed.floats, scene.integers, scene.snapshot.rows.reshape(-1), self.slots)

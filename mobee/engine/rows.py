@@ -134,10 +134,14 @@ def append_rows(
 
 
 @inner
-def push_links(numbers: Ints, reals: Array, used: np.uint64, count: np.uint64, wrench: Array) -> None:
-    """Add depth * normal of every field contact of rows used .. used + count - 1 to its first link, and the opposite to its second."""
-    for c in range(used, used + count):
-        n, r = c * _NUMBERS, c * _REALS
+def push_links(numbers: Ints, reals: Array, order: Ints, count: np.uint64, wrench: Array) -> None:
+    """Add depth * normal of every field contact to its first link, and the opposite to its second.
+
+    In the order of the rows: the sum does not depend on how they were found.
+    """
+    for c in range(count):
+        row = np.uint64(order[c])
+        n, r = row * _NUMBERS, row * _REALS
         if numbers[n + _1] != 1:
             continue
         depth = reals[r]

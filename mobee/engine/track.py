@@ -13,8 +13,9 @@ from mobee.collision.snapshot import Snapshot
 from mobee.engine.engine import Engine
 from mobee.engine.evaluate import settle
 from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
-from mobee.engine.neighbours import EMPTY, HEADER, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, follow, sizes
-from mobee.engine.pack import F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Packed, UInts
+from mobee.engine.memory import HEADER, sizes
+from mobee.engine.neighbours import EMPTY, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, follow
+from mobee.engine.pack import CLUSTERS, F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, Packed, UInts
 from mobee.engine.room import at_least
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene
 from mobee.robot.robot import Array, Ints
@@ -35,6 +36,7 @@ class Neighbours:
         self._pairs: UInts = np.empty(0, dtype=np.uint64)
         self._common: UInts = np.empty(0, dtype=np.uint64)
         self._ints: Ints = np.zeros(HEADER, dtype=np.int64)
+        self._flags: Flags = np.empty(0, dtype=np.bool_)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
         """What `Engine.contacts` gives for the poses q (B, n), one after the other."""
@@ -44,7 +46,7 @@ class Neighbours:
         packed, own = here.packed, len(self._engine.robot.shapes)
         numbers, reals, torque = follow(
             packed.integers, packed.floats, self._wide, packed.vertices, here.integers, here.floats, self._wide_places, here.carried,
-            own, reaching, self._skin, q, self._slots, self._floats, self._pairs, self._ints, self._common,
+            own, reaching, self._skin, self._common, self._slots, q, self._floats, self._pairs, self._ints, self._flags,
         )  # fmt: skip
         return self._engine.table(snapshot, numbers, reals), torque
 
@@ -58,10 +60,11 @@ class Neighbours:
         self._wide_places[WIDEST] += self._skin
         self._wide_places[W_COLUMNS + 3 * objects :] += self._skin
         was_of_use = self._ints[STATE] == LIST and self._ints[SERVED] >= WORTH
-        floats, pairs, ints = sizes(int(header[JOINTS]), int(header[LINKS]), count, objects)
+        floats, pairs, ints, flags = sizes(int(header[JOINTS]), int(header[LINKS]), count, int(header[CLUSTERS]), objects)
         self._floats = at_least(self._floats, floats)
         self._pairs = at_least(self._pairs, pairs)
         self._ints = at_least(self._ints, ints)
+        self._flags = at_least(self._flags, flags)
         self._slots = at_least(self._slots, (count + objects) * SLOT)
         settle(header, packed.floats, here.integers, here.snapshot.rows.reshape(-1), self._slots)
         self._ints[STATE] = RENEW if was_of_use else EMPTY
