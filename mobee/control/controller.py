@@ -6,13 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
 from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
 from mobee.control.load import law
 from mobee.control.modality import Command, Modality
-from mobee.control.pack import pack
+from mobee.control.pack import Law, pack
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
@@ -47,7 +48,9 @@ class Controller:
         propagate: Propagate = "tree",
         speed_scale: float = 1.0,
         contact_forces: bool = True,
+        alive: NDArray[np.bool_] | None = None,
     ) -> None:
+        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all."""
         if not callable(getattr(model, "track", None)):  # who brings a model of their own is welcome
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
@@ -66,7 +69,7 @@ class Controller:
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
         self._compiled = law()
-        self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces)
+        self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
         self.clear()
         self.reset(self.robot.home)
 
@@ -90,6 +93,33 @@ class Controller:
         """The acceleration of the last step, shape (n,), in [rad/s^2]: a copy."""
         own: Array = self._state[OWN_ACCELERATION].copy()
         return own
+
+    @property
+    def law(self) -> Law:
+        """The law as compiled code reads it."""
+        return self._packed
+
+    @property
+    def state(self) -> Array:
+        """The law's state (STATE, n), see `layout`: what compiled code advances, no copy."""
+        return self._state
+
+    @property
+    def goal(self) -> Array:
+        """The attractor itself, shape (n,), in [rad]: what compiled code reads, no copy."""
+        return self._attractor
+
+    @property
+    def pushed(self) -> bool:
+        """Whether forces act on markers, which depend on the pose."""
+        return bool(self._pushes)
+
+    def client_force(self, q: Array) -> Array:
+        """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
+        total = np.zeros(len(q))
+        if self._pushes or self._client.any():
+            self._add_client(q, total)
+        return total
 
     def set_attractor(self, part: str, q: Array) -> None:
         """Set the slice of q* that belongs to a part: (n_part,) rad."""
@@ -153,9 +183,7 @@ class Controller:
         q = _checked("q", q, n)
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
-        total = _checked("forces", forces.total, n)
-        if self._pushes or self._client.any():
-            self._add_client(q, total)
+        total = _checked("forces", forces.total, n) + self.client_force(q)
         packed = self._packed
         if self.modality == "torque":
             self._state[FEEDFORWARD] = gravity_torque(self.robot, q)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mobee.engine.compiled import inlined
 from mobee.engine.forces import project
-from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
+from mobee.engine.kinematics import place_links, sines_cosines
 from mobee.engine.memory import Memory
 from mobee.engine.pack import UInts
 from mobee.engine.place import place_shapes

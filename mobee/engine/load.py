@@ -11,7 +11,15 @@ from pathlib import Path
 
 from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 
-MODULES = ("mobee.engine.scene", "mobee.engine.neighbours", "mobee.control.law", "mobee.engine.evaluate")
+MODULES = (
+    "mobee.engine.scene",
+    "mobee.engine.neighbours",
+    "mobee.control.law",
+    "mobee.simulation.noise",
+    "mobee.simulation.drive",
+    "mobee.simulation.loop",
+    "mobee.engine.evaluate",
+)
 PATIENCE = 300.0  # s that a process waits for another that compiles
 
 

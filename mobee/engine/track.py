@@ -14,7 +14,7 @@ from mobee.engine.engine import Engine
 from mobee.engine.evaluate import settle
 from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
 from mobee.engine.memory import HEADER, sizes
-from mobee.engine.neighbours import EMPTY, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, follow
+from mobee.engine.neighbours import EMPTY, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, Around, follow
 from mobee.engine.pack import CLUSTERS, F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, Packed, UInts
 from mobee.engine.room import at_least
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene
@@ -40,15 +40,25 @@ class Neighbours:
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
         """What `Engine.contacts` gives for the poses q (B, n), one after the other."""
+        scene, memory = self.scene(snapshot, reaching), self.memory
+        numbers, reals, torque = follow(*scene, q, *memory)
+        return self._engine.table(snapshot, numbers, reals), torque
+
+    def scene(self, snapshot: Snapshot, reaching: int) -> Around:
+        """What `follow` takes before the poses; what is remembered of another world is forgotten."""
         here = self._engine.scene_of(snapshot)
         if self._known[0] is not here or self._known[1] != reaching:
             self._begin(here, reaching)
         packed, own = here.packed, len(self._engine.robot.shapes)
-        numbers, reals, torque = follow(
+        return Around(
             packed.integers, packed.floats, self._wide, packed.vertices, here.integers, here.floats, self._wide_places, here.carried,
-            own, reaching, self._skin, self._common, self._slots, q, self._floats, self._pairs, self._ints, self._flags,
+            own, reaching, self._skin, self._common, self._slots,
         )  # fmt: skip
-        return self._engine.table(snapshot, numbers, reals), torque
+
+    @property
+    def memory(self) -> tuple[Array, UInts, Ints, Flags]:
+        """What `follow` takes behind the poses, after `scene`."""
+        return self._floats, self._pairs, self._ints, self._flags
 
     def _begin(self, here: Scene, reaching: int) -> None:
         """Forget the list; the world, what is carried, or who reaches, is another."""

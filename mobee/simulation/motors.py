@@ -1,86 +1,109 @@
-"""The motors of a simulated robot: lag, delay, backlash, encoder noise, hard stops."""
+"""The motors of a simulated robot: lag, delay, backlash, friction, encoder noise, hard stops."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array, Ints, Robot
+from mobee.simulation import layout
+from mobee.simulation.layout import SERVO_GAIN as SERVO_GAIN
+from mobee.simulation.load import compiled
+from mobee.simulation.parameters import MotorParameters as MotorParameters
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 
 NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given
-SERVO_GAIN = 8.0  # 1/s, position mode and a hold that has come to rest
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotorParameters:
-    """What makes the robot not repeat itself; the defaults are those that bring out the published findings."""
-
-    lag: float = 0.05  # s, time constant of the first-order response to a velocity
-    delay: float = 0.02  # s, before a command begins to act
-    backlash: float = np.deg2rad(0.2)  # rad, play between motor and joint side
-    encoder_noise: float = np.deg2rad(0.1)  # rad, standard deviation of the white noise at a tick of 20 ms
-    substep: float = 0.005  # s, at most, between two steps of the motors
-
-    def __post_init__(self) -> None:
-        for name in ("lag", "delay", "backlash", "encoder_noise"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise InvalidValue(f"motor {name} {getattr(self, name)}: must be finite and not negative")
-        if not 0 < self.substep < np.inf:
-            raise InvalidValue(f"motor substep {self.substep} s: must be a finite time above 0")
-
-    @classmethod
-    def ideal(cls) -> MotorParameters:
-        """Motors that do at once and exactly what they are told, read without noise."""
-        return cls(lag=0.0, delay=0.0, backlash=0.0, encoder_noise=0.0)
-
-    def substeps(self, dt: float) -> int:
-        """Into how many substeps a tick of dt [s] is cut."""
-        return max(1, int(np.ceil(dt / self.substep - 1e-9)))
+_MODES: dict[Mode, int] = {
+    "position": layout.POSITION,
+    "velocity": layout.VELOCITY_MODE,
+    "torque": layout.TORQUE,
+    "hold": layout.HOLD,
+}
 
 
 class Motors:
-    """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`.
+    """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
 
     Each substep: `drive`, then either `integrate` (the joint side is this class's own, with hard stops) or
     `adopt` (the joint side is what a physics engine says it has become).
     """
 
-    def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array) -> None:
-        """Start at rest at q (n,) rad, every motor in hold."""
+    def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
+        """Start at rest at q (n,) rad, every motor in hold; motors that are not `alive` (n,) never move and are read without noise."""
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
+            raise InvalidValue(f"seed {seed!r}: must be a whole number")
         self.parameters = parameters
-        self.q = np.array(q, dtype=float)  # rad, joint side
-        self.velocities = np.zeros(n)  # rad/s, joint side
-        self.efforts = np.zeros(n)  # N m
-        self._limits = robot.limits
-        self._max_velocity = np.array([m.max_velocity for m in robot.motor_table])
-        self._max_acceleration = np.array([m.max_acceleration for m in robot.motor_table])
-        self._max_torque = np.array([m.max_torque for m in robot.motor_table])
-        self._motor_q = self.q.copy()  # rad, motor side of the play
-        self._motor_v = np.zeros(n)  # rad/s
-        self._dragged = self.q.copy()  # rad, where the motor side pulls the joint side
-        self._dt = parameters.substep
-        self._rest = self.q.copy()  # rad, where a hold stays
-        self._resting = np.ones(n, dtype=bool)
-        self._mode: NDArray[np.str_] = np.full(n, "hold", dtype="<U8")
-        self._reference = np.zeros(n)
-        self._line: list[Array] = []  # inputs on their way to the motors, the oldest first
-        self._set_masks()
-        self._rng = np.random.default_rng(seed)
+        self.seed = int(seed) % 2**64
+        self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
+        """Indices of the motors that live, ascending."""
+        self._compiled = compiled()
+        self.state = np.zeros((layout.STATE, n))
+        """What `layout` says, for compiled code."""
+        for row in (layout.Q, layout.MOTOR_Q, layout.DRAGGED, layout.REST):
+            self.state[row] = q
+        self.whole = np.zeros((layout.WHOLE, n), dtype=np.int64)
+        self.whole[layout.MODE], self.whole[layout.RESTING] = layout.HOLD, 1
+        self.fixed = np.zeros((layout.FIXED, n))
+        self.fixed[[layout.LOW, layout.HIGH]] = robot.limits.T
+        for row, name in (
+            (layout.MAX_VELOCITY, "max_velocity"),
+            (layout.MAX_ACCELERATION, "max_acceleration"),
+            (layout.MAX_TORQUE, "max_torque"),
+        ):
+            self.fixed[row] = [getattr(motor, name) for motor in robot.motor_table]
+        self.fixed[layout.PLAY] = parameters.of_motors("backlash", n) / 2.0
+        self.fixed[layout.FRICTION] = parameters.of_motors("friction", n)
+        self._lag, self._delay = parameters.of_motors("lag", n), parameters.of_motors("delay", n)
+        self.line, self.at = np.zeros((1, n)), np.zeros(1, dtype=np.int64)
+        self._dt = 0.0
+        self.begin_substeps(parameters.substep)
+
+    @property
+    def q(self) -> Array:
+        """Positions of the joint sides [rad]."""
+        return self._row(layout.Q)
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities of the joint sides [rad/s]."""
+        return self._row(layout.VELOCITY)
+
+    @property
+    def efforts(self) -> Array:
+        """What the motors exert [N m]."""
+        return self._row(layout.EFFORT)
 
     @property
     def motor_velocities(self) -> Array:
-        """Velocities [rad/s] on the motor side of the play, (n,); a copy is not needed, every substep makes a new array."""
-        return self._motor_v
+        """Velocities on the motor side of the play [rad/s]."""
+        return self._row(layout.MOTOR_V)
+
+    @property
+    def torques(self) -> Array:
+        """What left the delay line in the last substep [N m], 0 where a motor is not in torque mode."""
+        return self._row(layout.LEFT)
+
+    @property
+    def in_torque(self) -> NDArray[np.bool_]:
+        """Which motors are in torque mode."""
+        found: NDArray[np.bool_] = self.whole[layout.MODE] == layout.TORQUE
+        return found
+
+    @property
+    def load(self) -> Array:
+        """What pulls from outside against the motors in torque mode, gravity for one [N m]: for them a torque to overcome."""
+        return self._row(layout.LOAD)
+
+    @load.setter
+    def load(self, torque: Array) -> None:
+        self.state[layout.LOAD] = torque
 
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
         """Set what is in force for the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
@@ -88,104 +111,65 @@ class Motors:
         A hold decelerates at once, without the delay of the line, and then keeps the position reached.
         """
         if reference is not None:
-            self._reference[where] = reference
-        if (self._mode[where] == mode).all():
-            return
-        entering = np.zeros(len(self.q), dtype=bool)
-        entering[where] = self._mode[where] != mode
-        self._mode[where] = mode
-        self._resting[entering] = False
-        still = np.where(self._mode == "torque", 0.0, self._motor_v)
-        self._line = [np.where(entering, still, on_its_way) for on_its_way in self._line]
-        self._set_masks()
+            self.state[layout.REFERENCE, where] = reference
+        code = _MODES[mode]
+        if (self.whole[layout.MODE, where] != code).any():
+            entering = np.arange(self.state.shape[1])[where]
+            self._compiled.drive.enter_all(entering, self.whole, self.state, self.line, code)
 
     def drive(self, dt: float) -> Array:
         """Advance the motor side by one substep of dt [s]; the joint-side velocity [rad/s] it asks for, (n,).
 
         That is zero while the play is not taken up.
         """
-        before = self._motor_v
-        self._motor_v = self._respond(self._delayed(self._input(), dt), dt)
-        if self._any_hold:
-            self._motor_v = np.where(self._is_hold, self._held(before, dt), self._motor_v)
-        self.efforts = INERTIA * (self._motor_v - before) / dt + FRICTION * self._motor_v
-        self._motor_q = self._motor_q + self._motor_v * dt
-        play = self.parameters.backlash / 2.0
-        self._dragged = self.q.clip(self._motor_q - play, self._motor_q + play)
-        self._dt = dt
-        velocity: Array = (self._dragged - self.q) / dt
+        self.begin_substeps(dt)
+        self._compiled.drive.drive_all(self.living, self.whole, self.fixed, self.state, self.line, self.at, dt)
+        velocity: Array = (self.state[layout.DRAGGED] - self.state[layout.Q]) / dt
         return velocity
 
     def integrate(self) -> None:
         """Kinematic joint side: go where `drive` asked, as far as the hard stops."""
-        self.adopt(self._dragged.clip(self._limits[:, 0], self._limits[:, 1]))
+        self._compiled.drive.integrate_all(self.living, self.whole, self.fixed, self.state, self._dt)
 
     def adopt(self, q: Array) -> None:
         """Take the joint side (n,) rad at the end of the substep, as a physics engine says.
 
-        The motor side follows into the play: nothing winds up while a joint is blocked.
+        The motor side follows into the play: nothing winds up while a joint is blocked.  In torque mode it goes with the joint.
         """
-        self.velocities = (q - self.q) / self._dt
-        self.q = np.array(q)
-        play = self.parameters.backlash / 2.0
-        self._motor_q = self._motor_q.clip(self.q - play, self.q + play)
+        given = np.array(q, dtype=np.float64)
+        self._compiled.drive.adopt_all(self.living, self.whole, self.fixed, self.state, given, self._dt)
 
-    def encoders(self, dt: float, where: slice = slice(None)) -> Array:
-        """The joint positions [rad] with white noise whose strength does not depend on the tick dt [s]."""
-        noise = self.parameters.encoder_noise
-        if noise == 0.0:
-            return self.q[where].copy()
-        q = self.q[where]
-        noisy: Array = q + self._rng.standard_normal(len(q)) * (noise * np.sqrt(NOISE_PERIOD / dt))
-        return noisy
+    def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
+        """The joint positions [rad] at tick k with white noise whose strength does not depend on the tick's length dt [s].
 
-    def _set_masks(self) -> None:
-        self._is_hold = self._mode == "hold"
-        self._is_position = self._mode == "position"
-        self._is_torque = self._mode == "torque"
-        self._any_hold = bool(self._is_hold.any())
-        self._any_position = bool(self._is_position.any())
-        self._any_torque = bool(self._is_torque.any())
+        The noise is a pure function of seed, tick and motor: asked twice, it is the same.
+        """
+        noisy = self.q
+        self._compiled.noise.read(self.seed, k, self.noise(dt), self.living, self.state[layout.Q], noisy)
+        return noisy[where]
 
-    def _input(self) -> Array:
-        """What enters the delay line: a torque [N m] in torque mode, else a velocity [rad/s]."""
-        wanted: Array = self._reference.clip(-self._max_velocity, self._max_velocity)
-        if self._any_position:
-            wanted = np.where(self._is_position, self._servo(self._reference), wanted)
-        if self._any_torque:
-            wanted = np.where(self._is_torque, self._reference.clip(-self._max_torque, self._max_torque), wanted)
-        return wanted
+    def _row(self, row: int) -> Array:
+        copied: Array = self.state[row].copy()
+        return copied
 
-    def _servo(self, position: Array) -> Array:
-        velocity: Array = (SERVO_GAIN * (position - self._motor_q)).clip(-self._max_velocity, self._max_velocity)
-        return velocity
+    def noise(self, dt: float) -> float:
+        """The standard deviation [rad] of the encoders at ticks of dt [s]."""
+        return float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt))
 
-    def _delayed(self, wanted: Array, dt: float) -> Array:
-        steps = round(self.parameters.delay / dt)
-        if len(self._line) < steps:  # at the start, or when the substep has changed
-            still = np.where(self._is_torque, 0.0, self._motor_v)
-            self._line = [still] * (steps - len(self._line)) + self._line
-        self._line.append(wanted)
-        delayed = self._line[-steps - 1]
-        self._line = self._line[-steps:] if steps else []
-        return delayed
-
-    def _respond(self, delayed: Array, dt: float) -> Array:
-        lag = self.parameters.lag
-        share = 1.0 - np.exp(-dt / lag) if lag else 1.0
-        velocity = self._motor_v + share * (delayed - self._motor_v)
-        if self._any_torque:
-            push = (delayed - FRICTION * self._motor_v) / INERTIA
-            push = push.clip(-self._max_acceleration, self._max_acceleration)
-            driven = (self._motor_v + push * dt).clip(-self._max_velocity, self._max_velocity)
-            velocity = np.where(self._is_torque, driven, velocity)
-        return velocity
-
-    def _held(self, before: Array, dt: float) -> Array:
-        """Brake to rest, then stay where that was."""
-        change = self._max_acceleration * dt
-        arrived = ~self._resting & (np.abs(before) <= change)
-        self._rest = np.where(arrived, self._motor_q, self._rest)
-        self._resting = self._resting | arrived
-        braking = before - before.clip(-change, change)
-        return np.where(self._resting, self._servo(self._rest), braking)
+    def begin_substeps(self, dt: float) -> None:
+        """Let substeps last dt [s] from now on; what is on its way to the motors stays in order, the newest last."""
+        if dt == self._dt:
+            return
+        self._dt = dt
+        with np.errstate(divide="ignore"):
+            self.fixed[layout.SHARE] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
+        before, delay = self.whole[layout.DELAY].copy(), np.round(self._delay / dt).astype(np.int64)
+        rows, old = int(delay.max()) + 1, len(self.line)
+        oldest_first = np.roll(self.line, old - 1 - int(self.at[0]), axis=0)
+        still = np.where(self.in_torque, 0.0, self.state[layout.MOTOR_V])
+        line = np.tile(still, (rows, 1))
+        for motor, steps in enumerate(np.minimum(before, delay)):
+            if steps:
+                line[rows - steps :, motor] = oldest_first[old - steps :, motor]
+        self.whole[layout.DELAY] = delay
+        self.line, self.at = line, np.array([rows - 1])

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.collision.touch import touched
-from mobee.control import Command, Controller, Gains, SettleTest
+from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
+from mobee.control.layout import SETTLED
 from mobee.control.modality import Modality
-from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
 from mobee.plant import Outcome
-from mobee.robot.robot import Array
-from mobee.simulation.motors import MotorParameters, Motors
+from mobee.robot.robot import Array, Robot
+from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
+from mobee.simulation.motors import Motors
+from mobee.simulation.parameters import MotorParameters
+from mobee.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
 
-
-@dataclass(slots=True)
-class _Action:
-    start: float  # s
-    test: SettleTest
+CHUNK = 1000  # ticks between two moments at which a run can be broken off
 
 
 class OfflinePlant:
@@ -32,6 +35,23 @@ class OfflinePlant:
     A command formed from the encoders of tick k moves the motors from tick k + 1 on, as live.  Several parts may be acting
     at once: `begin` starts an action, `advance` runs until one or more are over, `act` does both for one part.
     Parts that are not acting stay under control, at their attractors.
+
+    Args:
+        model: the robot in its world.
+        seed: of the encoders' noise, a whole number.
+        gains: of the control law; None: the default ones.
+        motors: their parameters; None: those that bring out the published findings.
+        dt: the control tick [s].
+        propagate: how far down the body a contact is felt, "tree" or "part".
+        modality: "velocity", "position" or "torque".
+        speed_scale: share of the motors' speed that is used, above 0 to 1.
+        contact_forces: False leaves f_coll at zero.
+        active: names or patterns of parts and motors that live; the others are rigid at home, without noise, and cost nothing.
+        command_age: ticks between the encoders and the motion under their command, 1 as live.
+        hashed: whether `hash` is kept.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
     """
 
     def __init__(
@@ -45,28 +65,52 @@ class OfflinePlant:
         modality: Modality = "velocity",
         speed_scale: float = 1.0,
         contact_forces: bool = True,
+        active: Sequence[str] | None = None,
+        command_age: int = 1,
+        hashed: bool = False,
     ) -> None:
-        """Start at rest at the robot's home posture; `dt` [s] is the control tick."""
-        self.model = model
-        self.robot = model.robot
-        self.controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces)
+        alive = living(model.robot, active)
+        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive)
         if not 0 < dt < self.controller.max_dt:
             raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
-        self.dt = dt
+        if isinstance(command_age, bool) or not isinstance(command_age, int) or command_age < 1:
+            raise InvalidValue(f"command_age {command_age!r}: must be a whole number of ticks, at least 1")
+        self.model, self.robot, self.dt = model, model.robot, dt
         parameters = motors if motors is not None else MotorParameters()
-        self.motors = Motors(self.robot, parameters, seed, self.robot.home)
-        self._substeps = parameters.substeps(dt)
+        self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
+        from mobee.simulation.runner import Runner  # machine code, which `import mobee` does not load
+
+        self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
         self._ticks = 0
-        self._actions: dict[str, _Action] = {}
-        self._command: Command | None = None
-        self._q = self.motors.encoders(dt)
-        self._track = model.track()
-        self.pose: Pose | None = None  # the model at the last tick
+        self._parts = np.array([[p.start, p.start + len(p), 0, 0] for p in self.robot.parts.values()], dtype=np.int64).reshape(-1, PART)
+        self._tests = np.zeros((len(self._parts), 2))
+        self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
+        self._pose: Pose | None = None
+        self._digest = hashlib.sha256() if hashed else None
+
+    @property
+    def controller(self) -> Controller:
+        """Takes attractors and forces between two ticks."""
+        return self._controller
 
     @property
     def time(self) -> float:
         """Plant time in s."""
         return self._ticks * self.dt
+
+    @property
+    def pose(self) -> Pose | None:
+        """The model at the last tick, in the world of now; None before the first."""
+        if self._pose is None and self._ticks:
+            self._pose = self.model.evaluate(self._q)
+        return self._pose
+
+    @property
+    def hash(self) -> str:
+        """The SHA-256 of the encoders (n,) of every tick so far, little-endian float64; raises InvalidValue without `hashed`."""
+        if self._digest is None:
+            raise InvalidValue("this plant keeps no hash: make it with hashed=True")
+        return self._digest.hexdigest()
 
     def measure(self, part: str) -> Array:
         """The part's motor positions as the encoders said at the last tick, shape (n_part,), in [rad]."""
@@ -77,7 +121,8 @@ class OfflinePlant:
 
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
         """
-        if others := [name for name in self._actions if name != part]:
+        names = list(self.robot.parts)
+        if others := [names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if names[p] != part]:
             raise InvalidValue(f"act({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
         self.begin(part, target)
         return self.advance()[0][1]
@@ -92,46 +137,68 @@ class OfflinePlant:
                 low, high = limits[i]
                 raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
         self.controller.set_attractor(part, target)
+        index = list(self.robot.parts).index(part)
         asked = self.time - self.dt  # in the tick just over, as live: the next one is the first to see it
-        self._actions[part] = _Action(asked, SettleTest(self.controller.gains.settle, asked))
+        self._tests[index] = asked, asked + self.controller.gains.settle.first_look
+        self._parts[index, ACTING] = 1
 
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts."""
-        if not self._actions:
+        acting = self._parts[:, ACTING].astype(bool)
+        if not acting.any():
             raise InvalidValue("no part is acting: call begin first")
-        while True:
-            self.tick()
-            if done := self._finished():
-                return done
+        while (self._parts[acting, ACTING] == 1).all():
+            self._run(CHUNK)
+        return [self._outcome(int(p)) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
 
     def tick(self) -> None:
-        """One control tick: encoders, model, controller; then the motors run under the command of the tick before."""
-        if self._command is not None:
-            self.motors.command(slice(None), self.controller.modality, getattr(self._command, self.controller.modality))
-        self._q = self.motors.encoders(self.dt)
-        if not np.isfinite(self._q).all():
-            self._actions.clear()
+        """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
+
+        Actions under way are judged, and those that end here are returned by no `advance`.
+        """
+        self._run(1)
+
+    def run(self, ticks: int) -> Trace:
+        """That many ticks, whatever the actions under way are at, and what happened in each."""
+        rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
+        while left > 0:
+            rows.append(self._run(min(left, CHUNK), record=True))
+            left -= len(rows[-1])
+        return Trace.of(np.concatenate(rows))
+
+    def _run(self, most: int, record: bool = False) -> Array:
+        """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
+        kept = record or self._digest is not None
+        rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept)
+        if done:
+            self._pose = None
+            self._ticks += done
+            self._q = self._runner.q.copy()
+            n = len(self._q)
+            if self._digest is not None:
+                self._digest.update(np.ascontiguousarray(rows[:, :n]).astype("<f8").tobytes())
+        if lost:
+            self._parts[:, ACTING] = 0
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
-        self.pose = self._track.evaluate(self._q)
-        self._command = self.controller.step(self._q, self.dt, self.controller.forces(self.pose))
-        step = self.dt / self._substeps
-        for _ in range(self._substeps):
-            self.motors.drive(step)
-            self.motors.integrate()
-        self._ticks += 1
+        return rows
 
-    def _finished(self) -> list[tuple[str, Outcome]]:
-        done = []
-        sampled = self.time - self.dt
-        for name, part in self.robot.parts.items():
-            if name not in self._actions:
-                continue
-            action = self._actions[name]
-            verdict = action.test.look(sampled, self.controller.velocity[part.slice], self.controller.acceleration[part.slice])
-            if verdict != "moving":
-                del self._actions[name]
-                done.append((name, Outcome(self.measure(name), verdict == "settled", sampled - action.start, self._touched(name))))
-        return done
+    def _outcome(self, index: int) -> tuple[str, Outcome]:
+        name = list(self.robot.parts)[index]
+        first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
+        duration = self.time - self.dt - float(self._tests[index, 0])
+        return name, Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched(self.model.evaluate(self._q))[name])
 
-    def _touched(self, part: str) -> tuple[str, ...]:
-        return () if self.pose is None else touched(self.pose)[part]
+
+def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
+    """Which motors (n,) are meant by names and patterns of parts and motors; all by None."""
+    if active is None:
+        return np.ones(len(robot.motors), dtype=bool)
+    alive = np.zeros(len(robot.motors), dtype=bool)
+    for pattern in [active] if isinstance(active, str) else active:
+        found = [fnmatchcase(motor.name, pattern) or fnmatchcase(motor.part, pattern) for motor in robot.motor_table]
+        if not any(found):
+            raise UnknownName("part or motor", pattern, (*robot.parts, *robot.motors))
+        alive |= np.array(found)
+    if not alive.any():
+        raise InvalidValue(f"active={active!r}: at least one part or motor must live; None means all.")
+    return alive

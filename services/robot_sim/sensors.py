@@ -39,14 +39,14 @@ class Sensors:
         where = self._robot.parts[part].slice
         q_before, dq_before = self._before[0][where], self._before[1][where]
         q, dq = motors.q[where], motors.motor_velocities[where]
-        noise = motors.encoders(self._dt, where) - q
+        noise = motors.encoders(self._bus.k, self._dt, where) - q
         t = self._bus.t + round(share * self._dt * 1e9)
         self._put(part, t, q_before + share * (q - q_before) + noise, dq_before + share * (dq - dq_before), motors.efforts[where], gate)
 
     def publish_now(self, motors: Motors, gates: dict[str, Gate]) -> None:
         """All parts as they are now, at the beginning of the tick; tick 0, in which nothing moves, is read without noise."""
         k = self._bus.k
-        encoders = motors.encoders(self._dt) if k else motors.q
+        encoders = motors.encoders(k, self._dt) if k else motors.q
         for part, gate in gates.items():
             where = self._robot.parts[part].slice
             q, dq = encoders[where], motors.motor_velocities[where]

@@ -51,9 +51,9 @@ def draw(
     reacher = Reacher(controller, marker, position, normal)
     path, said = [], []
     velocity = np.zeros(len(start))
-    for _ in range(round(seconds / DT)):
+    for k in range(1, round(seconds / DT) + 1):
         plant.command(slice(None), "velocity", velocity)
-        q = plant.encoders(DT)
+        q = plant.encoders(k, DT)
         said.append(reacher.update(q, DT))
         velocity = controller.step(q, DT).velocity
         for _ in range(2):

@@ -33,7 +33,7 @@ def test_ideal_motors_do_what_they_are_told_at_once() -> None:
     m.command(ALL, "velocity", np.array([0.5, -0.2, 0.0]))
     assert run(m, 0.1)[-1] == pytest.approx([0.05, -0.02, 0.0])
     assert m.velocities == pytest.approx([0.5, -0.2, 0.0])
-    assert np.array_equal(m.encoders(0.01), m.q)
+    assert np.array_equal(m.encoders(1, 0.01), m.q)
 
 
 def test_the_lag_is_a_first_order_response() -> None:
@@ -69,16 +69,16 @@ def test_encoder_noise_is_white_seeded_and_independent_of_the_tick() -> None:
     noisy = replace(IDEAL, encoder_noise=0.002)
     for dt in (0.02, 0.005):
         m = motors(noisy)
-        readings = np.array([m.encoders(dt) for _ in range(20_000)])
+        readings = np.array([m.encoders(k, dt) for k in range(20_000)])
         assert readings.std(axis=0) * np.sqrt(dt / 0.02) == pytest.approx(np.full(3, 0.002), rel=0.02)
         assert np.abs(np.mean(readings[1:] * readings[:-1], axis=0)).max() < 0.03 * readings.var()
-    assert np.array_equal(motors(noisy, seed=5).encoders(0.01), motors(noisy, seed=5).encoders(0.01))
-    assert not np.array_equal(motors(noisy, seed=5).encoders(0.01), motors(noisy, seed=6).encoders(0.01))
+    assert np.array_equal(motors(noisy, seed=5).encoders(1, 0.01), motors(noisy, seed=5).encoders(1, 0.01))
+    assert not np.array_equal(motors(noisy, seed=5).encoders(1, 0.01), motors(noisy, seed=6).encoders(1, 0.01))
 
 
 def test_parts_can_be_read_one_by_one() -> None:
     m = motors(q=np.array([0.1, 0.2, 0.3]))
-    assert m.encoders(0.01, slice(1, 3)).tolist() == [0.2, 0.3]
+    assert m.encoders(1, 0.01, slice(1, 3)).tolist() == [0.2, 0.3]
 
 
 def test_hard_stops_stop_and_nothing_winds_up_behind_them() -> None:

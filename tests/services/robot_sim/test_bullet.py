@@ -119,7 +119,7 @@ def test_the_same_seed_gives_the_same_motion_also_after_a_reset() -> None:
         found = []
         for _ in range(150):
             backend.step(DT)
-            found.append(backend.motors.encoders(DT).tolist())
+            found.append(backend.motors.encoders(1, DT).tolist())
         return found
 
     first, second = body(), body()

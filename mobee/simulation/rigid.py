@@ -1,0 +1,93 @@
+"""A robot some of whose motors never move: joints that none of the others drives are gone, and their links one with what carries them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.kinematics import link_transforms
+from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
+
+
+def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool) -> Robot:
+    """The robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
+
+    Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding.
+    `keep_parts`: links of different parts stay apart, so that forces can be cut between them.  Markers, masses and what is
+    carried are left out.
+    """
+    if alive.all():
+        return robot
+    kept = (robot.coupling[0][:, alive] != 0.0).any(axis=1)
+    if keep_parts:
+        kept |= _borders(robot)
+    brought = _brought(robot, kept)
+    link = np.zeros(len(robot.links), dtype=np.intp)  # what each link has become
+    joint = np.cumsum(kept) - 1  # and each joint
+    for j, one in enumerate(robot.joints):
+        link[j + 1] = joint[j] + 1 if kept[j] else link[one.parent]
+    shape, solid_pairs, field_pairs = _shapes(robot, link)
+    return replace(
+        robot,
+        links=(robot.links[0], *(robot.links[j + 1] for j in np.flatnonzero(kept))),
+        joints=tuple(_moved_joint(robot.joints[j], brought, link) for j in np.flatnonzero(kept)),
+        motor_table=tuple(_driving(motor, kept, joint) for motor in robot.motor_table),
+        markers={},
+        shapes=tuple(
+            replace(
+                robot.shapes[i],
+                link=int(link[robot.shapes[i].link]),
+                position=_at(brought[robot.shapes[i].link], robot.shapes[i].position),
+                rotation=brought[robot.shapes[i].link][:3, :3] @ robot.shapes[i].rotation,
+            )
+            for i in shape
+        ),
+        field_pairs=field_pairs,
+        solid_pairs=solid_pairs,
+        base_shapes=frozenset(new for new, i in enumerate(shape) if int(i) in robot.base_shapes or link[robot.shapes[i].link] == 0),
+        untested={},
+        where={},
+        bodies=(),
+    )
+
+
+def _brought(robot: Robot, kept: NDArray[np.bool_]) -> Array:
+    """Where the links (L, 4, 4) are when the joints that are kept are at zero and the others at home."""
+    still = tuple(_driving(motor, ~kept, np.arange(len(kept))) for motor in robot.motor_table)
+    return link_transforms(replace(robot, motor_table=still), robot.home)
+
+
+def _driving(motor: Motor, kept: NDArray[np.bool_], joint: Ints) -> Motor:
+    """A motor that drives only the joints kept, by their new numbers."""
+    return replace(motor, joints=tuple((int(joint[j]), scale, offset) for j, scale, offset in motor.joints if kept[j]))
+
+
+def _moved_joint(joint: Joint, brought: Array, link: Ints) -> Joint:
+    carrier = brought[joint.parent]
+    return replace(joint, parent=int(link[joint.parent]), axis=carrier[:3, :3] @ joint.axis, point=_at(carrier, joint.point))
+
+
+def _shapes(robot: Robot, link: Ints) -> tuple[Ints, Ints, Ints]:
+    """Which shapes remain, and their pairs by the new numbers: those that can move apart."""
+    of_shape = np.array([link[shape.link] for shape in robot.shapes], dtype=np.intp)
+    solid, fields = (pairs[of_shape[pairs[:, 0]] != of_shape[pairs[:, 1]]] for pairs in (robot.solid_pairs, robot.field_pairs))
+    needed = of_shape != 0
+    needed[solid.ravel()] = needed[fields.ravel()] = True
+    number = np.cumsum(needed) - 1
+    return np.flatnonzero(needed), number[solid], number[fields]
+
+
+def _borders(robot: Robot) -> NDArray[np.bool_]:
+    """For each joint whether the link it moves belongs to another part than the link it is mounted on."""
+    part: list[str | None] = [None]
+    for joint, row in zip(robot.joints, robot.coupling[0], strict=True):
+        driven = np.flatnonzero(row)
+        part.append(robot.motor_table[int(driven[0])].part if driven.size else part[joint.parent])
+    return np.array([part[j + 1] != part[joint.parent] for j, joint in enumerate(robot.joints)], dtype=bool)
+
+
+def _at(transform: Array, point: Array) -> Array:
+    moved: Array = transform[:3, :3] @ point + transform[:3, 3]
+    return moved

@@ -1,0 +1,81 @@
+"""Motors that are not active: rigid at home, without noise, and for the others as if they were simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee import sphere
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model import Model
+from mobee.robot.load import load_robot, load_world
+from mobee.simulation import MotorParameters, OfflinePlant
+from mobee.simulation.rigid import stiffened
+
+QUIET = MotorParameters(encoder_noise=0.0)
+JOINTS = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
+
+
+@pytest.mark.parametrize("name", ["icub", "icub_2014"])
+@pytest.mark.parametrize("active", [JOINTS, ("torso",), ("torso", "left_arm"), ("head", "r_*")])
+def test_a_stiffened_robot_feels_what_the_whole_one_feels(name: str, active: tuple[str, ...]) -> None:
+    robot = load_robot(name)
+    plant = OfflinePlant(Model(robot), active=active)
+    alive = np.isin(np.arange(len(robot.motors)), plant.motors.living)
+    for keep_parts in (False, True):
+        stiff = stiffened(robot, alive, keep_parts)
+        assert len(stiff.joints) < len(robot.joints)
+        whole, reduced = Model(robot, load_world("table")), Model(stiff, load_world("table"))
+        rng = np.random.default_rng(0)
+        felt = 0.0
+        for _ in range(100):
+            q = np.where(alive, rng.uniform(*robot.limits.T), robot.home)
+            one, other = whole.evaluate(q), reduced.evaluate(q)
+            if keep_parts:
+                assert other.projection_of_part[alive] == pytest.approx(
+                    one.projection_of_part[alive], rel=1e-6, abs=1e-7
+                )  # cylinders meet to 1e-8 m
+            else:
+                assert other.projection[alive] == pytest.approx(one.projection[alive], rel=1e-6, abs=1e-7)  # cylinders meet to 1e-8 m
+            felt = max(felt, float(np.abs(one.projection[alive]).max()))
+        assert felt > 0.0
+
+
+def test_the_rest_of_the_robot_stands_still_and_is_read_without_noise() -> None:
+    robot = load_robot("icub")
+    plant = OfflinePlant(Model(robot), active=["left_arm"])
+    low, high = robot.limits[robot.parts["left_arm"].slice].T
+    plant.act("left_arm", low + 0.4 * (high - low))
+    still = np.ones(len(robot.motors), dtype=bool)
+    still[robot.parts["left_arm"].slice] = False
+    trace = plant.run(20)
+    assert (trace.encoders[:, still] == robot.home[still]).all()
+    assert (trace.encoders[:, ~still].std(axis=0) > 0.0).all()
+
+
+def test_a_quiet_arm_goes_the_way_it_goes_in_a_whole_quiet_robot() -> None:
+    robot = load_robot("icub")
+    low, high = robot.limits[robot.parts["left_arm"].slice].T
+    target = low + 0.6 * (high - low)
+    found = [OfflinePlant(Model(robot), 0, motors=QUIET, active=active).act("left_arm", target) for active in (None, ("left_arm",))]
+    assert found[0].q == pytest.approx(found[1].q, abs=1e-9)
+    assert found[0].duration == found[1].duration
+
+
+def test_what_an_active_arm_carries_is_felt() -> None:
+    robot = load_robot("icub")
+    model = Model(robot, load_world("table"))
+    plant = OfflinePlant(model, active=["left_arm"])
+    model.world.add("tool", sphere(0.05), position=model.evaluate(robot.home).position("left_palm"))
+    model.attach("tool", robot.links[robot.marker("left_palm").link], robot.home)
+    before = plant.controller.last_forces.collision.copy()
+    plant.tick()
+    assert before.any() == 0
+    assert np.isfinite(plant.controller.last_forces.total).all()
+
+
+def test_a_pattern_that_means_nothing_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(UnknownName, match="left_arm"):
+        OfflinePlant(Model(load_robot("icub")), active=["left_am"])
+    with pytest.raises(InvalidValue, match="at least one"):
+        OfflinePlant(Model(load_robot("icub")), active=[])

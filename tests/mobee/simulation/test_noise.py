@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.robot.load import load_robot
+from mobee.simulation import MotorParameters, Motors
+from mobee.simulation.load import compiled
+
+MASK = 2**64 - 1
+MOTORS = np.arange(41)
+
+
+def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
+    return np.array([compiled().noise.encoder_noise(np.uint64(seed), k, motors) for k in ticks])
+
+
+def splitmix(x: int) -> int:
+    """As published by Vigna, in whole numbers of any length."""
+    x = (x + 0x9E3779B97F4A7C15) & MASK
+    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & MASK
+    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & MASK
+    return x ^ (x >> 31)
+
+
+@pytest.mark.parametrize(("seed", "k", "motor"), [(0, 0, 0), (7, 1, 1), (2**64 - 1, 10**9, 40)])
+def test_a_normal_is_box_muller_of_splitmix(seed: int, k: int, motor: int) -> None:
+    one = splitmix(splitmix(splitmix(seed) ^ k) ^ splitmix(motor // 2))
+    radius = np.sqrt(-2.0 * np.log(((one >> 11) + 1) * 2.0**-53))
+    angle = 2.0 * np.pi * ((splitmix(one) >> 11) * 2.0**-53)
+    expected = radius * (np.sin(angle) if motor % 2 else np.cos(angle))
+    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_it_is_a_pure_function_of_seed_tick_and_motor() -> None:
+    assert np.array_equal(normals(3, range(50)), normals(3, range(50)))
+    assert np.array_equal(normals(3, range(50))[20:, 5:9], normals(3, range(20, 50), np.arange(5, 9)))
+    assert not (normals(3, range(50)) == normals(4, range(50))).any()
+
+
+def test_moments_and_tails_are_those_of_a_normal() -> None:
+    drawn = normals(1, range(5000)).ravel()
+    n = len(drawn)
+    assert abs(drawn.mean()) < 4.0 / np.sqrt(n)
+    assert abs(drawn.var() - 1.0) < 4.0 * np.sqrt(2.0 / n)
+    assert abs((drawn**3).mean()) < 4.0 * np.sqrt(15.0 / n)
+    assert abs((drawn**4).mean() - 3.0) < 4.0 * np.sqrt(96.0 / n)
+    for limit, share in ((1.0, 0.317311), (2.0, 0.0455), (3.0, 0.0026998)):
+        assert abs((np.abs(drawn) > limit).mean() - share) < 4.0 * np.sqrt(share / n)
+
+
+@pytest.mark.parametrize("lag", [1, 2, 7])
+def test_ticks_motors_and_seeds_are_uncorrelated(lag: int) -> None:
+    drawn = normals(1, range(5000))
+    bound = 4.5 / np.sqrt(drawn[lag:].size)
+    assert abs((drawn[lag:] * drawn[:-lag]).mean()) < bound
+    assert abs((drawn[:, lag:] * drawn[:, :-lag]).mean()) < bound
+    assert abs((drawn * normals(1 + lag, range(5000))).mean()) < bound
+    assert abs(((drawn**2 - 1.0)[:, lag:] * (drawn**2 - 1.0)[:, :-lag]).mean()) < 2.0 * bound
+
+
+def test_a_part_is_read_with_the_noise_that_the_whole_robot_is_read_with() -> None:
+    robot = load_robot("icub")
+    motors = Motors(robot, MotorParameters(), seed=9, q=robot.home)
+    where = robot.parts["right_arm"].slice
+    assert np.array_equal(motors.encoders(4, 0.01)[where], motors.encoders(4, 0.01, where))
+    expected = robot.home + np.deg2rad(0.1) * np.sqrt(2.0) * normals(9, range(4, 5))[0]
+    assert motors.encoders(4, 0.01) == pytest.approx(expected, abs=1e-15)
