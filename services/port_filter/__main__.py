@@ -19,6 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         robot = load_robot(config.robot)
         theirs = ServiceConfig(endpoint=config.endpoint, namespace=config.clients, robot=config.robot, mode=config.mode)
         with Service("robot_sim", theirs, robot) as twin, Service("port_filter", config, robot, inbox=twin.inbox) as service:
+            twin.log.disabled = True  # its events are for the clients; people are told by the service
             FilterNode(service, twin, config, robot)
             service.ready()
             twin.ready()

@@ -86,7 +86,7 @@ class DriveDesk:
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         for part, owner in self._owners.items():
             if not up and owner == Owner(who, instance):
-                self._twin.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
+                self._service.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
                 self._owners[part] = None
                 if not self._why_cut():
                     self.hold(part)

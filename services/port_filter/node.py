@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from bus_schema import VERSION, keys
@@ -20,7 +18,6 @@ from services.port_filter.switch import Switch
 from services.port_filter.twin import HandThrough
 
 STALE = 100_000_000  # ns: a part whose state is older cannot be judged
-WAIT = 0.2  # s for clients that have not answered any tick yet
 
 
 class FilterNode:
@@ -34,7 +31,7 @@ class FilterNode:
         self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
         self._last_k = -1
         self._is_stale = False
-        self._complete = False  # lockstep: every client that takes part has come
+        self._complete = self._is_waiting = False  # lockstep: every client that takes part has come; some have not answered yet
         self._commands = {part: Commands(service.bus, part) for part in robot.parts}
         self._moves = {part: Moves() for part in robot.parts}
         self._drives = DriveDesk(service, twin, robot, self._why_cut, self._armed)
@@ -42,6 +39,7 @@ class FilterNode:
         self._clock = twin.bus.publisher(keys.CLOCK, Clock, twin.bus.control)
         self._streams = {part: twin.bus.publisher(keys.state(part), State, twin.bus.control) for part in robot.parts}
         self._participant = Participant(service)
+        twin.keeps_step = twin.locked
         self._barrier = Barrier(twin, config.participants, lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"))
         self._declare()
 
@@ -103,7 +101,9 @@ class FilterNode:
 
     def _tick(self, clock: Clock) -> None:
         twin = self._twin.bus
-        twin.run, twin.k, twin.t = clock.run, clock.k, clock.t
+        if self._is_waiting:
+            return  # robot_sim went on without its late participants
+        twin.run, twin.k, twin.t, twin.dt = clock.run, clock.k, clock.t, clock.dt
         if clock.mode != "paused" and clock.k != self._last_k and len(self._states) == len(self._robot.parts):
             if self._last_k < 0:
                 self._switch.restart(clock.dt * 1e-9)
@@ -209,11 +209,12 @@ class FilterNode:
 
     def _answer(self, k: int) -> None:
         """Lockstep: the clients first, as robot_sim waits for its own."""
-        if not self._complete:
-            self._service.spin(time.monotonic() + WAIT, lambda: not self._barrier.absent())
-            self._complete = not self._barrier.absent()
+        self._complete = self._complete or not self._barrier.absent()
         if self._complete:
-            self._participant.done(k, ok=not self._barrier.wait(k))
+            self._is_waiting = True
+            late = self._barrier.wait(k)
+            self._is_waiting = False
+            self._participant.done(k, ok=not late)
 
     def _new_run(self) -> None:
         self._states.clear()
@@ -230,4 +231,4 @@ class FilterNode:
         counts = reflex.counts
         text = f"{reflex.state}, {counts.reflexes} reflexes, {counts.recovered} recovered, {counts.stuck} stuck"
         numbers = {"reflexes": counts.reflexes, "recovered": counts.recovered, "stuck": counts.stuck, "flips": counts.flips}
-        return text, {**numbers, "recorded": reflex.recorded}
+        return text, {**numbers, "recorded": reflex.recorded, "refused": sum(self._twin.bus.rejected.values())}
