@@ -9,8 +9,9 @@ four variants.
 A client drives the left hand on a straight way through the surface of the table's field, 6 cm before it and 4 cm behind, at 20 % speed,
 and tries again whenever it gets control back, for 12 s.  Motors with lag, delay, play and encoder noise, ticks of 10 ms.  Variants:
 off = nobody steps in; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
-are attractors of the controller.  A recovery, the first of each trial, fails when contact is seen again on the way back, when it
-really comes back, when the way back goes deeper than the stop, or when the hand is still in contact as control is given back.
+are attractors of the controller.  The first recovery of each trial counts.  It is a success when the hand ends out of contact, has not come
+into contact again nor gone deeper on the way back, and the reflex does not come again within 0.3 s; it is clean when besides the reflex
+saw nothing of the contact any more on the way back.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ SOURCE = "thesis 4.4"
 
 RECORDS = "graze.csv"
 ANGLES = (90.0, 60.0, 30.0, 20.0, 10.0, 7.0, 5.0, 3.0, 2.0, 1.0)  # degrees
-LOW = 5.0  # degrees, up to which a way counts as flat
+SHARES = ("recovered", "clean", "again", "came_back", "never", "deeper", "relapse", "settled", "switches", "flips", "flicker")
+LOW = 3.0  # degrees, up to which a way counts as flat
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,7 +88,7 @@ def summary(trials: Sequence[Trial]) -> dict[str, float]:
 
     return {
         "trials": len(trials),
-        **{name: share(name) for name in ("recovered", "again", "came_back", "never", "deeper", "settled", "switches", "flips", "flicker")},
+        **{name: share(name) for name in SHARES},
         "depth_mm_median": round(1e3 * float(np.median([trial.depth for trial in trials])), 1),
         "depth_mm_max": round(1e3 * max(trial.depth for trial in trials), 1),
         "solid_mm_max": round(1e3 * max(trial.solid for trial in trials), 1),

@@ -24,8 +24,9 @@ def draw(trials: Sequence[Trial], path: Path) -> Path:
     drawing = new_figure(10.0, 7.0)
     (success, switching), (depth, progress) = drawing.subplots(2, 2, sharex=True)
     _curves(success, trials, SWITCHING, lambda t: 100.0 * t.recovered)
+    _curves(success, trials, SWITCHING, lambda t: 100.0 * t.clean, "--")
     _curves(success, trials, ("2.0",), lambda t: 100.0 * t.settled)
-    success.set(ylabel="first recovery succeeds; 2.0: settles [%]", ylim=(-3.0, 103.0))
+    success.set(ylabel="first recovery succeeds (dashed: is clean); 2.0: settles [%]", ylim=(-3.0, 103.0))
     _curves(switching, trials, SWITCHING, lambda t: t.switches)
     switching.set(ylabel="switches of control per second")
     _curves(depth, trials, tuple(LABELS), lambda t: 1e3 * t.depth)
@@ -47,7 +48,7 @@ def _angles(trials: Sequence[Trial]) -> list[float]:
     return sorted({trial.angle for trial in trials})
 
 
-def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: Callable[[Trial], float]) -> None:
+def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: Callable[[Trial], float], line: str = "-") -> None:
     """Mean and standard error against the angle."""
     for variant in variants:
         rows = []
@@ -57,4 +58,4 @@ def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: 
                 rows.append((angle, float(np.mean(values)), float(np.std(values)) / np.sqrt(len(values))))
         if rows:
             x, mean, error = zip(*rows, strict=True)
-            axes.errorbar(x, mean, error, marker="o", markersize=3, capsize=2, color=COLORS[variant], label=LABELS[variant])
+            axes.errorbar(x, mean, error, linestyle=line, marker="o", markersize=3, capsize=2, color=COLORS[variant], label=LABELS[variant])

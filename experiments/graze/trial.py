@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 
 DT = 0.01  # s
 SECONDS = 12.0
+RELAPSE = 0.3  # s after control is back; the way from the start to the contact takes longer
 QUICKER_THAN_LIGHT = 1e6  # rad/s: nobody limits the naive reflex
 SETTINGS = {"naive": ReflexSettings.naive(), "mended": ReflexSettings()}
 VARIANTS = ("off", *SETTINGS, "2.0")
@@ -39,16 +40,22 @@ class Trial:
     came_back: bool  # the same, as it was
     never: bool  # control came back, or never did, while the hand was in contact
     deeper: bool  # the way back went deeper than the stop
+    relapse: bool  # the second reflex came as soon as control was back
     settled: bool  # 2.0: the controller says so
     progress: float  # m, from the start to where the hand was farthest along the table
 
     @property
     def recovered(self) -> bool:
-        """1.0: the first recovery did what it should."""
-        return self.reflexes > 0 and not (self.again or self.came_back or self.never or self.deeper)
+        """1.0: the first recovery took the hand out of contact, and there it was free."""
+        return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
+
+    @property
+    def clean(self) -> bool:
+        """1.0: besides, nothing was seen of the contact any more on the way back."""
+        return self.recovered and not self.again
 
 
-COLUMNS = tuple(field.name for field in fields(Trial))
+COLUMNS = tuple(column.name for column in fields(Trial))
 
 
 def run_trial(table: Table, way: Way, variant: str, angle: float, spot: int, seed: int) -> Trial:
@@ -57,11 +64,9 @@ def run_trial(table: Table, way: Way, variant: str, angle: float, spot: int, see
     body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
     truth = Truth(table, way)
     if variant == "2.0":
-        settled = _deflect(table, client, body, truth)
-        reflexes, switches = 0, 0
+        settled, control = _deflect(table, client, body, truth), Control()
     else:
-        settled = False
-        reflexes, switches = _switch(table, client, body, truth, SETTINGS.get(variant))
+        settled, control = False, _switch(table, client, body, truth, SETTINGS.get(variant))
     return Trial(
         variant=variant,
         angle=angle,
@@ -69,17 +74,36 @@ def run_trial(table: Table, way: Way, variant: str, angle: float, spot: int, see
         seed=seed,
         depth=truth.depth,
         solid=truth.solid,
-        switches=switches / SECONDS,
+        switches=control.switches / SECONDS,
         flips=truth.flips / SECONDS,
         flicker=truth.flicker * DT if variant == "off" else 0.0,
-        reflexes=reflexes,
+        reflexes=len(control.taken),
         again=truth.again,
         came_back=truth.came_back,
         never=truth.never,
         deeper=truth.deeper,
+        relapse=control.relapsed,
         settled=settled,
         progress=truth.progress,
     )
+
+
+@dataclass(slots=True)
+class Control:
+    """When the reflex took control, and when it gave it back; ticks."""
+
+    taken: list[int] = field(default_factory=list)
+    given: list[int] = field(default_factory=list)
+
+    @property
+    def switches(self) -> int:
+        """How often control changed hands."""
+        return len(self.taken) + len(self.given)
+
+    @property
+    def relapsed(self) -> bool:
+        """Whether the second reflex followed at once upon the first."""
+        return len(self.taken) > 1 and (self.taken[1] - self.given[0]) * DT <= RELAPSE
 
 
 class _Body:
@@ -110,34 +134,32 @@ class _Body:
             self._motors.integrate()
 
 
-def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> tuple[int, int]:
-    """MoBeE 1.0, or nothing: position commands, forwarded or replaced; (reflexes, switches of control)."""
+def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> Control:
+    """MoBeE 1.0, or nothing: position commands, forwarded or replaced."""
     limit = np.full(len(table.robot.motors), QUICKER_THAN_LIGHT)
     if settings is not None and settings.brake:
         limit = np.array([motor.max_velocity for motor in table.robot.motor_table])
     reflex = Reflex(settings or ReflexSettings(confirm=SECONDS + 1.0), DT, limit)
-    track, command, switches, was_cut = table.model.track(), client.start, 0, False
-    for _ in range(round(SECONDS / DT)):
+    track, command, control = table.model.track(), client.start, Control()
+    for k in range(round(SECONDS / DT)):
         body.tick("position", command)
         q = body.encoders()
         violations = table.watch.look(track.evaluate(q))
-        before = reflex.counts.reflexes
         target = reflex.tick(q, violations)
-        begun = reflex.counts.reflexes > before
-        is_cut = target is not None
-        switches += 2 * (begun and not is_cut) if is_cut == was_cut else 1
         truth.look(body.q, bool(violations), reflex)
-        if is_cut and target is not None:
+        if reflex.counts.reflexes > len(control.taken):
+            control.taken.append(k)
+        if target is not None:
             command = target
-        else:
-            if was_cut or begun:
-                client.retry(q)
-            if client.leaves_start:
-                reflex.mark()
-            command = client.next()
-        was_cut = is_cut
-    truth.finish(reflex)
-    return reflex.counts.reflexes, switches
+            continue
+        if len(control.given) < len(control.taken):
+            control.given.append(k)
+            client.retry(q)
+        if client.leaves_start:
+            reflex.mark()
+        command = client.next()
+    truth.finish()
+    return control
 
 
 def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:

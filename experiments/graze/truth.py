@@ -45,14 +45,14 @@ class Truth:
             if not seen:
                 self.flicker = self._since_first
         if reflex is not None and reflex.recovery is not None and not self._is_over:
-            self._follow(reflex, reflex.recovery, depth)
+            self._follow(reflex.recovery, depth)
 
-    def finish(self, reflex: Reflex) -> None:
+    def finish(self) -> None:
         """The trial is over."""
         if not self._is_over and self._first is not None:
             self._conclude(self._first, self._depths[-1])
 
-    def _follow(self, reflex: Reflex, recovery: Recovery, depth: float) -> None:
+    def _follow(self, recovery: Recovery, depth: float) -> None:
         """The first recovery, from where control is taken to where it is given back."""
         if self._first is None:
             self._first = recovery
