@@ -19,6 +19,7 @@ from mobee.robot.robot import Array, Robot
 REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the limits' own zone, less than half a cell of the thesis' lattices
 RETURNED = float(np.deg2rad(5.0))  # rad, likewise
 POSITIONS, CONTACTS = "q.f64", "contacts.csv"  # as services.robot_sim.record writes them
+SUMMARY = "summary.json"  # of the launcher
 
 Outcome = Literal["completed", "deflected", "returned"]
 
@@ -34,6 +35,21 @@ class Judged(Struct, frozen=True):
     way: float  # rad, the straight way from begin to target, all motors together
 
 
+class Lockstep(Struct, frozen=True):
+    """What the launcher says of the run's ticks."""
+
+    ticks: int
+    speed: float  # x real time
+    repeatable: bool  # everybody answered every tick in time
+    states_sha256: str  # of the state stream
+
+
+class _Summary(Struct):
+    """What is used of the launcher's summary."""
+
+    lockstep: Lockstep
+
+
 class Trial(Struct, frozen=True):
     """The numbers of one trial."""
 
@@ -46,6 +62,7 @@ class Trial(Struct, frozen=True):
     jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
     jerk_max: float  # rad/s^3
     path: float  # rad
+    lockstep: Lockstep
 
 
 def measure(folder: Path, robot: Robot, dt: float) -> Trial:
@@ -70,6 +87,7 @@ def measure(folder: Path, robot: Robot, dt: float) -> Trial:
         jerk_squared=float((third**2).mean()),
         jerk_max=float(np.abs(third).max()),
         path=path_length(q),
+        lockstep=msgspec.json.decode((folder / SUMMARY).read_bytes(), type=_Summary).lockstep,
     )
 
 

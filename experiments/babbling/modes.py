@@ -8,6 +8,7 @@ from services.common.session import NAMESPACE
 
 MODES = ("off", "one", "two")
 TITLES = {"off": "without MoBeE", "one": "MoBeE 1.0", "two": "MoBeE 2.0"}
+WORLD = Path(__file__).with_name("table.xml")
 RATE = 50.0  # Hz, the published control period
 FILTERED = "icub_filtered"  # namespace of the robot that MoBeE 1.0 offers
 SPEED = 0.2  # of the motors' top speed, thesis 4.1.1
@@ -17,7 +18,7 @@ _ROBOT = """title = "Babbling {title}"
 [shared]
 mode = "lock"
 robot = "icub"
-world = "table"
+world = {world}
 seed = {seed}
 {gains}
 
@@ -56,7 +57,7 @@ def scenario(mode: str, folder: Path, seed: int, minutes: float) -> str:
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
     between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
-    robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where)
+    robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where, world=_quoted(WORLD))
     return robot + between + _BABBLER.format(at=at, robot_of=robot_of, ticks=ticks, speed=SPEED, folder=where)
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from experiments.babbling.command_log import COMMANDS, finished_at
-from experiments.babbling.measured import POSITIONS
+from experiments.babbling.measured import POSITIONS, SUMMARY
 from experiments.babbling.modes import RATE, scenario
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
@@ -55,7 +55,7 @@ def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """`mobee launch` at an endpoint of its own; what it sums up must be without fault, and it is stopped when anything is raised."""
     argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--headless", "--json"]
     argv += ["--endpoint", _free_endpoint(), "--runs", str(folder / "launch")]
-    with (folder / "summary.json").open("wb") as summary, (folder / "news").open("wb") as news:
+    with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
         # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
         process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=summary, stderr=news, process_group=0)
     try:

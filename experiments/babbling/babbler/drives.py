@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Command, State
+from bus_schema.messages import Command, State
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
-from experiments.babbling.babbler.parts import PartsOfTick
+from experiments.babbling.babbler.parts import PartStreams
 from experiments.babbling.command_log import Commanded, Ending
 from experiments.babbling.moved import Targets
 from experiments.babbling.trajectory import PositionMove
@@ -25,18 +25,11 @@ RETRY = 0.1  # s of robot time between attempts to arm a part
 class AtDrives:
     """Commands a position every tick, along the move to the posture that is due."""
 
-    def __init__(
-        self,
-        service: Service,
-        robot: Robot,
-        targets: Targets,
-        speed: float,
-        note: Callable[[Commanded], None],
-        tick: Callable[[Clock], None],
-    ) -> None:
+    def __init__(self, service: Service, robot: Robot, targets: Targets, speed: float, note: Callable[[Commanded], None]) -> None:
+        """`speed`: share of the motors' top speed; `note` hears of every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
         self._speed = speed * np.array([motor.max_velocity for motor in robot.motor_table])
-        self._states = PartsOfTick(service, tuple(robot.parts), keys.state, State, tick)
+        self._states = PartStreams(service, robot, keys.state, State)
         self._commands = {part: service.bus.publisher(keys.command(part), Command, service.bus.control) for part in robot.parts}
         self._epochs = dict.fromkeys(robot.parts, 0)
         self._retry_at = 0  # tick
@@ -46,20 +39,22 @@ class AtDrives:
         self._is_refused = True  # it was ended by what guards the robot
         service.on_run(self._forget)
 
-    def move(self, clock: Clock) -> None:
-        """One tick."""
+    def move(self, k: int, dt: float) -> None:
+        """Tick k, of dt [s]."""
+        if not self._states.are_complete():
+            return
         states = self._states.newest
         if not all(states[part].gate == "armed" and states[part].epoch == epoch for part, epoch in self._epochs.items()):
             self._is_refused = True
-            self._arm(clock)
+            self._arm(k, dt)
             return
         if self._is_refused:  # only now is it known where what guards the robot has left it
-            self._end(clock.k, "refused")
-            self._start(clock.k, np.concatenate([states[part].q for part in self._robot.parts]))
-        elif (clock.k - self._begin) * clock.dt * 1e-9 >= self._move.duration + REST:
-            self._end(clock.k, "over")
-            self._start(clock.k, self._reference)
-        self._send(clock)
+            self._end(k, "refused")
+            self._start(k, np.concatenate([states[part].q for part in self._robot.parts]))
+        elif (k - self._begin) * dt >= self._move.duration + REST:
+            self._end(k, "over")
+            self._start(k, self._reference)
+        self._send(k, dt)
 
     def _start(self, k: int, here: Array) -> None:
         limits = self._robot.limits
@@ -70,17 +65,17 @@ class AtDrives:
         if self._begin:
             self._note(Commanded(self._begin, k, self._target.tolist(), dict.fromkeys(self._robot.parts, ending)))
 
-    def _send(self, clock: Clock) -> None:
-        self._reference = self._move.at((clock.k - self._begin) * clock.dt * 1e-9)
+    def _send(self, k: int, dt: float) -> None:
+        self._reference = self._move.at((k - self._begin) * dt)
         for part, publisher in self._commands.items():
             where = self._robot.parts[part].slice
-            publisher.put(epoch=self._epochs[part], re_k=clock.k, mode="position", ref=self._reference[where].tolist(), ttl=TTL)
+            publisher.put(epoch=self._epochs[part], re_k=k, mode="position", ref=self._reference[where].tolist(), ttl=TTL)
 
-    def _arm(self, clock: Clock) -> None:
+    def _arm(self, k: int, dt: float) -> None:
         """Take and arm what does not obey; waits for the answers, so that they belong to this tick."""
-        if clock.k < self._retry_at:
+        if k < self._retry_at:
             return
-        self._retry_at = clock.k + round(RETRY * 1e9 / clock.dt)
+        self._retry_at = k + round(RETRY / dt)
         for part, state in self._states.newest.items():
             if state.gate == "armed" and state.epoch == self._epochs[part]:
                 continue

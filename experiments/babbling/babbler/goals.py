@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Motion
+from bus_schema.messages import Motion
 from bus_schema.rpc import Goal, Started, Take, Taken
-from experiments.babbling.babbler.parts import PartsOfTick
+from experiments.babbling.babbler.parts import PartStreams
 from experiments.babbling.command_log import Commanded, Ending
 from experiments.babbling.moved import Targets
 from mobee.robot.robot import Array, Robot
@@ -18,34 +18,33 @@ from services.common.service import Service
 class AtGoals:
     """The next posture comes when every part has settled, or has tried for too long."""
 
-    def __init__(
-        self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None], tick: Callable[[Clock], None]
-    ) -> None:
+    def __init__(self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None]) -> None:
+        """`note` hears of every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
-        self._motions = PartsOfTick(service, tuple(robot.parts), keys.motion, Motion, tick)
+        self._motions = PartStreams(service, robot, keys.motion, Motion)
         self._epochs: dict[str, int] = {}
         self._begin, self._number = -1, 0  # tick of the command under way, -1: none
         self._target: Array = robot.home
         self._endings: dict[str, Ending] = {}
         service.on_run(self._forget)
 
-    def move(self, clock: Clock) -> None:
-        """One tick."""
-        if not self._owns_all():
+    def move(self, k: int, dt: float) -> None:
+        """Tick k, of dt [s]."""
+        if not self._motions.are_complete() or not self._owns_all():
             return
         if self._begin >= 0:
-            self._look(clock.k)
+            self._look()
             if len(self._endings) < len(self._robot.parts):
                 return
-            self._note(Commanded(self._begin, clock.k, self._target.tolist(), dict(self._endings)))
+            self._note(Commanded(self._begin, k, self._target.tolist(), dict(self._endings)))
             self._begin = -1
         if all(motion.status != "held" for motion in self._motions.newest.values()):
-            self._start(clock.k)
+            self._start(k)
 
-    def _look(self, k: int) -> None:
+    def _look(self) -> None:
         """Which parts have come to an end."""
         for part, motion in self._motions.newest.items():
-            if part in self._endings or k <= self._begin:
+            if part in self._endings or motion.k <= self._begin:
                 continue
             if motion.status == "settled" or motion.status == "timeout":
                 self._endings[part] = motion.status

@@ -1,10 +1,10 @@
-"""The babbler at work: one posture after the other, to all parts at once, until its ticks are over."""
+"""The babbler at work: one posture after the other, to all parts at once."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from bus_schema.messages import Clock
+from bus_schema.messages import Clock, Turn
 from experiments.babbling.babbler.config import Config
 from experiments.babbling.babbler.drives import AtDrives
 from experiments.babbling.babbler.goals import AtGoals
@@ -19,26 +19,28 @@ class BabblerNode:
     """Counts the ticks, writes down every command, and answers the barrier; the process ends when its ticks are over."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        self._ticks = config.ticks
+        self._ticks, self._commands = config.ticks, 0
         self._log = CommandLog(Path(config.run_dir) / COMMANDS)
         self._participant = Participant(service)
-        self._commands = 0
         targets = Targets(robot, config.seed)
         if config.at == "drives":
-            self._mover: AtDrives | AtGoals = AtDrives(service, robot, targets, config.speed, self._note, self._tick)
+            self._mover: AtDrives | AtGoals = AtDrives(service, robot, targets, config.speed, self._note)
         else:
-            self._mover = AtGoals(service, robot, targets, self._note, self._tick)
+            self._mover = AtGoals(service, robot, targets, self._note)
         service.describe = lambda: (f"{self._commands} commands", {"commands": self._commands})
+        if service.locked and config.at == "goals":  # behind the controller, when something may have come to its end
+            service.on_turn(self._tick)
+        else:
+            service.on_clock(self._tick)
 
-    def _tick(self, clock: Clock) -> None:
-        is_over = clock.k >= self._ticks
-        if not is_over and clock.k > 0:  # tick 0 gathers those who take part
-            self._mover.move(clock)
-        if is_over:
-            self._log.finish(clock.k)
-        self._participant.done(clock.k, last=is_over)
-        if is_over:
+    def _tick(self, now: Clock | Turn) -> None:
+        if now.k >= self._ticks:
+            self._log.finish(now.k)
+            self._participant.done(now.k, last=True)
             raise SystemExit(0)
+        if now.k > 0:  # tick 0 gathers those who take part
+            self._mover.move(now.k, now.dt * 1e-9)
+        self._participant.done(now.k)
 
     def _note(self, commanded: Commanded) -> None:
         self._commands += 1

@@ -8,7 +8,7 @@ import pytest
 
 from experiments import babbling
 from experiments.babbling.contacts import Touch
-from experiments.babbling.measured import POSITIONS, Judged, Trial
+from experiments.babbling.measured import POSITIONS, Judged, Lockstep, Trial
 from experiments.babbling.modes import FILTERED, MODES, scenario
 from experiments.babbling.results import summarise, verdict
 from experiments.babbling.table import as_table
@@ -23,7 +23,7 @@ def trial(depths: tuple[float, ...] = (), completed: int = 4, jerk: float = 4.0,
     left = {part: 0.1 if i < completed else 0.5 for i, part in enumerate(PARTS)}
     command = Judged(outcomes, dict.fromkeys(PARTS, "over"), left, 10.0, 12.0, 11.0)
     touches = [Touch("l_forearm table", 10 * i, 10 * i, depth) for i, depth in enumerate(depths)]
-    return Trial(seconds, [command], touches, beyond, "torso_yaw", 0.25, jerk**2, 50.0, 12.0)
+    return Trial(seconds, [command], touches, beyond, "torso_yaw", 0.25, jerk**2, 50.0, 12.0, Lockstep(3000, 8.0, True, ""))
 
 
 GOOD = {"off": trial((0.001, 0.003)), "one": trial(completed=1, jerk=9.0), "two": trial(completed=3)}
@@ -64,6 +64,7 @@ def test_of_one_mode_only_its_own_claims_are_judged() -> None:
 def test_trials_add_up() -> None:
     row = summarise([trial((0.001,), jerk=3.0, seconds=60.0), trial((0.004, 0.0), completed=1, jerk=5.0, seconds=120.0, beyond=0.0)])
     assert (row["minutes"], row["collisions"], row["deepest_mm"], row["worst_beyond_limit_deg"]) == (3.0, 3, 4.0, 0.0)
+    assert (row["trials"], row["repeatable_trials"], row["times_real_time"]) == (2, 2, 8.0)
     assert (row["commands"], row["completed"], row["deflected"], row["postures_completed"]) == (8, 5, 3, 1)
     assert (row["within_5_deg"], row["left_median_deg"]) == (0, 5.73)
     assert row["jerk_rms"] == pytest.approx(((9.0 + 2 * 25.0) / 3.0) ** 0.5, abs=0.01)

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments.babbling.command_log import COMMANDS, Commanded, CommandLog, finished_at, read_commands
-from experiments.babbling.measured import CONTACTS, POSITIONS, REACHED, RETURNED, judge, measure, read_trial, write_trial
+from experiments.babbling.measured import CONTACTS, POSITIONS, REACHED, RETURNED, SUMMARY, judge, measure, read_trial, write_trial
 from experiments.babbling.moved import moved_motors
 from mobee import load_robot
 from mobee.errors import MobeeError
@@ -56,6 +57,8 @@ def left_by_a_trial(folder: Path, ticks: int = TICKS) -> None:
     target[0] = ROBOT.limits[0, 1] + np.deg2rad(2.0)
     ramp(target)[:ticks].tofile(folder / POSITIONS)
     (folder / CONTACTS).write_text("k,pair,depth\n5,l_hand table,0.004\n")
+    lockstep = {"ticks": TICKS, "speed": 8.5, "repeatable": True, "states_sha256": "c0ffee"}
+    (folder / SUMMARY).write_text(json.dumps({"scenario": "off", "faults": [], "lockstep": lockstep}))
     log = CommandLog(folder / COMMANDS)
     log.note(commanded(target))
     log.finish(TICKS)
@@ -69,6 +72,7 @@ def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
     assert np.rad2deg(trial.beyond) == pytest.approx(2.0)
     assert [(touch.pair, touch.depth) for touch in trial.touches] == [("l_hand table", 0.004)]
     assert len(trial.commands) == 1
+    assert (trial.lockstep.repeatable, trial.lockstep.states_sha256) == (True, "c0ffee")
     assert trial.jerk_squared == pytest.approx(0.0, abs=1e-9)
 
 
