@@ -83,7 +83,7 @@ def check_lockstep(scenario: Scenario) -> None:
     for part in scenario.parts:
         if getattr(part.config, "ticks", 0) and not scenario.is_locked:
             raise ConfigError(
-                f"{scenario.where('services.robot_sim.ticks')}: a number of ticks is exact in lockstep only: shared.mode=lock"
+                f"{scenario.where('services.robot_sim.ticks')}: a number of ticks is exact in lockstep only: set shared.mode=lock"
             )
 
 

@@ -9,8 +9,11 @@ from services.launcher.child import Child, Program
 from services.launcher.summary import as_text, summarise
 
 
-def child(who: str, numbers: dict[str, float], rejected: dict[str, int] | None = None, restarts: int = 0) -> Child:
-    stat = Stat(v=VERSION, who=who, instance="i1", pid=1, uptime=1.0, ready=True, text="", numbers=numbers, rejected=rejected or {})
+def child(
+    who: str, numbers: dict[str, float], rejected: dict[str, int] | None = None, restarts: int = 0, words: dict[str, str] | None = None
+) -> Child:
+    header = {"v": VERSION, "who": who, "instance": "i1", "pid": 1, "uptime": 1.0, "ready": True, "text": ""}
+    stat = Stat(**header, numbers=numbers, rejected=rejected or {}, words=words or {})
     return Child(Program(who, (), Path("log")), stat=stat, restarts=restarts)
 
 

@@ -1,0 +1,173 @@
+"""robot_sim in lockstep as a process: the test is the only one who takes part."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bus_schema import keys
+from bus_schema.messages import Clock, Command, Event, State, StepDone
+from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
+from mobee import load_robot
+from services.common.delivery import LATEST, STEP
+from tests.services.harness import Rig, rig, wait_for
+
+ROBOT = load_robot("icub")
+TICK = 0.02  # s
+
+
+@dataclass
+class Bench:
+    rig: Rig
+    clocks: list[Clock]
+    states: list[State]
+    events: list[Event]
+    answers: Any
+    commands: Any
+    epoch: int = 0
+
+    @property
+    def k(self) -> int:
+        return self.clocks[-1].k if self.clocks else -1
+
+    def done(self, k: int, **fields: Any) -> None:
+        self.rig.bus.run, self.rig.bus.k = self.clocks[-1].run, k
+        self.answers.put(re_k=k, **fields)
+
+    def step(self) -> None:
+        """Answer the tick; returns at the next."""
+        k = self.k
+        self.done(k)
+        wait_for(lambda: self.k == k + 1, f"tick {k + 1}")
+
+    def begin(self) -> None:
+        wait_for(lambda: self.clocks, "tick 0")
+        self.step()
+
+    def arm(self) -> None:
+        self.rig.token("controller", "c1")
+        self.epoch = self.rig.call(keys.drive("torso", "take"), Take, Taken, who="controller", instance="c1").epoch
+        self.rig.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch)
+
+    def command(self, velocity: float, re_k: int) -> None:
+        self.commands.put(epoch=self.epoch, re_k=re_k, mode="velocity", ref=[velocity, 0.0, 0.0], ttl=1000)
+
+    def newest(self, k: int) -> State:
+        return wait_for(lambda: next((s for s in self.states if s.k == k), None), f"state {k}")
+
+    def told(self, code: str) -> list[str]:
+        return [event.text for event in self.events if event.code == code]
+
+    def stat(self) -> dict[str, float]:
+        return self.rig.stat("robot_sim").numbers
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with rig(tmp_path, ROBOT) as made:
+        made.bus.who = "controller"
+        clocks = made.record(keys.CLOCK, Clock)
+        states, events = made.record(keys.state("torso"), State, "torso"), made.record(keys.event("robot_sim"), Event)
+        answers = made.bus.publisher(keys.done("controller"), StepDone, STEP)
+        commands = made.bus.publisher(keys.command("torso"), Command, LATEST)
+        made.token("launcher", "l1")
+        flags = ("--backend", "kinematic", "--rate", "50", "--mode", "lock", "--participants", "controller", "--encoder-noise", "0.0")
+        made.start("services.robot_sim", "robot_sim", *flags)
+        yield Bench(made, clocks, states, events, answers, commands)
+
+
+def test_tick_0_is_repeated_until_answered_and_then_each_tick_waits(bench: Bench) -> None:
+    wait_for(lambda: len(bench.clocks) >= 3, "tick 0 again")
+    assert {clock.k for clock in bench.clocks} == {0}
+    bench.begin()
+    time.sleep(0.3)
+    assert bench.k == 1
+    bench.step()
+    assert (bench.k, bench.clocks[-1].mode, bench.clocks[-1].t) == (2, "lock", 40_000_000)
+
+
+def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    bench.command(0.1, re_k=1)
+    bench.step()
+    assert [bench.newest(k).cmd_age for k in (1, 2)] == [-1, 1]
+    bench.step()
+    assert bench.newest(3).q[0] == bench.newest(2).q[0]  # what moves in tick 2 waits in the motors' delay
+    for k in range(3, 9):
+        bench.command(0.1, re_k=k)
+        bench.step()
+    assert bench.newest(9).q[0] > bench.newest(2).q[0]
+    assert bench.newest(9).t == round(9 * TICK * 1e9)
+
+
+def test_a_command_is_in_force_for_three_ticks_however_long_they_take(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    bench.command(0.1, re_k=1)
+    for _ in range(3):
+        time.sleep(0.15)
+        bench.step()
+    assert [bench.newest(k).cmd_age for k in (2, 3, 4)] == [1, 2, 3]
+    bench.step()
+    assert (bench.newest(5).gate, bench.newest(5).mode) == ("hold", "hold")
+    assert "no valid command for 4 ticks" in bench.told("hold")[0]
+
+
+def test_who_is_late_is_done_without_its_parts_hold_and_the_run_is_marked(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    bench.command(0.1, re_k=1)
+    bench.step()
+    assert bench.stat()["flaws"] == 0.0
+    begin = time.monotonic()
+    wait_for(lambda: bench.k >= 12, "ticks without an answer")
+    assert time.monotonic() - begin > 2.0 + 8 * TICK  # at the pace of the clock on the wall
+    assert bench.newest(3).gate == "hold"
+    assert bench.stat()["flaws"] == 1.0
+    assert "controller has not answered tick 2 within 2 s" in bench.told("not_repeatable")[0]
+    bench.done(bench.k)
+    time.sleep(0.2)
+    k = bench.k
+    time.sleep(0.3)
+    assert bench.k == k  # it counts again
+
+
+def test_who_dies_is_not_waited_for(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    begin = time.monotonic()
+    bench.rig.drop_token("controller", "c1")
+    wait_for(lambda: bench.k >= 3, "ticks without it")
+    assert time.monotonic() - begin < 1.5
+    assert bench.told("not_repeatable")
+
+
+def test_a_reset_begins_a_new_run_at_tick_0(bench: Bench) -> None:
+    bench.begin()
+    bench.step()
+    before = bench.clocks[-1].run
+    bench.rig.call(keys.sim("reset"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].run != before, "a new run")
+    assert bench.k == 0
+    bench.begin()
+    assert (bench.k, bench.stat()["flaws"]) == (1, 0.0)
+
+
+def test_the_hash_is_that_of_the_states_and_of_nothing_else(bench: Bench) -> None:
+    def states_of(ticks: int) -> str:
+        wait_for(lambda: bench.k == 0, "tick 0")
+        for _ in range(ticks):
+            bench.step()
+        return bench.rig.stat("robot_sim").words["states"]
+
+    first = states_of(3)
+    bench.rig.call(keys.sim("reset"), Empty, Done)
+    assert states_of(3) == first
+    bench.step()
+    assert bench.rig.stat("robot_sim").words["states"] != first
