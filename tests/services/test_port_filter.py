@@ -1,0 +1,199 @@
+"""The port filter as a process, between a client's own program and robot_sim as a process."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from zenoh.handlers import RingChannel
+
+from bus_schema import keys
+from bus_schema.messages import Clock, Command, EStop, Event, State
+from bus_schema.rpc import Done, Driven, Empty, PartMeta, Request, Take, Taken, WithEpoch
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array
+from services.common import rpc
+from services.common.bus import Bus
+from services.common.delivery import LATEST, STOP
+from services.common.rpc import CallFailed
+from services.common.session import open_client
+from tests.services.harness import Rig, rig, wait_for
+
+ROBOT = load_robot("icub")
+TORSO = ROBOT.part("torso")
+YAW, PITCH = TORSO.motors.index("torso_yaw"), TORSO.motors.index("torso_pitch")
+FAST = float(np.deg2rad(25.0))  # rad/s
+NEAR = np.deg2rad(1.5)  # rad: backlash, noise of the encoders and of the recorded poses
+ROBOT_ITSELF, FILTERED = "icub", "icub_filtered"
+
+
+class Client:
+    """A program that drives the torso; it knows a robot by its namespace alone."""
+
+    def __init__(self, endpoint: str, namespace: str, name: str = "client") -> None:
+        self.session = open_client(endpoint, namespace=namespace)
+        self.bus, self.name = Bus(self.session, name, logging.getLogger(name)), name
+        self.bus.part_sizes = {"torso": len(TORSO)}
+        self.token = self.session.liveliness().declare_token(keys.alive(name, "c1"))
+        self.clock = self.session.declare_subscriber(keys.CLOCK, RingChannel(1))
+        self.states = self.bus.latest(keys.state("torso"), State, "torso")
+        self.commands = self.bus.publisher(keys.command("torso"), Command, LATEST)
+        self.events: list[Event] = []
+        self.state: State | None = None
+        self.epoch = self.sent = 0
+        self.listen = self.bus.latest(keys.event("robot_sim"), Event)
+        wait_for(self.tick, "the clock")
+        wait_for(lambda: self.tick() and self.state, "the state")
+
+    def close(self) -> None:
+        self.session.close()
+
+    def tick(self) -> bool:
+        """Whether a tick has come since the last call."""
+        sample = self.clock.try_recv()
+        clock = None if sample is None else self.bus.receive(Clock, sample, any_run=True)
+        if clock is None:
+            return False
+        self.bus.run, self.bus.k, self.bus.t = clock.run, clock.k, clock.t
+        self.state = self.states.take() or self.state
+        if (event := self.listen.take()) is not None:
+            self.events.append(event)
+        return True
+
+    @property
+    def q(self) -> Array:
+        assert self.state is not None
+        return np.array(self.state.q)
+
+    @property
+    def gate(self) -> str:
+        assert self.state is not None
+        return str(self.state.gate)
+
+    def call(self, key: str, request: type[Request], reply: type, **fields: object) -> object:
+        return rpc.call(self.session, self.name, key, request, reply, timeout=2.0, **fields)
+
+    def arm(self) -> None:
+        self.epoch = self.call(keys.drive("torso", "take"), Take, Taken, instance="c1").epoch
+        assert self.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch).gate == "armed"
+        self.until(lambda: self.gate == "armed", "the armed state")
+
+    def until(self, condition: Callable[[], bool], what: str, timeout: float = 10.0) -> None:
+        wait_for(lambda: self.tick() and condition(), what, timeout)
+
+    def go(self, motor: int, degrees: float) -> None:
+        """A position move, then a short rest; ends early when the gate does not obey any more."""
+        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode="hold", ref=self.q.tolist(), ttl=300)
+        reference, rest = self.q, 0.0
+        begin = self.bus.t
+        while self.gate == "armed" and rest < 0.8:
+            if self.tick():
+                step = FAST * (self.bus.t - begin) * 1e-9
+                begin = self.bus.t
+                reference[motor] += np.clip(np.deg2rad(degrees) - reference[motor], -step, step)
+                rest = rest + step / FAST if reference[motor] == np.deg2rad(degrees) else 0.0
+                self.send("position", reference.tolist())
+
+    def drive(self, motor: int, speed: float, over: Callable[[], bool]) -> None:
+        """A velocity, rad/s, until it is over or the gate does not obey any more."""
+        reference = [0.0] * len(TORSO)
+        reference[motor] = speed
+        while self.gate == "armed" and not over():
+            if self.tick():
+                self.send("velocity", reference)
+
+    def send(self, mode: str, reference: list[float]) -> None:
+        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode=mode, ref=reference, ttl=300)
+        self.sent += 1
+
+    def told(self, code: str) -> Callable[[], bool]:
+        return lambda: any(event.code == code for event in self.events)
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with rig(tmp_path_factory.mktemp("filter"), ROBOT) as made:
+        made.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--seed", "7")
+        program = made.start("services.port_filter", "port_filter")
+        yield made
+        assert program.stop(signal.SIGTERM) == 0
+
+
+@pytest.fixture
+def client(robot: Rig) -> Iterator[Callable[[str], Client]]:
+    made: list[Client] = []
+
+    def make(namespace: str) -> Client:
+        made.append(Client(robot.endpoint, namespace))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.mark.parametrize(("namespace", "degrees"), [(ROBOT_ITSELF, 6.0), (FILTERED, 0.0)])
+def test_one_program_drives_the_robot_and_its_filtered_twin(client: Callable[[str], Client], namespace: str, degrees: float) -> None:
+    mine = client(namespace)
+    meta = mine.call(keys.meta("torso"), Empty, PartMeta)
+    assert tuple(meta.motors) == TORSO.motors
+    assert any(True for _ in mine.session.liveliness().get(keys.alive("router", "rig")))
+    mine.arm()
+    mine.go(YAW, degrees)
+    assert mine.gate == "armed"
+    assert abs(mine.q[YAW] - np.deg2rad(degrees)) < NEAR
+    assert mine.state is not None
+    assert mine.state.epoch == mine.epoch
+    assert 0 <= mine.sent - mine.state.cmd_seq <= 20  # the client's own numbers, of commands that are a few ticks old
+    assert mine.state.cmd_age >= 0
+    with pytest.raises(CallFailed, match="epoch"):
+        mine.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=mine.epoch - 1)
+    mine.bus.publisher(keys.ESTOP, EStop, STOP).put(set=True, source="test", reason="because")
+    mine.until(lambda: mine.gate == "estop", "the stop")
+    mine.call(keys.ESTOP_RESET, Empty, Done)
+    mine.until(lambda: mine.gate == "hold", "its end")
+    assert mine.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=mine.epoch).gate == "idle"
+
+
+def test_a_motion_into_the_table_is_undone_and_its_client_is_told(client: Callable[[str], Client]) -> None:
+    mine = client(FILTERED)
+    mine.arm()
+    mine.go(YAW, 4.0)
+    mine.go(PITCH, 40.0)
+    assert mine.gate == "hold"
+    assert mine.q[PITCH] < np.deg2rad(15.0)
+    with pytest.raises(CallFailed, match="reflex") as refused:
+        mine.call(keys.drive("torso", "take"), Take, Taken, instance="c1")
+    assert refused.value.code == "reflex"
+    mine.until(mine.told("motion_failed"), "the end of the reflex")
+    assert mine.told("reflex")()
+    assert np.abs(mine.q - np.deg2rad([4.0, 0.0, 0.0])).max() < NEAR  # where this move began, not the one before
+    mine.arm()
+    mine.go(YAW, 0.0)
+    assert mine.gate == "armed"
+
+
+def test_a_waypoint_by_call_is_where_another_modality_goes_back_to(client: Callable[[str], Client]) -> None:
+    mine = client(FILTERED)
+    mine.arm()
+    mine.drive(YAW, FAST, lambda: bool(mine.q[YAW] > np.deg2rad(5.0)))
+    mine.drive(YAW, 0.0, lambda: mine.bus.k % 30 == 0)
+    here = mine.q
+    mine.call(keys.waypoint("torso"), Empty, Done)
+    mine.drive(PITCH, FAST, lambda: False)
+    mine.until(mine.told("motion_failed"), "the end of the reflex")
+    assert np.abs(mine.q - here).max() < NEAR
+
+
+def test_the_robot_holds_when_the_client_dies(robot: Rig, client: Callable[[str], Client]) -> None:
+    mine = client(FILTERED)
+    states = robot.record(keys.state("torso"), State, "torso")
+    mine.arm()
+    wait_for(lambda: states and states[-1].gate == "armed", "the robot")
+    mine.close()
+    wait_for(lambda: states[-1].gate == "hold", "the hold", 2.0)
+    time.sleep(0.1)  # its token is gone everywhere
