@@ -10,6 +10,7 @@ from mobee_cli.errors import ENVIRONMENT, UserError
 # One module of this package a benchmark: `add_arguments(parser)`, and `run(arguments)`, which returns the exit code.
 BENCHES = {
     "lockstep": "the live processes in lockstep, in multiples of real time",
+    "agree": "the live processes in lockstep against the offline plant: one law",
     "live": "the live processes in real time: how late commands are",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }

@@ -17,7 +17,7 @@ from services.common.delivery import STEP
 from services.common.service import Service
 
 CEILING = 2.0  # s of the clock on the wall for one tick: who has not answered then is out
-TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long before it answers, which must change nothing
+TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long at every tick and again before it answers
 
 
 class Participant:
@@ -27,17 +27,17 @@ class Participant:
         self._locked = service.keeps_step = service.locked
         self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
         if self._locked:
+            service.dawdle = self._dawdle
             self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
 
     def done(self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False) -> None:
         """All that this service has to say to tick k is put; see StepDone for the rest."""
         if not self._locked:
             return
-        self.dawdle()
+        self._dawdle()
         self._done.put(re_k=k, ok=ok, busy=list(busy), last=last)
 
-    def dawdle(self) -> None:
-        """For tests: sleep for a random time, if the environment says so."""
+    def _dawdle(self) -> None:
         if self._delay:
             time.sleep(random.uniform(0.0, self._delay))  # not seeded: it stands for the scheduler
 

@@ -74,6 +74,7 @@ class Service:
         self.bus = Bus(session, self.who, self.log)
         self.locked = self.config.mode == "lock"
         self.keeps_step = False  # a Participant of lockstep says otherwise
+        self.dawdle: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
         self.bus.control = STEP if self.locked else LATEST
         self.patience = rpc.LOCKED_TIMEOUT if self.locked else rpc.TIMEOUT  # s that a call waits for its answer
         if robot is not None:
@@ -170,6 +171,7 @@ class Service:
             time = self.bus.receive(cls, sample, any_run=True)
             if time is None:
                 return
+            self.dawdle()
             self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
             if time.run != self.bus.run:
                 known, self.bus.run = self.bus.run, time.run
