@@ -9,6 +9,7 @@ import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
+from mobee.simulation.identified import load_identified
 
 PerMotor = float | Sequence[float]  # one number for all, or one for each motor of the robot
 
@@ -41,6 +42,11 @@ class MotorParameters:
     def ideal(cls) -> MotorParameters:
         """Motors that do at once and exactly what they are told, read without noise."""
         return cls(lag=0.0, delay=0.0, backlash=0.0, encoder_noise=0.0)
+
+    @classmethod
+    def identified(cls, robot_name: str) -> MotorParameters:
+        """Numbers fitted to the responses of the simulated robot of that name (docs/plant.md); raises UnknownName with the nearest."""
+        return cls(**load_identified(robot_name))
 
     def substeps(self, dt: float) -> int:
         """Into how many substeps a tick of dt [s] is cut."""

@@ -1,0 +1,39 @@
+"""Motor models fitted to the responses of a robot, one TOML file a robot; `mobee experiment run identify` makes them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.errors import InvalidValue, UnknownName
+
+FOLDER = Path(__file__).parent
+FITTED = ("lag", "delay", "backlash", "friction")
+
+
+def identified_robots() -> tuple[str, ...]:
+    """Names of the robots whose motors have been identified, sorted."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def load_identified(robot_name: str, motors: Sequence[str] | None = None) -> dict[str, Any]:
+    """The arguments of MotorParameters: lag, delay [s], backlash [rad], friction [rad/s], each (n,), and encoder_noise [rad].
+
+    In the order of the file, which is that of the robot, or of `motors`.  Raises UnknownName with the nearest for a robot that
+    has not been identified, InvalidValue for one that has other motors.
+    """
+    if robot_name not in (known := identified_robots()):
+        raise UnknownName("identified robot", robot_name, known)
+    file = FOLDER / f"{robot_name}.toml"
+    data = tomllib.loads(file.read_text(encoding="utf-8"))
+    fitted = data["motors"]
+    names = tuple(fitted) if motors is None else tuple(motors)
+    if set(names) != set(fitted):
+        odd = sorted(set(names) ^ set(fitted))
+        raise InvalidValue(f"{file.name} holds other motors than the robot has, {', '.join(odd[:3])}: identify it again")
+    columns = {name: np.array([float(fitted[motor][name]) for motor in names]) for name in FITTED}
+    return {**columns, "encoder_noise": float(data["encoder_noise"])}
