@@ -23,12 +23,16 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Simulated seconds a second; a command's ttl stays in real time, its age is counted in ticks."""
     world: str = "table"
     """Shipped world, or path to a world file."""
+    motors: Literal["published", "identified"] = "published"
+    """The motors' numbers: those below, or those that were fitted to this robot, with which they do not count (docs/plant.md)."""
     lag: NotNegative = 0.05
     """Time constant of the motors, s."""
     delay: NotNegative = 0.02
     """Time before a command begins to act, s."""
     backlash: NotNegative = math.radians(0.2)
     """Play between motor and joint, rad."""
+    friction: NotNegative = 0.0
+    """Coulomb's, as the velocity that it costs, rad/s."""
     encoder_noise: NotNegative = math.radians(0.1)
     """Standard deviation of the encoders at a tick of 20 ms, rad; scaled with the tick."""
     substep: Annotated[float, Meta(gt=0)] = 0.005

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from mobee.robot.load import load_world
@@ -19,10 +20,22 @@ def make_backend(config: Config, robot: Robot) -> Backend:
     return Recorded(backend, Path(config.record)) if config.record else backend
 
 
-def _make_backend(config: Config, robot: Robot) -> Backend:
-    parameters = MotorParameters(
-        lag=config.lag, delay=config.delay, backlash=config.backlash, encoder_noise=config.encoder_noise, substep=config.substep
+def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
+    """The motors that the configuration names; raises UnknownName for a robot whose motors were not identified."""
+    if config.motors == "identified":
+        return replace(MotorParameters.identified(robot.name), substep=config.substep)
+    return MotorParameters(
+        lag=config.lag,
+        delay=config.delay,
+        backlash=config.backlash,
+        friction=config.friction,
+        encoder_noise=config.encoder_noise,
+        substep=config.substep,
     )
+
+
+def _make_backend(config: Config, robot: Robot) -> Backend:
+    parameters = motor_parameters(config, robot)
     if config.backend == "kinematic":
         return KinematicBackend(robot, lambda: load_world(config.world), parameters, config.seed)
     try:
