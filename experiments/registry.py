@@ -13,6 +13,7 @@ EXPERIMENTS = {
     "babbling": "experiments.babbling",
     "clauses": "experiments.clauses",
     "flood": "experiments.flood",
+    "identify": "experiments.identify",
     "graze": "experiments.graze",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
