@@ -7,8 +7,10 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import defusedxml.ElementTree
+import numpy as np
 
 from mobee.errors import MobeeError
+from mobee.robot.number_text import numbers
 
 MODEL = "iCubGazeboV2_5"
 LEGS = ("l_hip_pitch", "r_hip_pitch")
@@ -38,8 +40,8 @@ def models_folder() -> Path:
 def write_upper_body_urdf(path: Path) -> Path:
     """Write the upper body of iCub v2.5 (without fingers and eyes) to `path` and return it.
 
-    Legs, sensor frames and simulator tags are removed, mesh paths are absolute, link names are those of `load_robot("icub")`;
-    the frames l_hand_dh_frame and r_hand_dh_frame stay. Raises MobeeError when icub-models is not installed.
+    Legs, sensor frames and simulator tags are removed, axes have length 1, mesh paths are absolute, link names are those of
+    `load_robot("icub")`; the frames l_hand_dh_frame and r_hand_dh_frame stay. Raises MobeeError when icub-models is not installed.
     """
     folder = models_folder()
     root: ET.Element = defusedxml.ElementTree.parse(folder / "robots" / MODEL / "model.urdf").getroot()
@@ -57,6 +59,9 @@ def write_upper_body_urdf(path: Path) -> Path:
                 ET.SubElement(inertial, tag, attributes)
     for mesh in root.iter("mesh"):
         mesh.set("filename", mesh.attrib["filename"].replace("package://iCub", folder.as_posix()))
+    for axis in root.iter("axis"):  # given with six digits, of which PyBullet complains
+        direction = np.array(axis.attrib["xyz"].split(), dtype=float)
+        axis.set("xyz", numbers(direction / np.linalg.norm(direction)))
     path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
     return path
 

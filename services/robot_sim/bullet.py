@@ -1,4 +1,4 @@
-"""Physics: the motor model asks for velocities, PyBullet's joints follow as far as torque and contacts let them."""
+"""Physics: the motor model asks for velocities or torques, PyBullet's joints follow as far as weight and contacts let them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 import pybullet
 
 from mobee.collision.world import World
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Array, Robot
 from mobee.simulation.motors import MotorParameters, Motors
 from services.robot_sim.backend import SolidContact
 from services.robot_sim.bullet_scene import BulletScene
+from services.robot_sim.bullet_torque import Gears, Mask, Share
 from services.robot_sim.pairs import load_solid_pairs
 
 TOUCHING = ("forearm", "hand")  # links whose distance from the table is measured
@@ -22,8 +23,8 @@ NO_CONTACT = SolidContact()
 class BulletBackend:
     """The upper body of iCub v2.5 with gravity; fingers and eyes are the motor model alone.
 
-    A joint is a velocity constraint with the motor's torque as its limit, also in torque mode, where the motor model turns torque
-    into velocity: the gear carries the weight, as it does on the robot.
+    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight, as it does on the robot. In
+    torque mode it gets the torque itself, through a gear (bullet_torque.py): nobody carries the weight who does not compensate it.
     """
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
@@ -82,7 +83,10 @@ class BulletBackend:
         self._names = {index: name for name, index in scene.links.items()}
         driven = self._robot.limits[scene.motors]
         self._lower, self._upper = driven[:, 0], driven[:, 1]
-        self._forces = [self._robot.motor_table[motor].max_torque for motor in scene.motors]
+        self._forces = np.array([self._robot.motor_table[motor].max_torque for motor in scene.motors])
+        self._fastest = np.array([self._robot.motor_table[motor].max_velocity for motor in scene.motors])
+        self._gears = Gears(len(scene.joints))
+        self._touched = False  # in the last substep
         self._deepest: dict[str, float] = {}  # m, by pair, in the last tick
 
     def _advance(self, h: float) -> None:
@@ -90,20 +94,48 @@ class BulletBackend:
         velocity = motors.drive(h)
         q = motors.q + velocity * h
         here = motors.q[scene.motors]
-        target = np.clip(velocity[scene.motors], (self._lower - here) / h, (self._upper - here) / h)
-        scene.client.setJointMotorControlArray(
-            scene.body, scene.joints, pybullet.VELOCITY_CONTROL, targetVelocities=target.tolist(), forces=self._forces
-        )
+        slowest, fastest = (self._lower - here) / h, (self._upper - here) / h
+        target = np.clip(velocity[scene.motors], slowest, fastest)
+        in_torque = motors.in_torque[scene.motors]
+        if in_torque.any():
+            share = self._push(in_torque, target, (np.maximum(slowest, -self._fastest), np.minimum(fastest, self._fastest)), h)
+        else:
+            share = None
+            self._gears.forget()
+            self._pull(target, self._forces)
         scene.client.stepSimulation()
         joints = scene.client.getJointStates(scene.body, scene.joints)
         q = np.clip(q, self._robot.limits[:, 0], self._robot.limits[:, 1])  # of the motors that the URDF lacks
         q[scene.motors] = [joint[0] for joint in joints]
         motors.adopt(q)
-        motors.efforts[scene.motors] = [joint[3] for joint in joints]
+        efforts = motors.efforts
+        exerted = np.array([joint[3] for joint in joints])  # of a constraint that is switched off PyBullet tells the last one
+        efforts[scene.motors] = exerted if share is None else np.where(share.free, share.torque, exerted)
+        motors.efforts = efforts
+
+    def _push(self, in_torque: Mask, target: Array, fastest: tuple[Array, Array], h: float) -> Share:
+        """Give joints in torque mode their torques, the others their velocities."""
+        scene = self._scene
+        torque = self.motors.torques[scene.motors]
+        share = self._gears.transmit(scene.motion(self.motors.q), torque, in_torque, target, fastest, self._touched, h)
+        self._pull(share.velocity, np.where(share.free, 0.0, self._forces))
+        free = np.flatnonzero(share.free)
+        joints = [scene.joints[index] for index in free]
+        scene.client.setJointMotorControlArray(scene.body, joints, pybullet.TORQUE_CONTROL, forces=share.torque[free].tolist())
+        return share
+
+    def _pull(self, velocity: Array, force: Array) -> None:
+        """Have the joints go at a velocity, rad/s, with no more than a force, N m."""
+        scene = self._scene
+        scene.client.setJointMotorControlArray(
+            scene.body, scene.joints, pybullet.VELOCITY_CONTROL, targetVelocities=velocity.tolist(), forces=force.tolist()
+        )
 
     def _look_for_contacts(self) -> None:
         scene = self._scene
-        for point in scene.client.getContactPoints(scene.body):
+        points = scene.client.getContactPoints(scene.body)
+        self._touched = bool(points)
+        for point in points:
             depth = -point[8]
             if depth > 0.0:
                 self._keep(depth, *point[1:5])

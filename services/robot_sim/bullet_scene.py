@@ -11,10 +11,12 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from mobee.collision.world import World, WorldObject
+from mobee.kinematics.gravity import gravity_torque
 from mobee.kinematics.quaternion import from_matrix
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Array, Robot
 from services.robot_sim.backend import BackendUnavailable
+from services.robot_sim.bullet_torque import Motion
 
 GRAVITY = -9.81  # m/s^2
 SIMULATED = "icub"  # the robot that the URDF describes
@@ -49,6 +51,11 @@ class BulletScene:
         driven = [(i, joints[name]) for i, name in enumerate(robot.motors) if name in joints]
         self.motors = np.array([motor for motor, _ in driven])
         self.joints = [joint for _, joint in driven]
+        self._order = np.argsort(self.joints)  # PyBullet's vectors are in the order of its joints
+        self._back = np.argsort(self._order)
+        self._robot = robot
+        for joint in self.joints:  # the URDF's own friction: there is that of the motors, and at 5 ms this one shakes a wrist
+            self.client.changeDynamics(self.body, joint, jointDamping=0.0)
         self.objects = {thing.name: self._add(thing) for thing in world.objects.values()}
 
     def close(self) -> None:
@@ -59,6 +66,17 @@ class BulletScene:
         """Put the joints at q (n,) rad of all motors, at rest."""
         for joint, position in zip(self.joints, q[self.motors].tolist(), strict=True):
             self.client.resetJointState(self.body, joint, position)
+
+    def motion(self, q: Array) -> Motion:
+        """The equation of motion of the joints in `motors` at q (n,) rad of all motors and at the joints' velocities."""
+        velocity = np.array([state[1] for state in self.client.getJointStates(self.body, self.joints)])
+        at, moving = q[self.motors][self._order].tolist(), velocity[self._order].tolist()
+        still = [0.0] * len(at)
+        mass = np.array(self.client.calculateMassMatrix(self.body, at))
+        # PyBullet's own gravity is wrong here (it turns it by the base's inertial frame), its Coriolis terms are right
+        fast, slow = (self.client.calculateInverseDynamics(self.body, at, rates, still) for rates in (moving, still))
+        coriolis = (np.array(fast) - np.array(slow))[self._back]
+        return Motion(mass[np.ix_(self._back, self._back)], coriolis + gravity_torque(self._robot, q)[self.motors], velocity)
 
     def move(self, name: str, position: Iterable[float]) -> None:
         """Put a world object somewhere, m."""

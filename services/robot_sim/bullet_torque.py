@@ -1,0 +1,82 @@
+"""Torques that reach PyBullet's joints through gears: reflected inertia and friction, which PyBullet's joints lack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.control.modality import FRICTION, INERTIA
+from mobee.robot.robot import Array
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The arm's equation of motion now: mass * acceleration + bias = torque at the joints + what contacts do; (d,) driven joints."""
+
+    mass: Array  # (d, d) kg m^2
+    bias: Array  # (d,) N m, gravity and what velocities do
+    velocity: Array  # (d,) rad/s
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Share:
+    """What each joint gets in a substep: a torque where `free`, else a velocity; each (d,)."""
+
+    free: Mask
+    torque: Array  # N m, what passes the gear; 0 where not free
+    velocity: Array  # rad/s
+
+
+class Gears:
+    """Solves a substep of motor, gear and arm as one, implicitly, and says what torque passes the gear.
+
+    A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside.
+    Both are far larger than the inertia of a wrist, so an explicit step of 5 ms would explode.  What acts from outside (contacts)
+    is taken from the last substep: the difference of what the joints did and what they should have done.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._last: tuple[Motion, Share] | None = None
+        self._nothing = np.zeros(joints)
+
+    def forget(self) -> None:
+        """No torque was passed on in the last substep."""
+        self._last = None
+
+    def transmit(
+        self, now: Motion, torque: Array, free: Mask, velocity: Array, fastest: tuple[Array, Array], touched: bool, h: float
+    ) -> Share:
+        """The share of a substep of h [s]; all (d,).
+
+        `torque` N m acts where `free`, the other joints go at `velocity` rad/s.  A joint that would leave the range `fastest`
+        (lowest and highest velocity, rad/s) is not free: it goes at the end of the range.
+        """
+        outside = self._outside(now, h) if touched else self._nothing
+        free, velocity = free.copy(), velocity.copy()
+        known = now.velocity @ now.mass + h * (torque - now.bias + outside) + INERTIA * now.velocity
+        while True:
+            at, rest = np.flatnonzero(free), np.flatnonzero(~free)
+            mass = now.mass[np.ix_(at, at)] + (INERTIA + h * FRICTION) * np.eye(len(at))
+            # `known` holds the momentum of all joints; those that are not free keep theirs, or change it as they are told to
+            found = np.linalg.solve(mass, known[at] - now.mass[np.ix_(at, rest)] @ velocity[rest])
+            within = np.clip(found, fastest[0][at], fastest[1][at])
+            velocity[at] = within
+            if (within == found).all():
+                break
+            free[at[within != found]] = False
+        passed = torque - FRICTION * velocity - INERTIA * (velocity - now.velocity) / h
+        share = Share(free, np.where(free, passed, 0.0), np.where(free, 0.0, velocity))
+        self._last = now, share
+        return share
+
+    def _outside(self, now: Motion, h: float) -> Array:
+        """What acted on the joints that were free in the last substep, beside torque and bias, N m."""
+        if self._last is None:
+            return self._nothing
+        then, share = self._last
+        outside = then.mass @ (now.velocity - then.velocity) / h + then.bias - share.torque
+        return np.where(share.free, outside, 0.0)
