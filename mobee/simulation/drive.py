@@ -52,13 +52,18 @@ def shrunk(x: float, by: float) -> float:
 
 @inner_exact
 def enter(whole: Ints, state: Array, line: Array, motor: int, mode: int) -> None:
-    """Change a motor's mode; what is on its way to it has another unit and becomes what it does now."""
+    """Change a motor's mode; what is on its way to it has another unit and becomes what it does now: in torque mode, carry its load.
+
+    From then on its gear is rigid: the motor side stands where the joint is.
+    """
     if whole[MODE, motor] == mode:
         return
     whole[MODE, motor] = mode
     whole[RESTING, motor] = 0
     for row in range(len(line)):
-        line[row, motor] = 0.0 if mode == TORQUE else state[MOTOR_V, motor]
+        line[row, motor] = state[LOAD, motor] if mode == TORQUE else state[MOTOR_V, motor]
+    if mode == TORQUE:
+        state[MOTOR_Q, motor] = state[Q, motor]
 
 
 @inner_exact

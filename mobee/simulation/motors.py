@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.errors import InvalidValue
+from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array, Ints, Robot
 from mobee.simulation import layout
 from mobee.simulation.layout import SERVO_GAIN as SERVO_GAIN
@@ -39,6 +40,7 @@ class Motors:
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
         if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
             raise InvalidValue(f"seed {seed!r}: must be a whole number")
+        self._robot = robot
         self.parameters = parameters
         self.seed = int(seed) % 2**64
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
@@ -80,6 +82,10 @@ class Motors:
         """What the motors exert [N m]."""
         return self._row(layout.EFFORT)
 
+    @efforts.setter
+    def efforts(self, torque: Array) -> None:
+        self.state[layout.EFFORT] = torque
+
     @property
     def motor_velocities(self) -> Array:
         """Velocities on the motor side of the play [rad/s]."""
@@ -108,12 +114,15 @@ class Motors:
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
         """Set what is in force for the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
 
-        A hold decelerates at once, without the delay of the line, and then keeps the position reached.
+        A hold decelerates at once, without the delay of the line, and then keeps the position reached.  Motors that enter torque mode
+        carry their weight until the first torque arrives.
         """
         if reference is not None:
             self.state[layout.REFERENCE, where] = reference
         code = _MODES[mode]
         if (self.whole[layout.MODE, where] != code).any():
+            if mode == "torque":
+                self.load = gravity_torque(self._robot, self.q)
             entering = np.arange(self.state.shape[1])[where]
             self._compiled.drive.enter_all(entering, self.whole, self.state, self.line, code)
 
@@ -166,7 +175,7 @@ class Motors:
         before, delay = self.whole[layout.DELAY].copy(), np.round(self._delay / dt).astype(np.int64)
         rows, old = int(delay.max()) + 1, len(self.line)
         oldest_first = np.roll(self.line, old - 1 - int(self.at[0]), axis=0)
-        still = np.where(self.in_torque, 0.0, self.state[layout.MOTOR_V])
+        still = np.where(self.in_torque, self.state[layout.LOAD], self.state[layout.MOTOR_V])
         line = np.tile(still, (rows, 1))
         for motor, steps in enumerate(np.minimum(before, delay)):
             if steps:

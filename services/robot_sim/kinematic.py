@@ -1,10 +1,11 @@
-"""The motor model alone: no contacts, no gravity, every Python version."""
+"""The motor model alone: no contacts, every Python version; weight acts on motors in torque mode only."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
 from mobee.collision.world import World
+from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
 from services.robot_sim.backend import SolidContact
@@ -28,6 +29,8 @@ class KinematicBackend:
         """Advance by a tick of dt [s]."""
         substeps = self._parameters.substeps(dt)
         for _ in range(substeps):
+            if self.motors.in_torque.any():
+                self.motors.load = gravity_torque(self._robot, self.motors.q)
             self.motors.drive(dt / substeps)
             self.motors.integrate()
 
