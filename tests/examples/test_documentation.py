@@ -42,14 +42,21 @@ def test_the_main_flow_in_the_readme_runs(tmp_path: Path) -> None:
 
 
 def test_the_readers_own_robot_learns(tmp_path: Path) -> None:
-    flow, _ = blocks("docs/robots.md", tmp_path)
+    flow, _, _ = blocks("docs/robots.md", tmp_path)
     motors, transition = run(tmp_path, "-c", flow).splitlines()
     assert motors.startswith("('pan', 'bend') [")
     assert transition.startswith("Transition(n=10, ")
 
 
+def test_the_weight_of_a_robot_is_told(tmp_path: Path) -> None:
+    _, _, masses = blocks("docs/robots.md", tmp_path)
+    torque, energy = map(float, run(tmp_path, "-c", masses).splitlines())
+    assert 0.0 < abs(torque) < 5.0  # N m, an elbow of a small robot
+    assert 10.0 < energy < 100.0  # J above the waist
+
+
 def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
-    _, check = blocks("docs/robots.md", tmp_path)
+    _, check, _ = blocks("docs/robots.md", tmp_path)
     assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [
         ["error", "slips.xml:3"],
         ["warning", "slips.xml:5"],
