@@ -127,14 +127,17 @@ class Service:
         history: bool = False,
         any_run: bool = False,
         crowd: int = CROWDED,
+        later: bool = False,
     ) -> None:
         """Have every message of a stream handled, with `history` also those from before this service came.
 
-        `crowd`: how many may be waiting for the main thread before this stream's messages are dropped.
+        `crowd`: how many may be waiting for the main thread before this stream's messages are dropped.  `later`: they wait for
+        a message of another stream, before which they are handled.
         """
 
         def enqueue(sample: zenoh.Sample) -> None:
-            self.inbox.offer(lambda: self._deliver(cls, sample, handler, part, any_run), crowd)
+            offer = self.inbox.offer_later if later else self.inbox.offer
+            offer(lambda: self._deliver(cls, sample, handler, part, any_run), crowd)
 
         if history:
             settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)

@@ -179,11 +179,12 @@ class ControllerNode:
         for _ in range(ticks):
             command = self._law.step(q, clock.dt / 1e9, acting)
         reference = getattr(command, self._config.modality)
+        velocity, acceleration = self._law.velocity, self._law.acceleration
         for part, action in self._actions.items():
             if action.status != "held":
                 where = self._robot.part(part).slice
                 self._send(part, clock.k, self._config.modality, reference[where].tolist())
-                action.look(clock.k, clock.t * 1e-9, self._law.velocity[where], self._law.acceleration[where])
+                action.look(clock.k, clock.t * 1e-9, velocity[where], acceleration[where])
 
     def _starve(self, k: int) -> None:
         """No forces, no motion: tell every part that still obeys to hold."""

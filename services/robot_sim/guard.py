@@ -43,9 +43,10 @@ class Guard:
         """Hand to the motors what is in force in tick k."""
         now = time.monotonic_ns()
         motors = self._backend.motors
+        q, velocities = motors.q, motors.motor_velocities
         for part, gate in self.gates.items():
             where = self._robot.parts[part].slice
-            drive = gate.tick(k, now, motors.q[where], motors.motor_velocities[where])
+            drive = gate.tick(k, now, q[where], velocities[where])
             motors.command(where, drive.mode, drive.reference)
 
     def obey(self) -> None:
@@ -87,7 +88,7 @@ class Guard:
 
     def _listen(self, part: str) -> None:
         if self._service.locked:
-            self._service.on_each(keys.command(part), Command, lambda command: self._waiting.append((part, command)), part=part)
+            self._service.on_each(keys.command(part), Command, lambda command: self._waiting.append((part, command)), part=part, later=True)
         else:
             self._service.on_newest(keys.command(part), Command, lambda command: self._admit(part, command), part=part)
 

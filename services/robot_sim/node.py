@@ -148,10 +148,11 @@ class Node:
         self._watch_stops()
 
     def _watch_stops(self) -> None:
-        now, motors, stops = self._bus.t, self._backend.motors, self._counters.stops
+        now, stops = self._bus.t, self._counters.stops
+        all_q, velocities = self._backend.motors.q, self._backend.motors.motor_velocities
         for part, gate in self._guard.gates.items():
             where = self._robot.parts[part].slice
-            q, velocity = motors.q[where], motors.motor_velocities[where]
+            q, velocity = all_q[where], velocities[where]
             if gate.mode != "hold":
                 stops.obeys(part, now, q, velocity)
                 continue

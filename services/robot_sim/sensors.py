@@ -47,10 +47,11 @@ class Sensors:
         """All parts as they are now, at the beginning of the tick; tick 0, in which nothing moves, is read without noise."""
         k = self._bus.k
         encoders = motors.encoders(k, self._dt) if k else motors.q
+        velocities, efforts = motors.motor_velocities, motors.efforts
         for part, gate in gates.items():
             where = self._robot.parts[part].slice
-            q, dq = encoders[where], motors.motor_velocities[where]
-            self._put(part, self._bus.t, q, dq, motors.efforts[where], gate)
+            q, dq = encoders[where], velocities[where]
+            self._put(part, self._bus.t, q, dq, efforts[where], gate)
             if k:
                 self._hash.update(q.tobytes() + dq.tobytes() + f"{gate.mode} {gate.state}".encode())
 
