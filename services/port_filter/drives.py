@@ -24,8 +24,8 @@ class Owner:
 class DriveDesk:
     """Passes drive calls on, unless the clients are cut off; robot_sim's epochs are the clients' too."""
 
-    def __init__(self, service: Service, twin: Service, robot: Robot, why_cut: Callable[[], str], on_arm: Callable[[str], None]) -> None:
-        """`why_cut`: why no client may drive now, "" when they may; `on_arm(part)`: a client has just got control."""
+    def __init__(self, service: Service, twin: Service, robot: Robot, why_cut: Callable[[], str], on_arm: Callable[[], None]) -> None:
+        """`why_cut`: why no client may drive now, "" when they may; `on_arm` is called when a client has got control of a part."""
         self._service, self._twin, self._why_cut, self._on_arm = service, twin, why_cut, on_arm
         self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
@@ -37,12 +37,12 @@ class DriveDesk:
     def forget(self) -> None:
         """A new run: nobody owns anything."""
         self._owners = dict.fromkeys(self._owners)
-        self.epochs = dict.fromkeys(self.epochs, 0)
+        self.epochs.update(dict.fromkeys(self.epochs, 0))
 
-    def hold(self, part: str) -> None:
-        """Have robot_sim hold the part; whoever owns it must arm it again."""
+    def rest(self, part: str) -> None:
+        """Have robot_sim hold the part: its owner must arm it again; without an owner anybody may take it."""
         try:
-            self._call(part, "hold")
+            self._call(part, "hold" if self._owners[part] else "release")
         except CallFailed as failed:
             self._service.log.warning("%s cannot be held: %s", part, failed)
 
@@ -76,7 +76,7 @@ class DriveDesk:
         with _passed_on():
             driven = self._call(part, verb)
         if driven.gate == "armed":
-            self._on_arm(part)
+            self._on_arm()
         return driven
 
     def _refuse_while_cut(self, part: str) -> None:
@@ -89,7 +89,7 @@ class DriveDesk:
                 self._service.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
                 self._owners[part] = None
                 if not self._why_cut():
-                    self.hold(part)
+                    self.rest(part)
 
 
 @contextmanager

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from bus_schema import VERSION, keys
-from bus_schema.messages import Clock, Command, State
+from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty
 from mobee.robot.robot import Array, Robot
 from services.common.lockstep import Barrier, Participant
 from services.common.service import CallRefused, Service
-from services.port_filter.commands import Commands
 from services.port_filter.config import Config
 from services.port_filter.drives import DriveDesk
-from services.port_filter.moves import Moves
+from services.port_filter.passage import Passage
 from services.port_filter.switch import Switch
 from services.port_filter.twin import HandThrough
 
@@ -26,18 +25,14 @@ class FilterNode:
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
         self._service, self._twin, self._config, self._robot = service, twin, config, robot
         self._switch = Switch(config, robot)
-        self._states: dict[str, State] = {}
         self._driven: list[str] = []  # parts that the reflex moves
-        self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
         self._last_k = -1
         self._is_stale = False
         self._complete = self._is_waiting = False  # lockstep: every client that takes part has come; some have not answered yet
-        self._commands = {part: Commands(service.bus, part) for part in robot.parts}
-        self._moves = {part: Moves() for part in robot.parts}
-        self._drives = DriveDesk(service, twin, robot, self._why_cut, self._armed)
+        self._drives = DriveDesk(service, twin, robot, self._why_cut, self._mark)
+        self._passage = Passage(service, twin, robot, self._drives.epochs, self._why_cut, self._mark)
         HandThrough(service, twin, robot)
         self._clock = twin.bus.publisher(keys.CLOCK, Clock, twin.bus.control)
-        self._streams = {part: twin.bus.publisher(keys.state(part), State, twin.bus.control) for part in robot.parts}
         self._participant = Participant(service)
         twin.keeps_step = twin.locked
         self._barrier = Barrier(twin, config.participants, lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"))
@@ -47,9 +42,6 @@ class FilterNode:
         service, twin = self._service, self._twin
         service.describe = self._describe
         twin.describe = self._describe
-        for part in self._robot.parts:
-            twin.on_newest(keys.command(part), Command, lambda command, part=part: self._pass_down(part, command), part=part)
-            service.on_newest(keys.state(part), State, lambda state, part=part: self._pass_up(part, state), part=part)
         twin.on_request(keys.waypoint("*"), Empty, self._waypoint, part_of_key=True)
         service.on_run(self._new_run)
         service.on_clock(self._tick)
@@ -63,48 +55,12 @@ class FilterNode:
             return f"{self._where()}, and there is no way back; if this pose is safe, say so by the call rpc/waypoint of any part"
         return "" if state == "forward" else f"the reflex takes the robot back ({state}); wait, then arm again"
 
-    def _pass_down(self, part: str, command: Command) -> None:
-        """A client's command."""
-        epoch, seq = self._newest[part]
-        if why := self._why_cut():
-            self._twin.bus.reject("reflex", f"{part}: {why}")
-        elif command.epoch != self._drives.epochs[part]:
-            self._twin.bus.reject("epoch", f"{part}: epoch {command.epoch}, in force is {self._drives.epochs[part]}")
-        elif command.epoch == epoch and command.seq <= seq:
-            self._twin.bus.reject("seq", f"{part}: seq {command.seq} after {seq}")
-        else:
-            self._newest[part] = (command.epoch, command.seq)
-            if self._moves[part].begins(command, self._service.bus.t):
-                self._switch.reflex.mark()
-            self._commands[part].forward(command)
-
-    def _pass_up(self, part: str, state: State) -> None:
-        """The robot's state, as the client's own robot would be in."""
-        self._states[part] = state
-        twin = self._twin.bus
-        twin.run = self._service.bus.run
-        is_cut = state.gate == "armed" and bool(self._why_cut())
-        seq = -1 if is_cut else self._commands[part].theirs(state.cmd_seq)
-        self._streams[part].put(
-            k=state.k,
-            t=state.t,
-            q=state.q,
-            dq=state.dq,
-            tau=state.tau,
-            mode="hold" if is_cut else state.mode,
-            gate="hold" if is_cut else state.gate,
-            faults=state.faults,
-            epoch=state.epoch,
-            cmd_seq=seq,
-            cmd_age=state.cmd_age if seq >= 0 else -1,
-        )
-
     def _tick(self, clock: Clock) -> None:
         twin = self._twin.bus
         if self._is_waiting:
             return  # robot_sim went on without its late participants
         twin.run, twin.k, twin.t, twin.dt = clock.run, clock.k, clock.t, clock.dt
-        if clock.mode != "paused" and clock.k != self._last_k and len(self._states) == len(self._robot.parts):
+        if clock.mode != "paused" and clock.k != self._last_k and self._passage.is_complete:
             if self._last_k < 0:
                 self._switch.restart(clock.dt * 1e-9)
             self._last_k = clock.k
@@ -114,43 +70,32 @@ class FilterNode:
             self._answer(clock.k)
 
     def _judge(self, clock: Clock) -> None:
-        self._is_stale = clock.t - min(state.t for state in self._states.values()) > STALE
+        self._is_stale = clock.t - min(state.t for state in self._passage.states.values()) > STALE
         if self._is_stale:
             return
         reflex = self._switch.reflex
         before = reflex.state
-        if before not in ("forward", "stuck") and not all(self._obeys(part) for part in self._driven):
+        if before not in ("forward", "stuck") and not all(map(self._passage.obeys, self._driven)):
             reflex.give_up()
-        target = self._switch.tick(self._measured())
+        target = self._switch.tick(self._passage.q())
         if before == "forward" and reflex.state != "forward":
             self._cut_off()
         if before != "stuck" and reflex.state == "stuck":
             self._get_stuck()
-        if before not in ("forward", "stuck") and reflex.state == "forward":
+        if before != "forward" and reflex.state == "forward":
             self._hand_back()
         if target is not None and reflex.state != "stuck":
             self._command(clock.k, target, moving=reflex.state != "brake")
-
-    def _measured(self) -> Array:
-        q = np.empty(len(self._robot.motors))
-        for name, part in self._robot.parts.items():
-            q[part.slice] = self._states[name].q
-        return q
-
-    def _obeys(self, part: str) -> bool:
-        state = self._states[part]
-        return state.gate == "armed" and state.epoch == self._drives.epochs[part]
 
     def _command(self, k: int, target: Array, moving: bool) -> None:
         for part in self._driven:
             where = self._robot.part(part).slice
             reference = target[where].clip(self._robot.limits[where, 0], self._robot.limits[where, 1]).tolist()
-            self._commands[part].put(self._drives.epochs[part], k, "position" if moving else "hold", reference, self._config.ttl)
+            self._passage.commands[part].put(self._drives.epochs[part], k, "position" if moving else "hold", reference, self._config.ttl)
 
     def _cut_off(self) -> None:
-        self._driven = [part for part in self._robot.parts if self._obeys(part)]
-        for moves in self._moves.values():
-            moves.forget()
+        self._driven = [part for part in self._robot.parts if self._passage.obeys(part)]
+        self._passage.forget_moves()
         if self._driven:
             self._tell("warning", "reflex", f"{self._where()}: clients are cut off, {', '.join(self._driven)} go back the way they came")
         else:
@@ -160,10 +105,11 @@ class FilterNode:
         self._rest()
         recovery = self._switch.reflex.recovery
         if recovery is not None:
+            where = "the robot stays where it was held" if recovery.outcome == "stuck" else f"was undone to the {recovery.outcome}"
             self._tell(
                 "warning",
                 "motion_failed",
-                f"the motion failed and was undone to the {recovery.outcome}; arm to go on",
+                f"the motion failed and {where}; arm to go on",
                 deepest=recovery.deepest,
                 ticks=float(recovery.ticks),
                 again=float(recovery.again),
@@ -172,11 +118,11 @@ class FilterNode:
 
     def _get_stuck(self) -> None:
         self._rest()
-        self._tell("error", "stuck", f"the motion failed: {self._why_cut()}")
+        self._tell("error", "stuck", self._why_cut())
 
     def _rest(self) -> None:
         for part in self._driven:
-            self._drives.hold(part)
+            self._drives.rest(part)
         self._driven = []
 
     def _where(self) -> str:
@@ -192,8 +138,8 @@ class FilterNode:
         for bus in (self._service.bus, self._twin.bus):
             bus.event(level, code, text, **values)
 
-    def _armed(self, part: str) -> None:
-        """A client has got control of the part: what it does from now on can be undone to here."""
+    def _mark(self) -> None:
+        """A client has got control of a part, or a move of it begins: what it does from now on can be undone to here."""
         self._switch.reflex.mark()
 
     def _waypoint(self, request: Empty, key: str) -> Done:
@@ -217,14 +163,11 @@ class FilterNode:
             self._participant.done(k, ok=not late)
 
     def _new_run(self) -> None:
-        self._states.clear()
+        self._passage.forget()
         self._drives.forget()
         self._barrier.begin()
         self._driven, self._last_k, self._complete = [], -1, False
-        self._newest = dict.fromkeys(self._newest, (0, -1))
         self._switch.restart(0.01)
-        for moves in self._moves.values():
-            moves.forget()
 
     def _describe(self) -> tuple[str, dict[str, float]]:
         reflex = self._switch.reflex
