@@ -1,9 +1,9 @@
 """Does the robot recover when its hand comes into the table's field at a low angle?
 
 Claim: the reflex of MoBeE 1.0 recovers from a contact that it meets head on; where the hand comes in flat its recovery fails ever
-more often and control goes back and forth, as the encoders' noise decides what counts as contact; a filter and a dead time mend most of that;
-MoBeE 2.0 lets the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which gives no
-numbers.  Run time: 5 to 10 minutes for 10 angles with 30 trials of each of four variants.
+more often and control goes back and forth, as the encoders' noise decides what counts as contact; a filter and a dead time mend
+most of that; MoBeE 2.0 lets the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which
+gives no numbers.  Run time: 5 to 10 minutes for 10 angles with 30 trials of each of four variants.
 
 A client drives the left hand on a straight way through the surface of the table's field, 6 cm before it and 4 cm behind, at 20 % speed,
 and tries again whenever it gets control back, for 12 s.  Motors with lag, delay, play and encoder noise, ticks of 10 ms.  Variants:
