@@ -27,7 +27,7 @@ from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
 from services.common.delivery import LATEST, STEP
 from services.common.inbox import CROWDED, CROWDED_WITH_CALLS, Inbox, Newest
-from services.common.session import open_client
+from services.common.session import open_client, spare_threads
 
 _M = TypeVar("_M", bound=Message)
 _Q = TypeVar("_Q", bound=Request)
@@ -62,6 +62,8 @@ class Service:
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
         self.log = log.set_up(who)
+        if config.mode == "lock":
+            spare_threads()
         session = session or open_client(config.endpoint, namespace=config.namespace)
         self.inbox = inbox or Inbox()
         try:

@@ -19,7 +19,7 @@ from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
+from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router, spare_threads
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_lockstep, check_ports, check_robots
 from services.launcher.child import Program
 from services.launcher.engine import EngineMissing, compile_engine
@@ -63,6 +63,8 @@ def launch(options: Options) -> int:
         check_ports(scenario)
         compile_engine()
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+        if scenario.is_locked:
+            spare_threads()
         session = open_router(endpoint)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
