@@ -30,7 +30,6 @@ record = {record}
 _ONE = """participants = ["port_filter"]
 
 [services.port_filter]
-module = "services.port_filter"
 clients = "icub_filtered"
 participants = ["babbler"]
 """

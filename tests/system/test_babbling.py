@@ -1,0 +1,49 @@
+"""Thesis 4.1.1 in short: a minute of random position moves without MoBeE, with the first and with the second one."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from tests.services.harness import ROOT
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    pytest.importorskip("pybullet")
+    folder = tmp_path_factory.mktemp("babbling")
+    argv = ["-m", "mobee_cli", "experiment", "run", "babbling", "--minutes", "1", "--seed", "1", "--json", "--runs", str(folder)]
+    done = subprocess.run([sys.executable, *argv], cwd=ROOT, capture_output=True, text=True, timeout=280)
+    assert done.stdout, done.stderr
+    found = json.loads(done.stdout)
+    print({mode: {key: row[key] for key in KEYS} for mode, row in found["modes"].items()})
+    return found
+
+
+KEYS = ("collisions", "deepest_mm", "worst_beyond_limit_deg", "commands", "completed", "returned", "jerk_over_speed", "times_real_time")
+
+
+def test_a_minute_of_babbling_breaks_nothing_under_mobee_and_hits_things_without(results: dict[str, Any]) -> None:
+    off, two = results["modes"]["off"], results["modes"]["two"]
+    assert off["collisions"] >= 1
+    assert two["deepest_mm"] <= 2.0
+    assert two["worst_beyond_limit_deg"] <= 0.5
+
+
+def test_the_second_mobee_completes_more_than_the_first_and_moves_more_smoothly(results: dict[str, Any]) -> None:
+    one, two = results["modes"]["one"], results["modes"]["two"]
+    assert one["returned"] > 0
+    assert two["completed"] / two["commands"] > one["completed"] / one["commands"]
+    assert two["jerk_over_speed"] < one["jerk_over_speed"]
+
+
+def test_every_trial_can_be_repeated(results: dict[str, Any]) -> None:
+    for mode, row in results["modes"].items():
+        assert row["minutes"] == 1.0, mode
+        assert row["repeatable_trials"] == row["trials"] == 1
