@@ -27,7 +27,6 @@ class FilterNode:
         self._switch = Switch(config, robot)
         self._driven: list[str] = []  # parts that the reflex moves
         self._last_k = -1
-        self._is_stale = False
         self._complete = self._is_waiting = False  # lockstep: every client that takes part has come; some have not answered yet
         self._drives = DriveDesk(service, twin, robot, self._why_cut, self._mark)
         self._passage = Passage(service, twin, robot, self._drives.epochs, self._why_cut, self._mark)
@@ -48,8 +47,6 @@ class FilterNode:
 
     def _why_cut(self) -> str:
         """Why the clients are cut off; "" when they are not."""
-        if self._is_stale:
-            return "the robot's states are too old to be judged"
         state = self._switch.reflex.state
         if state == "stuck":
             return f"{self._where()}, and there is no way back; if this pose is safe, say so by the call rpc/waypoint of any part"
@@ -70,8 +67,8 @@ class FilterNode:
             self._answer(clock.k)
 
     def _judge(self, clock: Clock) -> None:
-        self._is_stale = clock.t - min(state.t for state in self._passage.states.values()) > STALE
-        if self._is_stale:
+        self._passage.is_stale = clock.t - min(state.t for state in self._passage.states.values()) > STALE
+        if self._passage.is_stale:
             return
         reflex = self._switch.reflex
         before = reflex.state

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from zenoh.handlers import RingChannel
+from zenoh.handlers import FifoChannel, RingChannel
 
 from bus_schema import keys
 from bus_schema.messages import Clock, Command, EStop, Event, State
@@ -44,7 +44,7 @@ class Client:
         self.events: list[Event] = []
         self.state: State | None = None
         self.epoch = self.sent = 0
-        self.listen = self.bus.latest(keys.event("robot_sim"), Event)
+        self.told_of = self.session.declare_subscriber(keys.event("robot_sim"), FifoChannel(1000))
         wait_for(self.tick, "the clock")
         wait_for(lambda: self.tick() and self.state, "the state")
 
@@ -59,8 +59,8 @@ class Client:
             return False
         self.bus.run, self.bus.k, self.bus.t = clock.run, clock.k, clock.t
         self.state = self.states.take() or self.state
-        if (event := self.listen.take()) is not None:
-            self.events.append(event)
+        while (sample := self.told_of.try_recv()) is not None:
+            self.events += filter(None, [self.bus.receive(Event, sample, any_run=True)])
         return True
 
     @property
@@ -86,7 +86,7 @@ class Client:
 
     def go(self, motor: int, degrees: float) -> None:
         """A position move, then a short rest; ends early when the gate does not obey any more."""
-        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode="hold", ref=self.q.tolist(), ttl=300)
+        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode="hold", ref=self.q.tolist(), ttl=1000)
         reference, rest = self.q, 0.0
         begin = self.bus.t
         while self.gate == "armed" and rest < 0.8:
@@ -106,7 +106,7 @@ class Client:
                 self.send("velocity", reference)
 
     def send(self, mode: str, reference: list[float]) -> None:
-        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode=mode, ref=reference, ttl=300)
+        self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode=mode, ref=reference, ttl=1000)
         self.sent += 1
 
     def told(self, code: str) -> Callable[[], bool]:
