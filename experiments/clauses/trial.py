@@ -53,7 +53,8 @@ def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: 
             for phase in np.flatnonzero(begins == tick):
                 _tell(plant.controller, part, command, int(phase), force)
 
-    done = ride(plant, max(command.seconds.sum() for command in commands), tell)
+    switches = {int(tick) for begins in schedule for tick in begins}
+    done = ride(plant, max(command.seconds.sum() for command in commands), tell, switches)
     return _judge(robot, done, start)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,17 +36,16 @@ class Ride:
         return Ride(self.q[-count:], self.velocity[-count:], self.dt)
 
 
-def ride(plant: OfflinePlant, seconds: float, before: Callable[[int], None] | None = None) -> Ride:
-    """Run the plant, at least one tick; `before` is called ahead of each tick with its number, from 0."""
+def ride(plant: OfflinePlant, seconds: float, before: Callable[[int], None] | None = None, at: Collection[int] | None = None) -> Ride:
+    """Run the plant, at least one tick; `before` is called ahead of the ticks `at`, of each if None, with the tick's number, from 0."""
     ticks = max(1, round(seconds / plant.dt))
-    q, velocity = (np.empty((ticks, len(plant.robot.motors))) for _ in range(2))
-    for tick in range(ticks):
-        if before is not None:
-            before(tick)
-        plant.tick()
-        q[tick] = plant.motors.q
-        velocity[tick] = plant.controller.velocity
-    return Ride(q, velocity, plant.dt)
+    calls = () if before is None else range(ticks) if at is None else at
+    traces = []
+    for first, end in pairwise(sorted({0, ticks, *(tick for tick in calls if tick < ticks)})):
+        if before is not None and first in calls:
+            before(first)
+        traces.append(plant.run(end - first))
+    return Ride(np.concatenate([t.q for t in traces]), np.concatenate([t.velocity for t in traces]), plant.dt)
 
 
 def place(plant: OfflinePlant, q: Array) -> None:

@@ -20,12 +20,13 @@ from mobee import Gains
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
-STEPPED = ("torso_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup")
+STEPPED = ("torso_yaw", "torso_pitch", "l_shoulder_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup", "neck_yaw")
 POSTURES, TARGETS, COMMANDS = 4, 10, 40
 AGES = (1, 3, 4)  # ticks of 10 ms; the last is one more than must be stable
 SHOVED = ("table, left hand", "table, both hands", "table edge", "chest", "face", "the other hand")
 STRONG, PUSHED = 300.0, 3.0  # N/kg before the squash; s
-WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # how many; s each; s a target, anywhere in the joint box
+WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # how many; s each; s a target, in the joint box
+AT_ENDS = 0.5  # of the motors' targets are an end of the range, where the springs of many motors push together
 SPEEDS = (1.0, 0.2)  # speed scales, in turn; the thesis' robot ran at 0.1 and 0.2
 WANDERING = ("torso", "head", "left_arm", "right_arm")  # without the fingers: the 23 motors of thesis 4.1.1
 FINGERS = 7  # the first of them in an arm
@@ -52,7 +53,7 @@ class Judged(Row):
 # What is asked, and what a unit of falling short costs; a second of settling time costs 1.
 WANTED: Mapping[str, tuple[float, float]] = {
     "overshoot": (0.02, 20.0),
-    "solid_mm": (0.0, 1.0),
+    "solid_mm": (1.0, 1.0),
     "field_mm": (45.0, 0.02),
     "pushed_mm": (0.0, 0.5),
     "chatter_mm": (1.0, 0.3),
@@ -112,7 +113,10 @@ def _wander(gains: Gains, seed: int) -> float:
     found = 0.0
     for _ in range(round(WANDER / HOLD)):
         attractor = plant.controller.attractor
-        attractor[moving] = rng.uniform(*robot.limits[moving].T)
+        levels = rng.uniform(0.0, 1.0, len(moving))
+        levels = np.where(rng.random(len(moving)) < AT_ENDS, levels.round(), levels)
+        low, high = robot.limits[moving].T
+        attractor[moving] = low + levels * (high - low)
         plant.controller.attractor = attractor
         found = max(found, deepest(model(), ride(plant, HOLD).q[::2]).solid)
     return found

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,8 @@ from experiments.tune.criteria import Judged, evaluate, objective
 from experiments.tune.press import model
 from mobee import Controller, Gains
 
-TORSO = "max_spring of the torso"  # whose motors move the hands farthest
+# Motors with a spring of their own: those of the torso move the hands farthest, those of the shoulders elbows against the chest.
+SPRINGS = {"max_spring of the torso": "torso_*", "max_spring of the shoulders": "?_shoulder_*"}
 TUNED = (
     "damping",
     "stiffness",
@@ -21,7 +24,7 @@ TUNED = (
     "contact_gain",
     "max_contact",
     "max_client",
-    TORSO,
+    *SPRINGS,
 )
 COLUMNS = (*TUNED, *Judged.columns())
 CHANGED = (1, 3)  # numbers at a time, least and most
@@ -62,14 +65,19 @@ def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
 
 def numbers_of(gains: Gains) -> dict[str, float]:
     """What is tuned."""
-    numbers = {name: float(getattr(gains, name)) for name in TUNED if name != TORSO}
-    return {**numbers, TORSO: float(gains.of_motors("max_spring", ("torso_pitch",))[0])}
+    motors = model().robot.motors
+    springs = gains.of_motors("max_spring", motors)
+    numbers = {name: float(getattr(gains, name)) for name in TUNED if name not in SPRINGS}
+    return numbers | {name: float(springs[[fnmatchcase(m, pattern) for m in motors]][0]) for name, pattern in SPRINGS.items()}
 
 
 def gains_with(numbers: Mapping[str, float]) -> Gains:
     """`Gains.default()` but for these numbers."""
-    common = {name: value for name, value in numbers.items() if name != TORSO}
-    return replace(Gains.default(), motors=(), **common).with_motors("torso_*", max_spring=numbers[TORSO])
+    common: dict[str, Any] = {name: value for name, value in numbers.items() if name not in SPRINGS}
+    gains = replace(Gains.default(), motors=(), groups=(), **common)
+    for name, pattern in SPRINGS.items():
+        gains = gains.with_motors(pattern, max_spring=numbers[name])
+    return gains
 
 
 def _next(tried: list[Tried], seed: int) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""A hand is drawn to a target by J^T (thesis Algorithm 5) and watched: does it stop dead, does it oscillate?"""
+"""A hand is drawn to a target by J^T (thesis Algorithm 5, `mobee.control.Reacher`): does it stop dead, does it oscillate?"""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from experiments.control.depths import oscillation
 from experiments.control.ride import PERIOD, place, ride
 from experiments.control.row import Row
 from mobee import Gains, Model, load_robot
+from mobee.control import Reacher
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 MARKER, ARM = "left_palm", "left_arm"
-PULL, STRONGEST = 200.0, 60.0  # 1/s^2 and m/s^2: the force on the hand per m of distance, and its bound
 SECONDS = {"default": 20.0, "published_2014": 30.0}
 REST = 3.0  # s, the end of the ride
 SLOW, NEAR = 1e-3, 0.01  # m/s, m: slower than this, farther than that from where it comes to rest, the hand has stopped dead
@@ -82,8 +82,15 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
     targets = [home + np.array(target) for target in goal.targets]
     ticks = round(SECONDS[gains] / plant.dt / len(targets))
 
+    reacher = Reacher(plant.controller, MARKER, targets[0])
+
     def pull(tick: int) -> None:
-        _pull(plant, targets[min(tick // ticks, len(targets) - 1)])
+        nonlocal reacher
+        q = np.concatenate([plant.measure(part) for part in robot.parts])
+        if tick and tick % ticks == 0:
+            reacher.stop(q)
+            reacher = Reacher(plant.controller, MARKER, targets[tick // ticks])
+        reacher.update(q, plant.dt)
 
     done = ride(plant, ticks * plant.dt * len(targets), pull)
     hand = model().evaluate(done.q).position(MARKER)
@@ -92,17 +99,6 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
     restless = oscillation(model(), done.last(REST), MARKER)
     left = float(np.linalg.norm(hand[-1] - targets[-1]))
     return Drawn(gains, name, 1e3 * restless, dead, 1e3 * left), Way(done.times, hand, target)
-
-
-def _pull(plant: OfflinePlant, target: Array) -> None:
-    """The arm gives way and the hand is drawn by a bounded spring, from where the encoders say that it is."""
-    q = plant.controller.attractor
-    where = plant.robot.parts[ARM].slice
-    q[where] = plant.measure(ARM)
-    distance = target - plant.model.evaluate(q).position(MARKER)
-    force = PULL * distance
-    plant.controller.set_attractor(ARM, q[where])
-    plant.controller.push(MARKER, force * min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9)))
 
 
 def _dead(hand: Array, dt: float) -> float:

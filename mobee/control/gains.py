@@ -29,7 +29,8 @@ class Gains:
     and penetration of 1 m; published law, deg/s^2 before it is squared.  `contact_slope`, `client_slope`: the slope
     of the squash at 0.  `client_squash`: whether a client's force is bounded motor by motor (eq. 5.8 as printed), or in each part
     by its norm, which keeps its direction.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
-    none does; a motor of weight 0 is never moved.  `motors`: (pattern, gains of these motors), see `with_motors`.
+    none does; a motor of weight 0 is never moved.  `motors`: (pattern, gains of these motors), see `with_motors`.  `groups`: the
+    same, looked at after `motors`; a robot without such motors passes them over.
     """
 
     law: Law
@@ -49,6 +50,7 @@ class Gains:
     client_squash: ClientSquash = "each"
     weights: tuple[tuple[str, float], ...] = ()
     motors: tuple[tuple[str, Changes], ...] = ()
+    groups: tuple[tuple[str, Changes], ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
@@ -57,7 +59,7 @@ class Gains:
                 _require_positive(name, value)
         if self.client_squash not in ("each", "direction"):
             raise UnknownName("client_squash", self.client_squash, ("each", "direction"))
-        for pattern, changes in self.motors:
+        for pattern, changes in (*self.motors, *self.groups):
             for name, value in changes:
                 if name not in _OF_MOTORS:
                     raise UnknownName("gain of single motors", name, _OF_MOTORS)
@@ -69,26 +71,29 @@ class Gains:
 
     @classmethod
     def default(cls) -> Gains:
-        """The thesis' equations with our own tuning: time constant C/K = 0.4 s, contacts held within the fields.
+        """The thesis' equations with our own tuning: time constant C/K = 0.32 s, contacts held within the fields.
 
-        A faster spring or a stiffer contact does not help: with the lag and delay of the motors and commands up to
-        three ticks old at 100 Hz, the contact begins to oscillate (experiments/control/press.py).
+        Tuned by experiments/tune, with the lag and delay of the motors and commands up to three ticks old at 100 Hz: with a
+        stiffer contact it begins to oscillate, with stronger springs the fields are left.  The springs of torso and shoulders are
+        weaker, for many motors push a hand together.  The contact force is bounded a little above what the springs of an
+        arm do together, so that it is stiff where a field begins.
         """
         return cls(
             law="default",
             damping=40.0,
-            stiffness=100.0,
-            max_spring=20.0,
+            stiffness=125.0,
+            max_spring=12.0,
             limit_width=np.deg2rad(10.0),
-            max_limit=30.0,
+            max_limit=40.0,
             constraint_width=np.deg2rad(12.0),
-            max_constraint=45.0,
-            contact_gain=900.0,
+            max_constraint=80.0,
+            contact_gain=1800.0,
             contact_slope=1.0,
-            max_contact=100.0,
+            max_contact=35.0,
             client_slope=1.0,
-            max_client=20.0,
+            max_client=12.0,
             settle=Settle(speed=np.deg2rad(3.0), acceleration=np.deg2rad(300.0)),
+            groups=(("torso_*", (("max_spring", 8.0),)), ("?_shoulder_*", (("max_spring", 8.0),))),
         )
 
     @classmethod
@@ -146,7 +151,8 @@ class Gains:
 
     def _changed(self, name: str) -> Changes:
         """The patterns that change a gain, with its value."""
-        return tuple((pattern, value) for pattern, changes in self.motors for changed, value in changes if changed == name)
+        chosen = (*self.motors, *self.groups)
+        return tuple((pattern, value) for pattern, changes in chosen for changed, value in changes if changed == name)
 
 
 def _first_match(values: Changes, motors: tuple[str, ...], common: float) -> Array:

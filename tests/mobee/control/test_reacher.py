@@ -78,7 +78,7 @@ def test_a_target_in_reach_is_reached_without_overshoot(gains: Gains, motors: Mo
 @EACH_MOTOR
 def test_out_of_a_stretched_arm_a_target_straight_inward_is_reached(motors: MotorParameters) -> None:
     position = np.array([0.5, 0.0, 0.0])
-    drawn = draw(PLANAR, "tip", position, np.zeros(3), 6.0, motors=motors)
+    drawn = draw(PLANAR, "tip", position, np.zeros(3), 9.0, motors=motors)
     assert drawn.said[-1] == "reached"
     assert drawn.distance(position)[-1] < 2e-3
 
