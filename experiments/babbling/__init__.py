@@ -13,6 +13,7 @@ Run time: 2 h of robot time in each of three modes take about an hour; a run tha
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,12 @@ from experiments.babbling.modes import MODES, RATE, TITLES
 from experiments.babbling.moved import ROBOT
 from experiments.babbling.results import summarise, verdict
 from experiments.babbling.table import as_table
-from experiments.babbling.trial import run_trial
+from experiments.babbling.trial import TrialFailed, run_trial
 from experiments.options import positive_number
 from experiments.progress import Progress
 from mobee import load_robot
 from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
 from services.launcher.engine import compile_engine
 
 NAME = "babbling"
@@ -35,6 +37,7 @@ SOURCE = "thesis 4.1.1"
 
 TRIAL = "trial.json"
 SEEDS = 10_000  # trials a seed
+TRIES = 3  # of a trial in which somebody was late for a tick, which the robot does not forgive
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,15 +60,25 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 if not (place / TRIAL).exists():
                     text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
                     seed = SEEDS * arguments.seed + number
-                    run_trial(place, mode, robot, seed, minutes, lambda share: progress.show((before + share) / total, text))  # noqa: B023
-                    write_trial(place / TRIAL, measure(place, robot, 1.0 / RATE))
-                    (place / POSITIONS).unlink()
+                    _run_until_repeatable(place, mode, robot, seed, minutes, lambda share: progress.show((before + share) / total, text))  # noqa: B023
                 done += 1
     rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
     claims = verdict(rows)
     if not arguments.json:
         print(as_table(rows))
     return {"passed": all(claims.values()), "claims": claims, **({"modes": rows} if arguments.json else {})}
+
+
+def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, minutes: float, show: Callable[[float], None]) -> None:
+    """Leave a trial in which nobody was late for a tick; raises TrialFailed."""
+    for _ in range(TRIES):
+        run_trial(place, mode, robot, seed, minutes, show)
+        trial = measure(place, robot, 1.0 / RATE)
+        if trial.lockstep.repeatable:
+            write_trial(place / TRIAL, trial)
+            (place / POSITIONS).unlink()
+            return
+    raise TrialFailed(f"{mode}: in {TRIES} trials somebody was late for a tick: this machine is too busy; see {place / 'launch'}")
 
 
 def trial_lengths(minutes: float, trial: float) -> list[float]:

@@ -32,7 +32,6 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
     return {
         "minutes": round(seconds / 60.0, 2),
         "trials": len(trials),
-        "repeatable_trials": sum(trial.lockstep.repeatable for trial in trials),
         "times_real_time": round(seconds / sum(trial.seconds / trial.lockstep.speed for trial in trials), 2),
         "collisions": len(touches),
         "deepest_mm": round(1e3 * max((touch.depth for touch in touches), default=0.0), 3),

@@ -26,7 +26,7 @@ def as_table(rows: Mapping[str, _Row]) -> str:
         add(label, {mode: _number(row[key], digits) for mode, row in rows.items()})
 
     plain("robot time [min]", "minutes", 1)
-    add("trials, of which can be repeated", {mode: f"{row['trials']}, {row['repeatable_trials']}" for mode, row in rows.items()})
+    plain("trials", "trials")
     plain("  times real time", "times_real_time", 1)
     plain("collisions (solid contacts)", "collisions")
     for depth in next(iter(rows.values()))["depth_histogram_mm"]:

@@ -54,7 +54,7 @@ class AtGoals:
     def _start(self, k: int) -> None:
         self._target, self._begin, self._endings = self._targets.next(), k, {}
         self._number += 1
-        for part, epoch in self._epochs.items():
+        for part, epoch in list(self._epochs.items()):
             where = self._robot.parts[part].slice
             try:
                 self._service.call(
@@ -62,7 +62,8 @@ class AtGoals:
                 )
             except CallFailed as failed:
                 self._service.log.warning("%s refuses: %s", part, failed)
-                self._endings[part] = "refused"
+                self._forget()  # whoever refuses does not know this process any more: ask again for all parts
+                return
 
     def _owns_all(self) -> bool:
         for part in self._robot.parts:
