@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -30,7 +30,8 @@ class Gains:
     of the squash at 0.  `client_squash`: whether a client's force is bounded motor by motor (eq. 5.8 as printed), or in each part
     by its norm, which keeps its direction.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
     none does; a motor of weight 0 is never moved.  `motors`: (pattern, gains of these motors), see `with_motors`.  `groups`: the
-    same, looked at after `motors`; a robot without such motors passes them over.
+    same, looked at after `motors`; a robot without such motors passes them over.  What `dataclasses.asdict` gives of a set
+    goes through JSON and back: Gains(**read).
     """
 
     law: Law
@@ -57,6 +58,10 @@ class Gains:
             value = getattr(self, name)
             if isinstance(value, float):
                 _require_positive(name, value)
+        for name in ("weights", "motors"):  # lists where they come from a file
+            object.__setattr__(self, name, _tuples(getattr(self, name)))
+        if isinstance(self.settle, dict):
+            object.__setattr__(self, "settle", Settle(**self.settle))
         if self.client_squash not in ("each", "direction"):
             raise UnknownName("client_squash", self.client_squash, ("each", "direction"))
         for pattern, changes in (*self.motors, *self.groups):
@@ -153,6 +158,10 @@ class Gains:
         """The patterns that change a gain, with its value."""
         chosen = (*self.motors, *self.groups)
         return tuple((pattern, value) for pattern, changes in chosen for changed, value in changes if changed == name)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
 
 
 def _first_match(values: Changes, motors: tuple[str, ...], common: float) -> Array:

@@ -23,10 +23,10 @@ from mobee.robot.robot import Array
 if TYPE_CHECKING:
     from mobee.control.controller import Controller
 
-RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/control.md)
+RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
 LONGEST = 0.2  # m: beyond it the pull grows no more
-DAMPING = 0.02  # of the largest eigenvalue of J E J^T
-WEAK = 0.02  # of the RATE: a marker that is drawn slower is in a singular pose, or as near as possible
+DAMPING = 0.1  # of the largest eigenvalue of J E J^T
+WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
 NUDGE = 0.1  # rad, out of a singular pose
 BEND = 1e-3  # of the largest eigenvalue: curvature that counts
 SMOOTH = 0.25  # s, over which the error is averaged before it is judged
@@ -78,7 +78,7 @@ class Reacher:
         controller.push(self.target.marker, np.concatenate([force[:3], ARM * force[3:]]))
         missing = float(np.linalg.norm(self._seen))
         arrived = missing <= self._tolerance
-        weak = float(np.linalg.norm(give @ force)) < WEAK * RATE * float(np.linalg.norm(error))
+        weak = float(error @ give @ error) < WEAK**2 * most * float(error @ error)
         if missing < self._best - self._tolerance:
             self._best, self._since = missing, 0.0
         self._since += dt

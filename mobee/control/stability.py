@@ -52,7 +52,8 @@ def stability_bound(robot: Robot, gains: Gains) -> Bound:
 
     With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive
     definite: with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular.  Contacts are not in the bound: their
-    stiffness depends on the pose and on how many there are, and their force is bounded (docs/control.md).
+    stiffness depends on the pose and on how many there are, and their force is bounded.  Nor is the age of the commands, which
+    depends on the motors.  docs/law.md has both in numbers.
     """
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):

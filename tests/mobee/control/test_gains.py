@@ -1,6 +1,7 @@
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -77,3 +78,9 @@ def test_a_pattern_that_matches_no_motor_is_refused_where_the_robot_is_known() -
 def test_an_unknown_squash_is_refused() -> None:
     with pytest.raises(UnknownName, match="'norm'.*Valid: direction, each"):
         replace(Gains.default(), client_squash="norm")
+
+
+def test_gains_go_through_json_and_back() -> None:
+    gains = Gains.published_2014().with_motors("*_elbow", stiffness=50.0)
+    again = Gains(**json.loads(json.dumps(asdict(gains))))
+    assert again == gains and hash(again) == hash(gains)
