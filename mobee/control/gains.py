@@ -56,10 +56,10 @@ class Gains:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
+            if isinstance(value, list):  # as JSON has it
+                object.__setattr__(self, name, _tuples(value))
             if isinstance(value, float):
                 _require_positive(name, value)
-        for name in ("weights", "motors"):  # lists where they come from a file
-            object.__setattr__(self, name, _tuples(getattr(self, name)))
         if isinstance(self.settle, dict):
             object.__setattr__(self, "settle", Settle(**self.settle))
         if self.client_squash not in ("each", "direction"):

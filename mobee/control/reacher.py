@@ -73,10 +73,11 @@ class Reacher:
         ease = self._ease(q, found.torque)
         give = (found.rows * ease) @ found.rows.T
         most = max(float(np.linalg.eigvalsh(give)[-1]), _NOTHING)
-        error = found.error / (1.0 + np.linalg.norm(found.error) / LONGEST)
+        missing = float(np.linalg.norm(self._seen))
+        fading = missing / (missing + 0.5 * self._tolerance)  # so that at the target the encoders' noise is not followed
+        error = fading * found.error / (1.0 + np.linalg.norm(found.error) / LONGEST)
         force = self._force(q, found, ease, give / most, RATE * error / most)
         controller.push(self.target.marker, np.concatenate([force[:3], ARM * force[3:]]))
-        missing = float(np.linalg.norm(self._seen))
         arrived = missing <= self._tolerance
         weak = float(error @ give @ error) < WEAK**2 * most * float(error @ error)
         if missing < self._best - self._tolerance:

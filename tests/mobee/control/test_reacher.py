@@ -67,7 +67,7 @@ def draw(
 @EACH_MOTOR
 def test_a_target_in_reach_is_reached_without_overshoot(gains: Gains, motors: MotorParameters) -> None:
     position = PLANAR.evaluate(np.array([1.0, 0.5, 0.8])).position("tip")
-    drawn = draw(PLANAR, "tip", position, BENT, 6.0, motors=motors, gains=gains)
+    drawn = draw(PLANAR, "tip", position, BENT, 9.0, motors=motors, gains=gains)
     assert drawn.said[-1] == "reached"
     assert drawn.distance(position)[-1] < 2e-3
     assert drawn.swing(1.0) < 1e-3
@@ -86,7 +86,7 @@ def test_out_of_a_stretched_arm_a_target_straight_inward_is_reached(motors: Moto
 @EACH_MOTOR
 def test_a_target_20_cm_out_of_reach_is_approached_and_the_marker_rests(motors: MotorParameters) -> None:
     position = np.array([0.0, 1.1, 0.0])
-    drawn = draw(PLANAR, "tip", position, BENT, 20.0, motors=motors)
+    drawn = draw(PLANAR, "tip", position, BENT, 25.0, motors=motors)
     assert drawn.said[-1] == "stuck"
     assert drawn.distance(position)[-1] == pytest.approx(0.2, abs=2e-3)
     assert drawn.swing(3.0) < 1e-3
@@ -98,7 +98,7 @@ def test_the_icubs_arm_leaves_its_stretched_pose_and_rests_at_it() -> None:
     stretched = reach_path(model, "left_palm", np.array([-3.0, 0.0, 0.9]), home).q[-1]
     end = model.evaluate(stretched).position("left_palm")
     away = (np.array([-3.0, 0.0, 0.9]) - end) / np.linalg.norm(np.array([-3.0, 0.0, 0.9]) - end)
-    inward = draw(model, "left_palm", end - 0.25 * away, stretched, 6.0)
+    inward = draw(model, "left_palm", end - 0.25 * away, stretched, 12.0)
     assert inward.distance(end - 0.25 * away)[-1] < 3e-3
     outward = draw(model, "left_palm", end + 0.2 * away, stretched, 8.0)
     assert outward.said[-1] == "stuck"
