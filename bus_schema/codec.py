@@ -48,8 +48,8 @@ def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = N
     version = getattr(message, "v", VERSION)
     if version != VERSION:
         raise Refused("version", f"{cls.__name__}: version {version}, this side speaks {VERSION}")
-    _check_lengths(message, part=part, robot=robot)
-    if not _finite(message):
+    _check_lengths(message, part, robot)
+    if not _struct_finite(message):
         raise Refused("value", f"{cls.__name__}: NaN or infinity")
     return message  # type: ignore[no-any-return]  # the decoder was made for cls
 
@@ -89,9 +89,9 @@ def _length_kind(hint: Any) -> str | None:
     return None
 
 
-def _check_lengths(message: Struct, **lengths: int | None) -> None:
+def _check_lengths(message: Struct, part: int | None, robot: int | None) -> None:
     for name, kind in _vectors(type(message)):
-        expected, value = lengths[kind], getattr(message, name)
+        expected, value = part if kind == "part" else robot, getattr(message, name)
         if expected is not None and value is not None and len(value) != expected:
             raise Refused("length", f"{type(message).__name__}.{name}: {len(value)} numbers, expected {expected}")
 
@@ -124,15 +124,20 @@ def _finite(value: Any) -> bool:
     if isinstance(value, dict):
         return all(map(_finite, value.values()))
     if isinstance(value, Struct):
-        singles, lists, mixed = _numbers(type(value))
-        for name in singles:
-            if not math.isfinite(getattr(value, name)):
-                return False
-        for name in lists:
-            if not _all_finite(getattr(value, name)):
-                return False
-        return all(_finite(getattr(value, name)) for name in mixed) if mixed else True
+        return _struct_finite(value)
     return True
+
+
+def _struct_finite(message: Struct) -> bool:
+    singles, lists, mixed = _numbers(type(message))
+    for name in singles:
+        if not math.isfinite(getattr(message, name)):
+            return False
+    for name in lists:
+        values = getattr(message, name)
+        if not math.isfinite(sum(values)) and not _all_finite(values):
+            return False
+    return all(_finite(getattr(message, name)) for name in mixed) if mixed else True
 
 
 def _all_finite(values: list[float]) -> bool:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import time
 
-from bus_schema import VERSION, keys
+from bus_schema import VERSION, Refused, keys
 from bus_schema.messages import Command, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Array, Robot
 from services.common.delivery import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
 from services.robot_sim.backend import Backend
 from services.robot_sim.gate import LOCKED_TTL, Gate
 from services.robot_sim.limits import Limits
-from services.robot_sim.refuse import refused_as_call, rejected
+from services.robot_sim.refuse import refused_as_call
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
 ESTOP_PERIOD = 0.1  # s
@@ -51,8 +51,9 @@ class Guard:
 
     def obey(self) -> None:
         """Lockstep: admit what came in answer to this tick, in the order of the names, whichever came first."""
+        q = self._backend.motors.q
         for part, command in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
-            self._admit(part, command)
+            self._admit(part, command, q)
         self._waiting.clear()
 
     def do_without(self, who: str) -> None:
@@ -90,12 +91,16 @@ class Guard:
         if self._service.locked:
             self._service.on_each(keys.command(part), Command, lambda command: self._waiting.append((part, command)), part=part, later=True)
         else:
-            self._service.on_newest(keys.command(part), Command, lambda command: self._admit(part, command), part=part)
+            self._service.on_newest(
+                keys.command(part), Command, lambda command: self._admit(part, command, self._backend.motors.q), part=part
+            )
 
-    def _admit(self, part: str, command: Command) -> None:
-        where = self._robot.parts[part].slice
-        with rejected(self._service.bus):
-            self.gates[part].admit(command, self._service.bus.k, time.monotonic_ns(), self._backend.motors.q[where])
+    def _admit(self, part: str, command: Command, q: Array) -> None:
+        """`q` (n,) rad: where all motors are."""
+        try:
+            self.gates[part].admit(command, self._service.bus.k, time.monotonic_ns(), q[self._robot.parts[part].slice])
+        except Refused as refused:  # told and counted; robot_sim goes on
+            self._service.bus.reject(refused.reason, str(refused))
 
     def _take(self, request: Take, key: str) -> Taken:
         gate = self.gates[key.split("/")[0]]

@@ -1,4 +1,4 @@
-"""What becomes of a refusal of the gate: counted when it was a message, answered when it was a call."""
+"""What becomes of a refusal of the gate when it was a call: an answer."""
 
 from __future__ import annotations
 
@@ -6,17 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from bus_schema import Refused
-from services.common.bus import Bus
 from services.common.service import CallRefused
-
-
-@contextmanager
-def rejected(bus: Bus) -> Iterator[None]:
-    """Count and tell it; robot_sim goes on."""
-    try:
-        yield
-    except Refused as refused:
-        bus.reject(refused.reason, str(refused))
 
 
 @contextmanager

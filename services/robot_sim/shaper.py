@@ -8,12 +8,15 @@ from mobee.robot.robot import Array
 from mobee.simulation.motors import SERVO_GAIN
 from services.robot_sim.limits import Limits
 
+_WAYS = np.array([[1.0], [-1.0]])  # down, up: a position's part in the distance from that limit
+
 
 class Shaper:
     """Turns commanded references into allowed ones, tick by tick; arrays (n,)."""
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits, self._dt = limits, dt
+        self._ends = np.stack([-limits.lower, limits.upper])
         self._change = limits.acceleration * dt  # rad/s a tick
         self.position = np.zeros(len(limits.lower))  # rad
         self.velocity = np.zeros(len(limits.lower))  # rad/s, what is asked of the motors now
@@ -44,7 +47,8 @@ class Shaper:
 
     def _brakeable(self, q: Array) -> tuple[Array, Array]:
         """The largest speeds downwards and upwards that can be braked before a limit."""
-        return self._braked_within(np.maximum(q - self._limits.lower, 0.0)), self._braked_within(np.maximum(self._limits.upper - q, 0.0))
+        down, up = self._braked_within(np.maximum(self._ends + _WAYS * q, 0.0))
+        return down, up
 
     def _approach(self, velocity: Array) -> None:
         self.velocity = velocity.clip(self.velocity - self._change, self.velocity + self._change)  # exactly what is asked for, if it may be
