@@ -61,11 +61,14 @@ class Launch:
         return dict(json.loads(out))
 
 
-def launch(folder: Path, scenario: str, *settings: str, headless: bool = True, duration: float | None = None) -> Launch:
+def launch(
+    folder: Path, scenario: str, *settings: str, headless: bool = True, duration: float | None = None, ticks: int | None = None
+) -> Launch:
     endpoint, runs, errors = free_endpoint(), folder / "runs", folder / "launcher.err"
     argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", endpoint, "--runs", str(runs), "--json"]
     argv += ["--headless"] if headless else []
     argv += ["--duration", str(duration)] if duration else []
+    argv += ["--ticks", str(ticks)] if ticks else []
     for setting in settings:
         argv += ["--set", setting]
     with errors.open("w") as sink:

@@ -11,7 +11,7 @@ from tests.system.live import running, transitions, until
 
 pytestmark = pytest.mark.system
 
-ACTIONS = 30
+ACTIONS = 10
 SEED = 4
 GAINS = "default"
 ATTEMPTS = 5
@@ -20,7 +20,7 @@ Row = tuple[int, int, int, int]  # n, s, a, s'
 
 
 @pytest.mark.timeout(500)
-def test_thirty_actions_end_in_the_same_states(tmp_path: Path) -> None:
+def test_live_actions_end_in_the_same_states(tmp_path: Path) -> None:
     live = None
     for attempt in range(ATTEMPTS):
         live = on_the_bus(tmp_path / str(attempt))
@@ -28,7 +28,7 @@ def test_thirty_actions_end_in_the_same_states(tmp_path: Path) -> None:
             break
     assert live is not None, f"a stall of this machine interrupted an action in each of {ATTEMPTS} attempts"
     assert live == offline()
-    assert len({row[3] for row in live}) > 10
+    assert len({row[3] for row in live}) > 4
 
 
 def on_the_bus(folder: Path) -> list[Row] | None:
