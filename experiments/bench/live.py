@@ -50,8 +50,8 @@ def _measured(rate: int, seconds: float, backend: str) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> str:
     """The same for people."""
     lines = [f"Live on the {result['backend']} robot, three agents, {result['seconds']:g} s each; age in ticks, jitter in ms"]
-    names = ("rate", "age p50", "p99", "most", "jitter p50", "p99", "missed", "held", "late", "")
-    lines.append("{:>7}{:>9}{:>5}{:>6}{:>12}{:>8}{:>8}{:>7}{:>7}{:>8}".format(*names))
+    names = ("rate", "age p50", "p99", "most", "jitter p50", "p99", "missed", "held", "late")
+    lines.append("{:>7}{:>9}{:>5}{:>6}{:>12}{:>8}{:>8}{:>7}{:>7}".format(*names))
     for run in result["runs"]:
         verdict = "" if run["passed"] else "  LATE"
         lines.append(

@@ -14,7 +14,7 @@ BENCHES = {
     "live": "the live processes in real time: how late commands are",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
-_NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed."""
+_NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
