@@ -85,6 +85,7 @@ class ControllerNode:
             self._step()
             return
         if clock.mode == "lock":
+            self._body.update()  # while the model computes
             self._go_without_model()
             return
         k = clock.k

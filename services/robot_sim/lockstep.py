@@ -65,5 +65,5 @@ class Lockstep:
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
 
     def _note(self, who: str, why: str) -> None:
-        if self._service.bus.k > 0:  # before, it will be waited for
+        if self._service.bus.k > 0 and not self.is_over():  # before tick 1 it will be waited for
             self.spoil(f"{who} {why}")
