@@ -56,11 +56,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     with Progress() as progress:
         for number, minutes in enumerate(lengths):
             for mode in arguments.modes:
-                place, before = _place(folder, mode, number), done
+                place = folder / mode / f"{number:03}"
                 if not (place / TRIAL).exists():
                     text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
-                    seed = SEEDS * arguments.seed + number
-                    _run_until_repeatable(place, mode, robot, seed, minutes, lambda share: progress.show((before + share) / total, text))  # noqa: B023
+                    seed, ticks = SEEDS * arguments.seed + number, round(60.0 * minutes * RATE)
+                    _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text))
                 done += 1
     rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
     claims = verdict(rows)
@@ -69,16 +69,21 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return {"passed": all(claims.values()), "claims": claims, **({"modes": rows} if arguments.json else {})}
 
 
-def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, minutes: float, show: Callable[[float], None]) -> None:
+def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
     """Leave a trial in which nobody was late for a tick; raises TrialFailed."""
     for _ in range(TRIES):
-        run_trial(place, mode, robot, seed, minutes, show)
+        run_trial(place, mode, robot, seed, ticks, show)
         trial = measure(place, robot, 1.0 / RATE)
         if trial.lockstep.repeatable:
             write_trial(place / TRIAL, trial)
             (place / POSITIONS).unlink()
             return
     raise TrialFailed(f"{mode}: in {TRIES} trials somebody was late for a tick: this machine is too busy; see {place / 'launch'}")
+
+
+def _shower(progress: Progress, done: int, total: int, text: str) -> Callable[[float], None]:
+    """Shows which share of all trials is done when it is told the share of the one under way."""
+    return lambda share: progress.show((done + share) / total, text)
 
 
 def trial_lengths(minutes: float, trial: float) -> list[float]:
@@ -99,7 +104,3 @@ def figure(folder: Path) -> Path:
     if not trials:
         raise InvalidValue(f"{folder} has no finished trial: it was stopped before the first was over.")
     return draw({mode: summarise(found) for mode, found in trials.items()}, folder / "babbling.png")
-
-
-def _place(folder: Path, mode: str, number: int) -> Path:
-    return folder / mode / f"{number:03}"

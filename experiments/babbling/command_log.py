@@ -22,7 +22,7 @@ class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CommandLog:
-    """Every command is in the file when `note` returns; the last line says that all was done."""
+    """Every command is in the file when `note` returns."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -32,19 +32,8 @@ class CommandLog:
         """A command has ended."""
         self._file.write(msgspec.json.encode(commanded).decode() + "\n")
 
-    def finish(self, k: int) -> None:
-        """The babbling is over at tick k."""
-        self._file.write(msgspec.json.encode({"finished": k}).decode() + "\n")
-
 
 def read_commands(path: Path) -> list[Commanded]:
-    """All commands that have ended."""
-    return [msgspec.json.decode(line, type=Commanded) for line in path.read_text().splitlines() if '"finished"' not in line]
-
-
-def finished_at(path: Path) -> int | None:
-    """The tick at which the babbling was over; None while it goes on."""
-    if not path.exists():
-        return None
-    *_, last = ["", *path.read_text().splitlines()]
-    return int(msgspec.json.decode(last)["finished"]) if last.startswith('{"finished"') and last.endswith("}") else None
+    """All commands that have ended; a last line that a kill has cut is dropped."""
+    *whole, _ = path.read_text().split("\n")
+    return [msgspec.json.decode(line, type=Commanded) for line in whole]

@@ -23,10 +23,10 @@ class Touch(Struct, frozen=True):
     depth: float  # m, at its deepest
 
 
-def read_touches(path: Path, dt: float, last: int) -> list[Touch]:
-    """The events of a record until tick `last`, in order of their beginning; `dt` s a tick."""
+def read_touches(path: Path, dt: float) -> list[Touch]:
+    """The events of a record, in order of their beginning; `dt` s a tick."""
     rows = ((int(row["k"]), row["pair"], float(row["depth"])) for row in read_records(path, COLUMNS))
-    return touches((row for row in rows if row[0] <= last), round(APART / dt))
+    return touches(rows, round(APART / dt))
 
 
 def touches(rows: Iterable[tuple[int, str, float]], apart: int) -> list[Touch]:

@@ -9,11 +9,10 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from experiments.babbling.command_log import COMMANDS, Commanded, Ending, finished_at, read_commands
+from experiments.babbling.command_log import COMMANDS, Commanded, Ending, read_commands
 from experiments.babbling.contacts import Touch, read_touches
 from experiments.babbling.motion import beyond_limits, jerk, path_length, speed
 from experiments.babbling.moved import moved_motors
-from mobee.errors import MobeeError
 from mobee.robot.robot import Array, Robot
 
 REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the limits' own zone, less than half a cell of the thesis' lattices
@@ -66,21 +65,16 @@ class Trial(Struct, frozen=True):
 
 
 def measure(folder: Path, robot: Robot, dt: float) -> Trial:
-    """What a finished trial left in its folder; raises MobeeError when it is not whole."""
-    last = finished_at(folder / COMMANDS)
-    if last is None:
-        raise MobeeError(f"{folder}: the babbling did not come to its end")
+    """What a finished trial left in its folder."""
     q_all = np.fromfile(folder / POSITIONS).reshape(-1, len(robot.motors))
-    if len(q_all) < last - 1:
-        raise MobeeError(f"{folder}: {len(q_all)} of {last} ticks were recorded")
     moved = moved_motors(robot)
-    q = q_all[:last, moved]
+    q = q_all[:, moved]
     worst = beyond_limits(q, robot.limits[moved])
     third = jerk(q, dt)
     return Trial(
-        seconds=last * dt,
+        seconds=len(q) * dt,
         commands=[judge(commanded, q_all, robot, dt) for commanded in read_commands(folder / COMMANDS)],
-        touches=read_touches(folder / CONTACTS, dt, last),
+        touches=read_touches(folder / CONTACTS, dt),
         beyond=float(worst.max()),
         motor=robot.motors[moved[int(worst.argmax())]],
         speed_squared=float((speed(q, dt) ** 2).mean()),

@@ -43,21 +43,20 @@ _BABBLER = """
 [services.babbler]
 module = "experiments.babbling.babbler"
 at = "{at}"
-ticks = {ticks}
 robot_of = "{robot_of}"
 speed = {speed:g}
 run_dir = {folder}
 """
 
 
-def scenario(mode: str, folder: Path, seed: int, minutes: float) -> str:
+def scenario(mode: str, folder: Path, seed: int, ticks: int) -> str:
     """The scenario's text; what is measured goes to the folder."""
-    ticks, where = round(60.0 * minutes * RATE), _quoted(folder)
+    where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
     between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
     robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where, world=_quoted(WORLD))
-    return robot + between + _BABBLER.format(at=at, robot_of=robot_of, ticks=ticks, speed=SPEED, folder=where)
+    return robot + between + _BABBLER.format(at=at, robot_of=robot_of, speed=SPEED, folder=where)
 
 
 def _quoted(path: Path) -> str:

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from experiments.babbling.command_log import COMMANDS, finished_at
+from experiments.babbling.command_log import COMMANDS
 from experiments.babbling.measured import POSITIONS, SUMMARY
-from experiments.babbling.modes import RATE, scenario
+from experiments.babbling.modes import scenario
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 
@@ -28,14 +28,14 @@ class TrialFailed(MobeeError):
     """A trial that did not come to its end; the message names its logs."""
 
 
-def run_trial(folder: Path, mode: str, robot: Robot, seed: int, minutes: float, show: Callable[[float], None]) -> None:
+def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
     """Leave commands, positions and contacts in the folder; `show` is told which share is done.  Raises TrialFailed."""
     folder.mkdir(parents=True, exist_ok=True)
     for left in (COMMANDS, POSITIONS):  # of a trial that was broken off
         (folder / left).unlink(missing_ok=True)
     file = folder / f"{mode}.toml"
-    file.write_text(scenario(mode, folder.resolve(), seed, minutes))
-    due = minutes * 60.0 * RATE * 8 * len(robot.motors)  # bytes of a whole record
+    file.write_text(scenario(mode, folder.resolve(), seed, ticks))
+    due = ticks * 8 * len(robot.motors)  # bytes of a whole record
     with _launched(file, folder) as process:
         written, stands_at = 0, time.monotonic() + BEGINS
         while process.poll() is None:  # robot_sim counts the ticks, and the launcher ends with it
@@ -46,7 +46,7 @@ def run_trial(folder: Path, mode: str, robot: Robot, seed: int, minutes: float, 
                 show(size / due)
             elif time.monotonic() > stands_at:
                 raise TrialFailed(f"{mode}: no tick for {STANDS:g} s; see {folder / 'news'} and {folder / 'launch'}")
-    if finished_at(folder / COMMANDS) is None:
+    if _size(folder / POSITIONS) != due:
         raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'news'} and {folder / 'launch'}")
 
 

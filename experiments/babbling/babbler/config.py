@@ -17,8 +17,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Whom it commands: the drives of the robot, or the goals of the controller."""
     robot_of: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
     """Namespace of the robot that it commands: the robot's own, or that of a filter in front of it."""
-    ticks: Annotated[int, Meta(gt=0)] = 15_000
-    """It ends after so many."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.2
     """Share of the motors' top speed that its own moves use; the controller has its own."""
     run_dir: str = ""

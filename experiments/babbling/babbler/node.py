@@ -16,10 +16,10 @@ from services.common.service import Service
 
 
 class BabblerNode:
-    """Counts the ticks, writes down every command, and answers the barrier; the process ends when its ticks are over."""
+    """Has its turn tick by tick, writes down every command, and answers the barrier; goes on until it is ended."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        self._ticks, self._commands = config.ticks, 0
+        self._commands = 0
         self._log = CommandLog(Path(config.run_dir) / COMMANDS)
         self._participant = Participant(service)
         targets = Targets(robot, config.seed)
@@ -34,10 +34,6 @@ class BabblerNode:
             service.on_clock(self._tick)
 
     def _tick(self, now: Clock | Turn) -> None:
-        if now.k >= self._ticks:
-            self._log.finish(now.k)
-            self._participant.done(now.k, last=True)
-            raise SystemExit(0)
         if now.k > 0:  # tick 0 gathers those who take part
             self._mover.move(now.k, now.dt * 1e-9)
         self._participant.done(now.k)

@@ -97,9 +97,9 @@ def test_every_mode_is_a_scenario_that_the_launcher_accepts(tmp_path: Path) -> N
 
     for mode in MODES:
         file = tmp_path / f"{mode}.toml"
-        file.write_text(scenario(mode, tmp_path / 'a "quoted" folder', seed=3, minutes=1.0))
+        file.write_text(scenario(mode, tmp_path / 'a "quoted" folder', seed=3, ticks=3000))
         read = {part.who: part.config for part in read_scenario(str(file)).parts}
-        assert read["robot_sim"].mode == "lock" and read["robot_sim"].ticks == read["babbler"].ticks == 3000
+        assert read["robot_sim"].mode == read["babbler"].mode == "lock" and read["robot_sim"].ticks == 3000
         assert read["robot_sim"].record == read["babbler"].run_dir
         assert ("controller" in read, "port_filter" in read) == (mode == "two", mode == "one")
         if mode == "two":
@@ -112,7 +112,7 @@ class Trials:
     """In place of real ones: notes which are run, leaves what they would, and breaks off where it is told."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.run: list[tuple[str, int, float]] = []
+        self.run: list[tuple[str, int, int]] = []
         self.breaks_at = 99
         monkeypatch.setattr(babbling, "run_trial", self._run)
         self.late = 0  # in so many of the next trials somebody is late
@@ -122,10 +122,10 @@ class Trials:
         self.late -= 1
         return trial(repeatable=False) if self.late >= 0 else GOOD[folder.parent.name]
 
-    def _run(self, folder: Path, mode: str, robot: Any, seed: int, minutes: float, show: Any) -> None:
+    def _run(self, folder: Path, mode: str, robot: Any, seed: int, ticks: int, show: Any) -> None:
         if len(self.run) == self.breaks_at:
             raise TrialFailed("broken off")
-        self.run.append((mode, seed, minutes))
+        self.run.append((mode, seed, ticks))
         folder.mkdir(parents=True, exist_ok=True)
         (folder / POSITIONS).write_bytes(b"much")
 
@@ -143,7 +143,7 @@ def test_a_run_that_was_broken_off_goes_on_behind_its_finished_trials(
         babbling.run(options(), tmp_path)
     trials.breaks_at = 99
     results = babbling.run(options(), tmp_path)
-    assert trials.run == [(mode, 20_000 + number, minutes) for number, minutes in ((0, 10.0), (1, 5.0)) for mode in MODES]
+    assert trials.run == [(mode, 20_000 + number, ticks) for number, ticks in ((0, 30_000), (1, 15_000)) for mode in MODES]
     assert results["passed"] and "modes" not in results
     assert "MoBeE 2.0" in capsys.readouterr().out
     assert not list(tmp_path.rglob(POSITIONS))
@@ -156,7 +156,7 @@ def test_a_trial_in_which_somebody_was_late_is_run_again(tmp_path: Path, monkeyp
     trials = Trials(monkeypatch)
     trials.late = 2
     babbling.run(options(minutes=1.0, modes=["two"], json=True), tmp_path)
-    assert trials.run == [("two", 20_000, 1.0)] * 3
+    assert trials.run == [("two", 20_000, 3000)] * 3
     assert babbling.read_trials(tmp_path, "two") == [GOOD["two"]]
     trials.late = 3
     with pytest.raises(TrialFailed, match="too busy"):

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.babbling.command_log import COMMANDS, Commanded, CommandLog, finished_at, read_commands
+from experiments.babbling.command_log import COMMANDS, Commanded, CommandLog, read_commands
 from experiments.babbling.measured import CONTACTS, POSITIONS, REACHED, RETURNED, SUMMARY, judge, measure, read_trial, write_trial
 from experiments.babbling.moved import moved_motors
 from mobee import load_robot
-from mobee.errors import MobeeError
 
 ROBOT = load_robot("icub")
 DT = 0.02
@@ -52,16 +51,14 @@ def test_the_hands_do_not_count() -> None:
     assert set(judge(commanded(target), ramp(ROBOT.home), ROBOT, DT).outcomes.values()) == {"completed"}
 
 
-def left_by_a_trial(folder: Path, ticks: int = TICKS) -> None:
+def left_by_a_trial(folder: Path) -> None:
     target = ROBOT.home.copy()
     target[0] = ROBOT.limits[0, 1] + np.deg2rad(2.0)
-    ramp(target)[:ticks].tofile(folder / POSITIONS)
+    ramp(target).tofile(folder / POSITIONS)
     (folder / CONTACTS).write_text("k,pair,depth\n5,l_hand table,0.004\n")
     lockstep = {"ticks": TICKS, "speed": 8.5, "repeatable": True, "states_sha256": "c0ffee"}
     (folder / SUMMARY).write_text(json.dumps({"scenario": "off", "faults": [], "lockstep": lockstep}))
-    log = CommandLog(folder / COMMANDS)
-    log.note(commanded(target))
-    log.finish(TICKS)
+    CommandLog(folder / COMMANDS).note(commanded(target))
 
 
 def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
@@ -76,15 +73,6 @@ def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
     assert trial.jerk_squared == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_trial_whose_record_is_not_whole_is_refused(tmp_path: Path) -> None:
-    left_by_a_trial(tmp_path, ticks=50)
-    with pytest.raises(MobeeError, match="50 of 100 ticks"):
-        measure(tmp_path, ROBOT, DT)
-    (tmp_path / COMMANDS).write_text((tmp_path / COMMANDS).read_text().splitlines()[0] + "\n")
-    with pytest.raises(MobeeError, match="did not come to its end"):
-        measure(tmp_path, ROBOT, DT)
-
-
 def test_what_is_kept_of_a_trial_is_read_as_it_was_written(tmp_path: Path) -> None:
     left_by_a_trial(tmp_path)
     trial = measure(tmp_path, ROBOT, DT)
@@ -93,15 +81,14 @@ def test_what_is_kept_of_a_trial_is_read_as_it_was_written(tmp_path: Path) -> No
     assert not list(tmp_path.glob("*.new"))
 
 
-def test_the_log_says_when_it_is_over_and_only_then(tmp_path: Path) -> None:
+def test_a_command_is_in_the_log_when_it_has_ended_and_what_a_kill_has_cut_is_not(tmp_path: Path) -> None:
     path = tmp_path / "deep" / COMMANDS
-    assert finished_at(path) is None
     log = CommandLog(path)
-    assert finished_at(path) is None
+    assert read_commands(path) == []
     log.note(commanded(ROBOT.home))
-    assert finished_at(path) is None
-    log.finish(77)
-    assert finished_at(path) == 77
+    assert read_commands(path) == [commanded(ROBOT.home)]
+    with path.open("a") as file:
+        file.write('{"begin":2,"en')
     assert read_commands(path) == [commanded(ROBOT.home)]
 
 
