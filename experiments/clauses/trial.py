@@ -17,6 +17,7 @@ from mobee.simulation import OfflinePlant
 
 ARMS = ("left_arm", "right_arm")
 STRONG = 1e3  # rad/s^2: the squash lets through nearly all that it can
+MARGIN = np.deg2rad(15.0)  # of a start, along the normal; the constraints are felt nearer than 12
 AT_STOP = np.deg2rad(0.01)
 
 
@@ -78,10 +79,10 @@ def _tell(controller: Controller, part: str, command: Command, phase: int, force
 
 
 def _legal(robot: Robot, q: Array) -> Array:
-    """On the way from home to q, as far as the constraints hold."""
+    """On the way from home to q, as far as all constraints are farther than MARGIN: what is violated later is the command's doing."""
     for share in np.linspace(1.0, 0.0, 21):
         found: Array = robot.home + share * (q - robot.home)
-        if clause_violations(robot, found[None]).max() < 0.0:
+        if clause_violations(robot, found[None]).max() < -MARGIN:
             return found
     return robot.home
 

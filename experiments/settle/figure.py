@@ -26,7 +26,7 @@ def draw(found: Sequence[Response], path: Path) -> Path:
     for gains in GAINS:
         mine = [r for r in found if r.gains == gains]
         for kind, marker in (("motors", "o"), ("postures", "s")):
-            some = [r for r in mine if r.step.startswith("posture ") == (kind == "postures")]
+            some = [r for r in mine if r.is_posture == (kind == "postures")]
             periods = sorted({r.period_ms for r in some})
             for axes, of in ((time, lambda r: r.settling), (overshoot, lambda r: 100.0 * r.overshoot)):
                 values = [[of(r) for r in some if r.period_ms == period] for period in periods]

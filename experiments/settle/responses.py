@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,6 +38,11 @@ class Response(Row):
     error_deg: float  # between rest and attractor
     rest_deg: float  # standard deviation at rest
     is_settled: bool
+
+    @property
+    def is_posture(self) -> bool:
+        """Whether many motors stepped together."""
+        return self.step.startswith("posture ")
 
 
 @lru_cache(maxsize=1)
@@ -76,18 +82,24 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 
 
 def postures(count: int, seed: int) -> list[Array]:
-    """Random postures of torso and arms without any contact and away from limits and constraints."""
+    """Random postures of torso and arms, one after the other from home, with nothing in the way that any field would feel."""
     robot, rng = model().robot, np.random.default_rng(seed)
-    found: list[Array] = []
-    while len(found) < count:
+    found = [robot.home]
+    while len(found) <= count:
         q = robot.home.copy()
         for part, motors in LATTICE.items():
             where = slice(robot.parts[part].start, robot.parts[part].start + motors)
             low, high = robot.limits[where].T
             q[where] = low + rng.uniform(*MIDDLE, motors) * (high - low)
-        if clause_violations(robot, q[None]).max() < -MARGIN and not len(model().evaluate(q).table):
+        # Motors get there at different times, so the way is not the line: the torso first, then the arms, and the other way round.
+        ways = np.linspace(0.0, 1.0, 11)[:, None, None]
+        torso = np.arange(len(q)) < robot.parts["torso"].slice.stop
+        corners = np.stack([np.where(torso, q, found[-1]), np.where(torso, found[-1], q)])
+        sides = np.stack([np.stack([found[-1], found[-1], found[-1]]), np.stack([*corners, q]), np.stack([q, q, q])])
+        path = np.concatenate([a + ways * (b - a) for a, b in pairwise(sides)]).reshape(-1, len(q))
+        if clause_violations(robot, path).max() < -MARGIN and not len(model().evaluate(path).table):
             found.append(q)
-    return found
+    return found[1:]
 
 
 def step_ride(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> Ride:

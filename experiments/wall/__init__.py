@@ -57,7 +57,9 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 progress.show((len(begun) + len(reached)) / cases, f"{gains}: into {wall}")
             for target in arguments.targets:
                 if (gains, target) not in reached:
-                    draws.append(draw_hand(gains, target, arguments.seed)[0].record())
+                    drawn_hand, way = draw_hand(gains, target, arguments.seed)
+                    way.save(folder, gains, target)
+                    draws.append(drawn_hand.record())
                     reached.add((gains, target))
                 progress.show((len(begun) + len(reached)) / cases, f"{gains}: drawn to {target}")
     return results(*read(folder))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 MARKER, ARM = "left_palm", "left_arm"
-SECONDS = {"default": 20.0, "published_2014": 30.0}
+SECONDS = {"default": 40.0, "published_2014": 60.0}
 REST = 3.0  # s, the end of the ride
 SLOW, NEAR = 1e-3, 0.01  # m/s, m: slower than this, farther than that from where it comes to rest, the hand has stopped dead
 
@@ -39,6 +40,16 @@ class Way:
     times: Array  # (T,) s
     place: Array  # (T, 3) m
     target: Array  # (T, 3) m
+
+    def save(self, folder: Path, gains: str, name: str) -> None:
+        """For the figure."""
+        np.savez_compressed(_file(folder, gains, name), times=self.times, place=self.place, target=self.target)
+
+    @classmethod
+    def load(cls, folder: Path, gains: str, name: str) -> Way:
+        """What was saved."""
+        with np.load(_file(folder, gains, name)) as file:
+            return cls(file["times"], file["place"], file["target"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +110,10 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
     restless = oscillation(model(), done.last(REST), MARKER)
     left = float(np.linalg.norm(hand[-1] - targets[-1]))
     return Drawn(gains, name, 1e3 * restless, dead, 1e3 * left), Way(done.times, hand, target)
+
+
+def _file(folder: Path, gains: str, name: str) -> Path:
+    return folder / f"{gains}-{name.replace(', ', ' ').replace(' ', '-')}.npz"
 
 
 def _dead(hand: Array, dt: float) -> float:

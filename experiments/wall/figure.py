@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.matplotlib_figure import new_figure
-from experiments.wall.drawn import DRAWN, Drawn, draw_hand
+from experiments.wall.drawn import DRAWN, Drawn, Way
 from experiments.wall.pressing import LEVELS, Pressed
 from mobee.errors import InvalidValue
 
@@ -23,7 +23,7 @@ def draw(pressed: Sequence[Pressed], drawn: Sequence[Drawn], path: Path) -> Path
     above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.1))
     _pressing(above, pressed)
     if drawn:
-        _ways(below, drawn)
+        _ways(below, drawn, path.parent)
     drawing.savefig(path, dpi=130)
     return path
 
@@ -45,6 +45,7 @@ def _pressing(drawing: object, pressed: Sequence[Pressed]) -> None:
         axes.set_xscale("symlog", linthresh=LEVELS[1])
         axes.set(xlabel="force before the squash [per unit mass]", ylabel=label)
         axes.grid(alpha=0.2)
+    panels[1].set_ylim(-0.2, max(5.0, panels[1].get_ylim()[1]))
     panels[2].axhline(0.0, color="0.3", linewidth=0.8)
     panels[3].axhline(0.0, color="0.3", linewidth=0.8)
     for gains, color in COLORS.items():
@@ -52,17 +53,16 @@ def _pressing(drawing: object, pressed: Sequence[Pressed]) -> None:
     panels[0].legend(fontsize=7)
 
 
-def _ways(drawing: object, drawn: Sequence[Drawn]) -> None:
+def _ways(drawing: object, drawn: Sequence[Drawn], folder: Path) -> None:
     names = [name for name in DRAWN if any(d.target == name for d in drawn)]
     columns = (len(names) + 1) // 2
     panels = np.ravel(drawing.subplots(2, columns, squeeze=False))  # type: ignore[attr-defined]  # as above
     for axes, name in zip(panels, names, strict=False):
         for gains, color in COLORS.items():
-            if not any(d.target == name and d.gains == gains for d in drawn):
-                continue
-            result, way = draw_hand(gains, name, seed=0)
-            label = f"{gains}: at rest ±{result.oscillation_mm:.2f} mm, dead {result.dead_s:.1f} s"
-            axes.plot(way.times, np.linalg.norm(way.place - way.target, axis=1), color=color, label=label)
+            for result in (d for d in drawn if d.target == name and d.gains == gains):
+                way = Way.load(folder, gains, name)
+                label = f"{gains}: at rest ±{result.oscillation_mm:.2f} mm, dead {result.dead_s:.1f} s"
+                axes.plot(way.times, np.linalg.norm(way.place - way.target, axis=1), color=color, label=label)
         axes.set_title(f"drawn: {name}", fontsize=8)
         axes.set(xlabel="time [s]", ylabel="from the target [m]", ylim=(0.0, None))
         axes.legend(fontsize=6)
