@@ -9,6 +9,7 @@ from services.common.lockstep import Barrier
 from services.common.service import Service
 from services.robot_sim.guard import Guard
 
+TELLS = 1.0  # s between two events about flaws
 GATHERING = 0.05  # s between two calls to come
 
 
@@ -21,12 +22,13 @@ class Lockstep:
         self._barrier = Barrier(service, participants, self._note)
         self._last_tick = last_tick
         self.flaws = 0
+        self._told = -TELLS  # monotonic clock
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
         """A new run."""
         self._barrier.begin()
-        self.flaws = 0
+        self.flaws, self._told = 0, -TELLS
 
     def is_complete(self) -> bool:
         """Whether everybody has answered tick 0; until then it is repeated."""
@@ -52,9 +54,12 @@ class Lockstep:
         return bool(self._barrier.absent())
 
     def spoil(self, why: str) -> None:
-        """Something happened that will not happen again at the same tick."""
+        """Something happened that will not happen again at the same tick: counted, and told at most once a second."""
         self.flaws += 1
-        self._service.bus.event("warning", "not_repeatable", f"this run cannot be repeated: {why}", k=float(self._service.bus.k))
+        now = time.monotonic()
+        if now - self._told >= TELLS:
+            self._told = now
+            self._service.bus.event("warning", "not_repeatable", f"this run cannot be repeated: {why}", k=float(self._service.bus.k))
 
     def speed(self, dt: float) -> float:
         """Simulated seconds a second since tick 1."""
