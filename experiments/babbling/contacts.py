@@ -11,7 +11,7 @@ from experiments.records import read_records
 
 APART = 0.2  # s for which a pair must be apart, so that its next contact is another event
 COLUMNS = ("k", "pair", "depth")
-EDGES = (0.5, 1.0, 2.0, 5.0, 10.0)  # mm, of the depth histogram
+EDGES = (0.1, 0.2, 0.5, 1.0, 2.0)  # mm, of the depth histogram
 
 
 class Touch(Struct, frozen=True):

@@ -64,7 +64,7 @@ def _outcomes(axes: Any, rows: _Rows) -> None:
 def _smoothness(axes: Any, rows: _Rows) -> None:
     axes.bar(range(len(rows)), [row["jerk_over_speed"] for row in rows.values()], color=[COLORS[mode] for mode in rows])
     axes.set_xticks(range(len(rows)), [TITLES[mode] for mode in rows])
-    axes.set(title="Roughness: jerk over speed, each rms over all ticks and motors", ylabel="1/s$^2$")
+    axes.set(title="Roughness: jerk over speed, each rms", ylabel="1/s$^2$")
 
 
 def _bars(axes: Any, rows: _Rows, heights: list[list[int]]) -> None:

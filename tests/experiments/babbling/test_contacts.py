@@ -23,6 +23,6 @@ def test_a_record_is_read_but_not_what_a_kill_has_cut(tmp_path: Path) -> None:
 
 
 def test_every_event_is_in_one_range_of_the_histogram() -> None:
-    depths = [0.0001, 0.0005, 0.0015, 0.002, 0.007, 0.02]
+    depths = [0.00005, 0.00015, 0.0002, 0.0007, 0.0015, 0.02]
     histogram = depth_histogram(Touch(HAND, i, i, depth) for i, depth in enumerate(depths))
-    assert histogram == {"<0.5": 1, "0.5-1": 1, "1-2": 1, "2-5": 1, "5-10": 1, ">10": 1}
+    assert histogram == {"<0.1": 1, "0.1-0.2": 1, "0.2-0.5": 1, "0.5-1": 1, "1-2": 1, ">2": 1}
