@@ -209,7 +209,7 @@ def _checked(what: str, value: Array, length: int) -> Array:
     array = np.array(value, dtype=np.float64)
     if array.shape != (length,):
         raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
-    if not math.isfinite(array.dot(array)):
+    if not math.isfinite(array.dot(array)) and not np.isfinite(array).all():  # the first is quick, but overflows
         worst = int(np.argmax(np.nan_to_num(np.abs(array), nan=np.inf)))
         raise InvalidValue(f"{what}: number {worst} is {array[worst]}; must be {length} finite numbers")
     return array

@@ -14,6 +14,7 @@ import pytest
 from bus_schema import encode, encoding_of, keys
 from bus_schema.messages import Clock, Command, EStop, Event, Message, State, Truth
 from bus_schema.rpc import Done, Driven, Empty, PartMeta, Place, Request, Take, Taken, WithEpoch
+from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.load import load_robot
 from services.common.delivery import LATEST
 from services.common.rpc import CallFailed
@@ -338,7 +339,14 @@ def test_position_mode_goes_where_the_reference_goes(bench: Bench) -> None:
 
 def test_torque_mode_accelerates_a_motor(bench: Bench) -> None:
     epoch = bench.arm("left_arm")
-    bench.keep("left_arm", epoch, 0.5, lambda: elbow(1.0), mode="torque")
+    arm = ROBOT.part("left_arm").slice
+
+    def carry_and_bend() -> list[float]:
+        q = ROBOT.home.copy()
+        q[arm] = bench.newest("left_arm").q
+        return (gravity_torque(ROBOT, q)[arm] + elbow(1.0)).tolist()
+
+    bench.keep("left_arm", epoch, 0.5, carry_and_bend, mode="torque")
     state = bench.next_state("left_arm")
     assert state.mode == "torque"
     assert state.dq[ELBOW] == pytest.approx(1.0 / 5.0, abs=0.02)  # where friction, 5 N m s/rad, balances it

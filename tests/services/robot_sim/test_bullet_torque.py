@@ -142,7 +142,7 @@ def test_torques_of_the_controller_reach_the_goal_that_its_velocities_reach() ->
         controller = Controller(model, Gains.default(), modality=modality)
         controller.reset(backend.motors.q)
         controller.attractor = goal
-        for _ in range(225):
+        for _ in range(350):
             command = controller.step(backend.motors.q, dt)
             backend.motors.command(ALL, modality, getattr(command, modality))
             backend.step(dt)
