@@ -4,7 +4,7 @@ Claim: with the default gains no force of a client drives a solid deeper than 2 
 limit; and a hand that is drawn to a target, reachable or not, through singular poses or not, never stops dead on its way and does
 not oscillate above 1 mm when it has come to rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
 dominate the constraint forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").
-Published: no numbers.  Run time: about two minutes.
+Published: no numbers.  Run time: about six minutes.
 
 The force rises in steps, each in force for two seconds, for both gain sets.  Depths are of the joints' true positions.
 """

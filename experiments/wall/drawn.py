@@ -17,9 +17,10 @@ from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 MARKER, ARM = "left_palm", "left_arm"
-SECONDS = {"default": 40.0, "published_2014": 60.0}
+SECONDS = 60.0
 REST = 3.0  # s, the end of the ride
-SLOW, NEAR = 1e-3, 0.01  # m/s, m: slower than this, farther than that from where it comes to rest, the hand has stopped dead
+# m/s, s, m: slower than this over that time, farther than that from where it comes to rest, the hand has stopped dead.
+SLOW, WINDOW, NEAR = 2e-4, 0.5, 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
     place(plant, start)
     home = model().evaluate(robot.home).position(MARKER)
     targets = [home + np.array(target) for target in goal.targets]
-    ticks = round(SECONDS[gains] / plant.dt / len(targets))
+    ticks = round(SECONDS / plant.dt / len(targets))
 
     reacher = Reacher(plant.controller, MARKER, targets[0])
 
@@ -118,7 +119,7 @@ def _file(folder: Path, gains: str, name: str) -> Path:
 
 def _dead(hand: Array, dt: float) -> float:
     """The longest time [s] in which the hand (T, 3) m was SLOW although NEAR where it ends it was not."""
-    window = max(1, round(0.1 / dt))  # the play of the motors makes single ticks count for nothing
+    window = max(1, round(WINDOW / dt))  # the play of the motors makes single ticks count for nothing
     speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
     stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
     begins = np.flatnonzero(stopped & ~np.r_[False, stopped[:-1]])
