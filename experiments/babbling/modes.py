@@ -17,6 +17,7 @@ _ROBOT = """title = "Babbling {title}"
 
 [shared]
 mode = "lock"
+patience = 20
 robot = "icub"
 world = {world}
 seed = {seed}

@@ -36,6 +36,8 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Seed of everything random in this service."""
     mode: Literal["free", "lock"] = "free"
     """The clock on the wall sets the pace, or lockstep: every tick waits for all who take part, as fast as they are."""
+    patience: Annotated[float, Meta(ge=2, le=60)] = 2.0
+    """Lockstep: s of the clock on the wall after which who has not answered counts as lost; more where others use the machine too."""
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:

@@ -16,7 +16,6 @@ from bus_schema.messages import StepDone, Turn
 from services.common.delivery import STEP
 from services.common.service import Service
 
-CEILING = 2.0  # s of the clock on the wall for one tick: who has not answered then is out
 TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long at every tick and again before it answers
 
 
@@ -51,10 +50,18 @@ class Barrier:
     """
 
     def __init__(
-        self, service: Service, participants: Iterable[str], tell: Callable[[str, str], None], referee: str = "controller"
+        self,
+        service: Service,
+        participants: Iterable[str],
+        tell: Callable[[str, str], None],
+        referee: str = "controller",
+        patience: float = 2.0,
     ) -> None:
-        """`tell` hears (who, why) of all that makes a run one that cannot be repeated; `referee` says who is busy."""
-        self._service, self._tell, self._referee = service, tell, referee
+        """`tell` hears (who, why) of all that makes a run one that cannot be repeated; `referee` says who is busy.
+
+        `patience`: s of the clock on the wall for one tick; who has not answered then is out.
+        """
+        self._service, self._tell, self._referee, self._patience = service, tell, referee, patience
         self._expected = set(participants)
         self._present: set[str] = set()
         self._answers: dict[str, StepDone] = {}
@@ -83,10 +90,10 @@ class Barrier:
         """Handle what comes until tick k is answered by all, or until those who have not are late: these are dropped, and named."""
         if self._referee not in self._present:
             self._give_turns(())
-        self._service.spin(time.monotonic() + CEILING, lambda: not self.missing(k))
+        self._service.spin(time.monotonic() + self._patience, lambda: not self.missing(k))
         late = self.missing(k)
         for who in late:
-            self._drop(who, f"has not answered tick {k} within {CEILING:g} s")
+            self._drop(who, f"has not answered tick {k} within {self._patience:g} s")
         return late
 
     def _drop(self, who: str, why: str) -> None:

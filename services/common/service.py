@@ -27,7 +27,7 @@ from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
 from services.common.delivery import LATEST, STEP
 from services.common.inbox import CROWDED, CROWDED_WITH_CALLS, Inbox, Newest
-from services.common.session import open_client, spare_threads
+from services.common.session import LEASE, open_client, spare_threads
 
 _M = TypeVar("_M", bound=Message)
 _Q = TypeVar("_Q", bound=Request)
@@ -64,7 +64,8 @@ class Service:
         self.log = log.set_up(who)
         if config.mode == "lock":
             spare_threads()
-        session = session or open_client(config.endpoint, namespace=config.namespace)
+        lease = config.patience if config.mode == "lock" else LEASE
+        session = session or open_client(config.endpoint, namespace=config.namespace, lease=lease)
         self.inbox = inbox or Inbox()
         try:
             self._begin(session, robot)

@@ -11,12 +11,12 @@ import zenoh
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
+LEASE = 1.0  # s
 
 _COMMON = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
-    "transport/link/tx/lease": 1000,
     "transport/unicast/open_timeout": 2000,  # ms; a listener that says nothing blocks `open` so long, and signals with it
     "timestamping/enabled": {"router": True, "peer": True, "client": True},  # events keep a history
 }
@@ -29,9 +29,9 @@ class BusUnreachable(Exception):
     """No router where one was expected; the message names the endpoint and the remedy."""
 
 
-def _config(namespace: str, settings: dict[str, object]) -> zenoh.Config:
+def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.Config:
     config = zenoh.Config()
-    for path, value in {**_COMMON, "namespace": namespace, **settings}.items():
+    for path, value in {**_COMMON, "namespace": namespace, "transport/link/tx/lease": round(1e3 * lease), **settings}.items():
         config.insert_json5(path, json.dumps(value))
     return config
 
@@ -44,10 +44,11 @@ def spare_threads() -> None:
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 
 
-def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE) -> zenoh.Session:
+def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
     """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: the robot that its keys are about, or the filter in front of it; one chunk of a key.
+    `namespace`: the robot that its keys are about, or the filter in front of it; one chunk of a key.  `lease`: s of silence after
+    which this process counts as dead.
     """
     settings: dict[str, object] = {
         "mode": "client",
@@ -57,7 +58,7 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
     give_up = time.monotonic() + patience
     while True:
         try:
-            return zenoh.open(_config(namespace, settings))
+            return zenoh.open(_config(namespace, lease, settings))
         except zenoh.ZError as error:
             if time.monotonic() >= give_up:
                 raise BusUnreachable(
@@ -67,11 +68,11 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
             time.sleep(0.1)
 
 
-def open_router(endpoint: str) -> zenoh.Session:
+def open_router(endpoint: str, lease: float = LEASE) -> zenoh.Session:
     """The router every service connects to, listening at `endpoint`; raises BusUnreachable when that is taken."""
     settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint]}
     try:
-        return zenoh.open(_config(NAMESPACE, settings))
+        return zenoh.open(_config(NAMESPACE, lease, settings))
     except zenoh.ZError as error:
         raise BusUnreachable(
             f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop --endpoint {endpoint}` ends it; "

@@ -31,6 +31,7 @@ class Program:
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
+    patience: float = 0.0  # s for which it may be silent at least
 
 
 @dataclass

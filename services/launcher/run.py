@@ -19,7 +19,7 @@ from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router, spare_threads
+from services.common.session import DEFAULT_ENDPOINT, LEASE, BusUnreachable, open_router, spare_threads
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_lockstep, check_ports, check_robots
 from services.launcher.child import Program
 from services.launcher.engine import EngineMissing, compile_engine
@@ -65,7 +65,7 @@ def launch(options: Options) -> int:
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
         if scenario.is_locked:
             spare_threads()
-        session = open_router(endpoint)
+        session = open_router(endpoint, max(part.config.patience for part in scenario.parts) if scenario.is_locked else LEASE)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
     except (MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
@@ -219,6 +219,7 @@ def _programs(scenario: Scenario, directory: Path) -> list[Program]:
             after=part.entry.after,
             nice=part.entry.nice,
             vital=part.entry.vital,
+            patience=part.config.patience if scenario.is_locked else 0.0,
         )
         for part in scenario.parts
     ]

@@ -107,7 +107,7 @@ class Supervisor:
 
     def _is_frozen(self, child: Child, now: float) -> bool:
         """Both, since a call to a process whose connection was dropped fails at once, and the launcher itself may have been stopped."""
-        limit = FROZEN_LATE if child.program.nice else FROZEN
+        limit = max(FROZEN_LATE if child.program.nice else FROZEN, child.program.patience)
         return child.unanswered >= UNANSWERED and now - child.answered_at >= limit
 
     def ask(self, child: Child) -> None:

@@ -34,7 +34,12 @@ class FilterNode:
         self._clock = twin.bus.publisher(keys.CLOCK, Clock, twin.bus.control)
         self._participant = Participant(service)
         twin.keeps_step = twin.locked
-        self._barrier = Barrier(twin, config.participants, lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"))
+        self._barrier = Barrier(
+            twin,
+            config.participants,
+            lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"),
+            patience=config.patience,
+        )
         self._declare()
 
     def _declare(self) -> None:

@@ -19,7 +19,7 @@ class Lockstep:
     def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
         """`last_tick`: where the run ends, 0: nowhere."""
         self._service, self._guard = service, guard
-        self._barrier = Barrier(service, participants, self._note)
+        self._barrier = Barrier(service, participants, self._note, patience=service.config.patience)
         self._last_tick = last_tick
         self.flaws = 0
         self._told = -TELLS  # monotonic clock
