@@ -89,11 +89,11 @@ def contacts(
     Room settled for the scene.
     """
     m = memory_of(integers, world, work, lists, spare, flags)
-    motors, torques, used = q.ravel(), torque.ravel(), 0
+    used = 0
     m.moved[:] = True
     m.wrench[:] = 0.0
     for b in range(begin, len(q)):
-        joint_angles(integers, floats, motors, b * q.shape[1], m.angles)
+        joint_angles(integers, floats, q[b], 0, m.angles)
         place(integers, floats, slots, m)
         bound_clusters(integers, slots, m.x, m.y, m.z, m.balls)
         pairs = own_pairs(integers, floats, slots, m.x, m.y, m.z, m.balls, m.first, m.second)
@@ -106,7 +106,7 @@ def contacts(
         if (used + rows) * REALS > len(reals):
             return b, used
         if rows > 0:
-            feel(integers, floats, count, cut, m, torques, b * q.shape[1])
+            feel(integers, floats, count, cut, m, torque[b])
             append_rows(b, m.found_numbers, m.found_reals, m.order, count, numbers, reals, np.uint64(used))
             used += rows
     return len(q), used

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.engine.compiled import inlined
+from mobee.engine.compiled import inlined, inner
 from mobee.engine.forces import project
 from mobee.engine.kinematics import place_links, sines_cosines
 from mobee.engine.memory import Memory
@@ -22,9 +22,9 @@ def place(integers: UInts, floats: Array, slots: Array, memory: Memory) -> None:
     place_shapes(integers, floats, memory.frames, memory.moved, slots, memory.x, memory.y, memory.z)
 
 
-@inlined
-def feel(integers: UInts, floats: Array, count: np.uint64, cut: bool, memory: Memory, torque: Array, row: int) -> None:
-    """Put the contacts found in order, and add what they do to the motors to torque[row], torque[row + 1], ...; `cut`: see `project`."""
+@inner
+def feel(integers: UInts, floats: Array, count: np.uint64, cut: bool, memory: Memory, torque: Array) -> None:
+    """Put the contacts found in order, and add what they do to the motors to `torque` (n,); `cut`: see `project`."""
     sort_rows(memory.found_numbers, count, memory.keys, memory.order)
     push_links(memory.found_numbers, memory.found_reals, memory.order, count, memory.wrench)
-    project(integers, floats, memory.frames, memory.wrench, cut, torque, row)
+    project(integers, floats, memory.frames, memory.wrench, cut, torque, 0)

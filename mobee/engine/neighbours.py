@@ -52,6 +52,7 @@ class Around(NamedTuple):
     own_shapes: int
     reaching: int
     skin: float
+    cut: bool
     common: UInts
     slots: Array
 
@@ -73,11 +74,11 @@ def _choose(ints: Ints, most: float, skin: float) -> int:
     return _PLAIN
 
 
-@inlined
-def find(here: Around, q: Array, row: int, m: Memory) -> np.uint64:
-    """Find the contacts of the pose at q[row], q[row + 1], ...; returns how many are in the memory, in no order."""
+@inner
+def find(here: Around, q: Array, m: Memory) -> np.uint64:
+    """Find the contacts of the pose at q (n,); returns how many are in the memory, in no order."""
     fresh = m.header[STATE] == EMPTY or m.header[STATE] == RENEW
-    joint_angles(here.integers, here.floats, q, row, m.angles)
+    joint_angles(here.integers, here.floats, q, 0, m.angles)
     find_moved(here.integers, m.angles, m.last, fresh, m.moved)
     place(here.integers, here.floats, here.slots, m)
     farthest = 0.0
@@ -88,13 +89,12 @@ def find(here: Around, q: Array, row: int, m: Memory) -> np.uint64:
         enough = 0.5 * here.skin
         farthest = measure(here.integers, m.moved, m.frames, m.then, m.arm, m.x, m.y, m.z, m.x0, m.y0, m.z0, enough, m.turn, m.way)
     mode = _choose(m.header, farthest, here.skin)
-    if mode == _USE:
-        return _among_listed(here, m)
-    return _among_all(here, mode == _BUILD, m)
+    building = mode == _BUILD  # as a variable: a constant would be a type of its own, and `look` compiled once more
+    return _among_listed(here, building, m) if mode == _USE else _among_all(here, building, m)
 
 
 @inlined
-def _among_listed(here: Around, m: Memory) -> np.uint64:
+def _among_listed(here: Around, building: bool, m: Memory) -> np.uint64:
     """The contacts of listed pairs."""
     joints = np.int64(here.integers[JOINTS])
     spans, levers = here.wide[len(here.floats) : len(here.floats) + joints], here.wide[len(here.floats) + joints :]
@@ -103,7 +103,7 @@ def _among_listed(here: Around, m: Memory) -> np.uint64:
         here.integers, m.way, here.common, levers, m.bend, m.sway, m.chain, m.first, m.second, m.gap, m.row_of,
         np.uint64(m.header[LISTED]), m.near_first, m.near_second, m.kept_numbers, m.kept_reals, m.found_numbers, m.found_reals,
     )  # fmt: skip
-    return _look(here, False, m.near_first, m.near_second, pairs, found, m)[0]
+    return _look(here, building, m.near_first, m.near_second, pairs, found, m)[0]
 
 
 @inlined
@@ -137,7 +137,7 @@ def _look(
 @entry(
     "Tuple((int64[::1], float64[::1], float64[:,::1]))("
     "uint64[::1], float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], float64[::1], int64[::1], int64, int64, "
-    "float64, uint64[::1], float64[::1], float64[:,::1], float64[::1], uint64[::1], int64[::1], boolean[::1])"
+    "float64, boolean, uint64[::1], float64[::1], float64[:,::1], float64[::1], uint64[::1], int64[::1], boolean[::1])"
 )
 def follow(
     integers: UInts,
@@ -151,6 +151,7 @@ def follow(
     own_shapes: int,
     reaching: int,
     skin: float,
+    cut: bool,
     common: UInts,
     slots: Array,
     q: Array,
@@ -163,21 +164,18 @@ def follow(
 
     `wide`, `wide_places`: `floats` and `places` in which every pair and object reaches farther by the skin [m]; at the end of
     `wide` stand each joint's distance from the one before and each shape's from its own [m].  `common`: the last link that
-    carries both of two links, (L L,).  The last four: as long as `memory.sizes` says, and kept for the same robot, world and
-    reaching link.
+    carries both of two links, (L L,).  `cut`: see `project`.  The last four: as long as `memory.sizes` says, and kept for the same
+    robot, world and reaching link.
     """
-    here = Around(
-        integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, common, slots
-    )  # fmt: skip
+    here = Around(integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, cut, common, slots)
     m = memory_of(integers, world, reals_memory, pairs_memory, ints, flags)
     room, used = 16 + 4 * len(q), 0
     numbers, reals, torque = np.empty(room * NUMBERS, dtype=np.int64), np.empty(room * REALS), np.zeros(q.shape)
-    given, torques = q.ravel(), torque.ravel()
     for b in range(len(q)):
-        count = find(here, given, b * q.shape[1], m)
+        count = find(here, q[b], m)
         if count == _0:
             continue
-        feel(integers, floats, count, False, m, torques, b * q.shape[1])
+        feel(integers, floats, count, cut, m, torque[b])
         rows = np.int64(count)
         if used + rows > room:
             room = 2 * room + rows

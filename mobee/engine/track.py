@@ -44,15 +44,15 @@ class Neighbours:
         numbers, reals, torque = follow(*scene, q, *memory)
         return self._engine.table(snapshot, numbers, reals), torque
 
-    def scene(self, snapshot: Snapshot, reaching: int) -> Around:
-        """What `follow` takes before the poses; what is remembered of another world is forgotten."""
+    def scene(self, snapshot: Snapshot, reaching: int, cut: bool = False) -> Around:
+        """What `follow` takes before the poses; what is remembered of another world is forgotten.  `cut`: see `project`."""
         here = self._engine.scene_of(snapshot)
         if self._known[0] is not here or self._known[1] != reaching:
             self._begin(here, reaching)
         packed, own = here.packed, len(self._engine.robot.shapes)
         return Around(
             packed.integers, packed.floats, self._wide, packed.vertices, here.integers, here.floats, self._wide_places, here.carried,
-            own, reaching, self._skin, self._common, self._slots,
+            own, reaching, self._skin, cut, self._common, self._slots,
         )  # fmt: skip
 
     @property

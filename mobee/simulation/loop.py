@@ -84,13 +84,13 @@ def measure(body: Body, k: int, q: Array) -> bool:
 
 
 @inner_exact
-def feel_pose(here: Around, memory: Memory, cut: bool, q: Array, torque: Array) -> np.uint64:
+def feel_pose(here: Around, memory: Memory, q: Array, torque: Array) -> np.uint64:
     """Fill the sum of J^T (depth * normal) (n,) at q (n,); returns how many contacts there are."""
     for i in range(len(torque)):
         torque[i] = 0.0
-    count = find(here, q, 0, memory)
+    count = find(here, q, memory)
     if count > np.uint64(0):
-        feel(here.integers, here.floats, count, cut, memory, torque, 0)
+        feel(here.integers, here.floats, count, here.cut, memory, torque)
     return count
 
 
@@ -148,7 +148,7 @@ def write(body: Body, law: Law, memory: Memory, count: np.uint64, q: Array, row:
     "UniTuple(int64, 2)("
     # the robot in its scene, see `follow`
     "uint64[::1], float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1], float64[::1], int64[::1], int64, int64, "
-    "float64, uint64[::1], float64[::1], float64[::1], uint64[::1], int64[::1], boolean[::1], boolean, boolean, "
+    "float64, boolean, uint64[::1], float64[::1], float64[::1], uint64[::1], int64[::1], boolean[::1], boolean, "
     # Law
     "int64[::1], float64[::1], float64[::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], "
     # Body
@@ -168,13 +168,13 @@ def run(
     own_shapes: int,
     reaching: int,
     skin: float,
+    cut: bool,
     common: UInts,
     slots: Array,
     reals_memory: Array,
     pairs_memory: UInts,
     ints: Ints,
     flags: Flags,
-    cut: bool,
     felt: bool,
     law_integers: Ints,
     law_floats: Array,
@@ -205,11 +205,11 @@ def run(
 ) -> tuple[int, int]:
     """Run at most that many ticks of dt [s] after the `ticks` there have been; returns how many were run, and why no more.
 
-    `cut`: contacts are felt by their own part only; `felt`: contacts are looked for.  `parts` (P, PART), `tests` (P, 2): actions
+    `cut`: see `project`; `felt`: contacts are looked for.  `parts` (P, PART), `tests` (P, 2): actions
     and their settle tests; `q`, `torque` (n,): encoders and projected depths of the last tick.  `record` (`most`, 3 n + 2), see
     `write`, or without rows.
     """
-    here = Around(integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, common, slots)
+    here = Around(integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, cut, common, slots)
     memory = memory_of(integers, world, reals_memory, pairs_memory, ints, flags)
     law = Law(law_integers, law_floats, settle, law_state, attractor, client, forces, np.empty(len(q)))
     body = Body(living, whole, fixed, state, line, at, commands, mode, substeps, np.uint64(seed), noise)
@@ -220,7 +220,7 @@ def run(
         if not measure(body, k, q):
             return done, LOST
         if felt:
-            count = feel_pose(here, memory, cut, q, torque)
+            count = feel_pose(here, memory, q, torque)
         respond(law, body, k, dt, q, torque)
         move(body, dt)
         if len(record) > 0:

@@ -1,4 +1,7 @@
-"""A robot some of whose motors never move: joints that none of the others drives are gone, and their links one with what carries them."""
+"""A robot reduced to what the forces on some of its motors depend on.
+
+Joints that none of them drives are gone, and their links one with what carries them.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,13 @@ from mobee.kinematics import link_transforms
 from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
 
 
-def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool) -> Robot:
+def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True) -> Robot:
     """The robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
 
-    Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding.
-    `keep_parts`: links of different parts stay apart, so that forces can be cut between them.  Markers, masses and what is
-    carried are left out.
+    Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding, and to the
+    last bit if all are alive.  `keep_parts`: links of different parts stay apart, so that forces can be cut between them.
+    `solids` False: fields alone, for solids exert no forces.  Markers, masses and what is carried are left out.
     """
-    if alive.all():
-        return robot
     kept = (robot.coupling[0][:, alive] != 0.0).any(axis=1)
     if keep_parts:
         kept |= _borders(robot)
@@ -28,7 +29,7 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool) -> Robot
     joint = np.cumsum(kept) - 1  # and each joint
     for j, one in enumerate(robot.joints):
         link[j + 1] = joint[j] + 1 if kept[j] else link[one.parent]
-    shape, solid_pairs, field_pairs = _shapes(robot, link)
+    shape, solid_pairs, field_pairs = _shapes(robot, link, solids)
     return replace(
         robot,
         links=(robot.links[0], *(robot.links[j + 1] for j in np.flatnonzero(kept))),
@@ -69,11 +70,14 @@ def _moved_joint(joint: Joint, brought: Array, link: Ints) -> Joint:
     return replace(joint, parent=int(link[joint.parent]), axis=carrier[:3, :3] @ joint.axis, point=_at(carrier, joint.point))
 
 
-def _shapes(robot: Robot, link: Ints) -> tuple[Ints, Ints, Ints]:
+def _shapes(robot: Robot, link: Ints, solids: bool) -> tuple[Ints, Ints, Ints]:
     """Which shapes remain, and their pairs by the new numbers: those that can move apart."""
     of_shape = np.array([link[shape.link] for shape in robot.shapes], dtype=np.intp)
     solid, fields = (pairs[of_shape[pairs[:, 0]] != of_shape[pairs[:, 1]]] for pairs in (robot.solid_pairs, robot.field_pairs))
     needed = of_shape != 0
+    if not solids:
+        solid = solid[:0]
+        needed &= np.array([shape.role == "field" for shape in robot.shapes], dtype=bool)
     needed[solid.ravel()] = needed[fields.ravel()] = True
     number = np.cumsum(needed) - 1
     return np.flatnonzero(needed), number[solid], number[fields]

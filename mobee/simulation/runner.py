@@ -29,8 +29,10 @@ class Runner:
         self._controller, self._motors, self._dt = controller, motors, dt
         self._substeps = motors.parameters.substeps(dt)
         self._cut = controller.propagate == "part"
-        self._stiff = Neighbours(engine_of(stiffened(robot, alive, self._cut)), SKIN)
-        self._whole: Neighbours | None = self._stiff if alive.all() else None
+        self._alive = alive
+        self._fields = self._neighbours(solids=False)
+        self._solids: Neighbours | None = None  # where they are asked for
+        self._whole: Neighbours | None = None
         self._mode = int(controller.law.integers[MODALITY])
         self._commands = np.zeros((command_age, n))
         if self._mode == POSITION:
@@ -41,8 +43,11 @@ class Runner:
         self._forces = np.zeros((3, n))
         self._loop = compiled().loop
 
-    def run(self, ticks: int, most: int, parts: Ints, tests: Array, kept: bool) -> tuple[Array, int, bool]:
-        """Run up to that many ticks after those there have been; the record, how many were run, whether the state is lost."""
+    def run(self, ticks: int, most: int, parts: Ints, tests: Array, kept: bool, solids: bool) -> tuple[Array, int, bool]:
+        """Run up to that many ticks after those there have been; the record, how many were run, whether the state is lost.
+
+        `kept`: the record is; `solids`: contacts of solids are found too, for its sake.
+        """
         controller, motors = self._controller, self._motors
         motors.begin_substeps(self._dt / self._substeps)
         if self._mode == TORQUE or controller.pushed:  # forces that depend on the pose, beyond what the loop knows
@@ -52,7 +57,7 @@ class Runner:
             client = controller.client_force(self.q)
         record = np.zeros((most if kept else 0, 3 * len(self.q) + 2))
         done, why = self._loop.run(
-            *self._scene(), self._cut, controller.contact_forces or kept,
+            *self._scene(solids), controller.contact_forces or solids,
             controller.law.integers, controller.law.floats, controller.law.settle, controller.state, controller.goal, client, self._forces,
             motors.living, motors.whole, motors.fixed, motors.state, motors.line, motors.at, self._commands, self._mode,
             self._substeps, self._seed, self._noise, parts, tests, self.q, self._torque, record, ticks, self._dt, most,
@@ -61,17 +66,20 @@ class Runner:
             controller.last_forces = Forces(*self._forces.copy())
         return record[:done], done, why == self._loop.LOST
 
-    def _scene(self) -> tuple[Any, ...]:
+    def _scene(self, solids: bool) -> tuple[Any, ...]:
         """The robot in the world of now, and its memory; with all its links where a link is meant by its name."""
         model = self._controller.model
         snapshot = model.world.snapshot
-        near = self._stiff
+        near, reaching = self._fields, -1
         if snapshot.attached or model.reaching is not None:
-            if self._whole is None:
-                self._whole = Neighbours(engine_of(model.robot), SKIN)
-            near = self._whole
-        reaching = -1 if model.reaching is None else model.robot.marker(model.reaching).link
-        return (*near.scene(snapshot, reaching), *near.memory)
+            near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN)
+            reaching = -1 if model.reaching is None else model.robot.marker(model.reaching).link
+        elif solids:
+            near = self._solids = self._solids or self._neighbours(solids=True)
+        return (*near.scene(snapshot, reaching, self._cut), *near.memory)
+
+    def _neighbours(self, solids: bool) -> Neighbours:
+        return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN)
 
     def _pose_forces(self, q: Array) -> Array:
         """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""
