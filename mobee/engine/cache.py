@@ -23,7 +23,7 @@ KEPT = 8  # folders of other versions: checkouts and branches, which are used in
 READY = "ready"  # in a folder that holds everything
 
 _SOURCES = Path(__file__).parents[1]
-_FOLDERS = ("engine", "control", "simulation")  # of the library, where compiled functions are
+_FOLDERS = ("engine", "control", "learning", "simulation")  # of the library, where compiled functions are
 _IMPORT = re.compile(r"^from mobee\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 _NAME = re.compile(r"engine-[0-9a-f]{16}")
 _HARMLESS = ("NUMBA_CACHE_", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")  # settings that change no machine code

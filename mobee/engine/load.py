@@ -18,6 +18,7 @@ MODULES = (
     "mobee.simulation.noise",
     "mobee.simulation.drive",
     "mobee.simulation.loop",
+    "mobee.learning.sweeps",
     "mobee.engine.evaluate",
 )
 PATIENCE = 300.0  # s that a process waits for another that compiles

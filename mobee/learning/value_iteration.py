@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from types import ModuleType
 from typing import Protocol
 
 import numpy as np
@@ -48,29 +50,20 @@ def value_iteration(
     values = np.zeros(len(outcomes)) if start is None else np.array(start, dtype=np.float64)
     if values.shape != (len(outcomes),) or not np.isfinite(values).all():
         raise InvalidValue(f"start has shape {values.shape} or is not finite: give one value for each of the {len(outcomes)} states.")
-    possible = probabilities.any(axis=-1) & (reward != -np.inf)
-    if not np.isfinite(reward[possible]).all():
+    wrong = ~(np.isfinite(reward) | (reward == -np.inf))
+    if wrong.any() and (wrong & probabilities.any(axis=-1)).any():
         raise InvalidValue("reward holds NaN or +inf: valid are finite values, and -inf to take an action out of the plan.")
-    action_values = np.full(outcomes.shape[:2], -np.inf)
-    if possible.any():
-        source = possible.nonzero()[0]
-        action_values[possible] = _iterate(
-            probabilities[possible], outcomes[possible], reward[possible], source, values, discount, tolerance
-        )
+    given = (np.array(x, dtype=t, order="C") for x, t in ((probabilities, np.float64), (outcomes, np.int64), (reward, np.float64)))
+    action_values: Array = _sweeps().sweep(*given, values, discount, tolerance)
     return values, action_values
 
 
-def _iterate(probabilities: Array, outcomes: Ints, reward: Array, source: Ints, values: Array, discount: float, tolerance: float) -> Array:
-    """Sweep to the limit; a row is a possible state-action, its bins are laid end to end; `values` changes in place."""
-    used = probabilities > 0
-    row_starts = np.concatenate([[0], used.sum(axis=1).cumsum()[:-1]])
-    weights, outcomes = discount * probabilities[used], outcomes[used]
-    states, state_starts = np.unique(source, return_index=True)
-    action_values = values[source]
-    while True:
-        updated = np.add.reduceat(weights * values[outcomes], row_starts) + reward
-        change = np.abs(updated - action_values).max()
-        action_values = updated
-        values[states] = np.maximum.reduceat(action_values, state_starts)
-        if change < tolerance or change <= 4 * np.spacing(np.abs(action_values).max()):  # rounding may cycle for ever
-            return action_values
+@cache
+def _sweeps() -> ModuleType:
+    """The compiled sweeps, imported when they are first needed, after the whole engine: a process compiles all at once, or nothing."""
+    from mobee.engine.load import load
+
+    load()
+    from mobee.learning import sweeps
+
+    return sweeps
