@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -13,8 +15,18 @@ if TYPE_CHECKING:
 
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
     """For every part, the names of the world objects in contact (fields included) with a link that it moves; one pose."""
-    touching = [(c.first_link, c.second) for c in pose.contacts if c.second_link < 0]
-    return {part: tuple(sorted({name for link, name in touching if link in moved})) for part, moved in links_moved(pose.robot).items()}
+    return {part: touched_by(pose, part) for part in pose.robot.parts}
+
+
+def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
+    """The names of the world objects in contact (fields included) with a link that the part moves, in order; one pose."""
+    table = pose.table
+    outside = np.flatnonzero(table.second_link < 0)
+    if not len(outside):
+        return ()
+    moved = links_moved(pose.robot)[part]
+    found = {table.name(int(table.second[row])) for row in outside if int(table.first_link[row]) in moved}
+    return tuple(sorted(found))
 
 
 @lru_cache(maxsize=8)

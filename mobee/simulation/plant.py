@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.collision.touch import touched
+from mobee.collision.touch import touched_by
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
 from mobee.control.layout import SETTLED
@@ -84,6 +84,7 @@ class OfflinePlant:
         self._ticks = 0
         self._parts = np.array([[p.start, p.start + len(p), 0, 0] for p in self.robot.parts.values()], dtype=np.int64).reshape(-1, PART)
         self._tests = np.zeros((len(self._parts), 2))
+        self._names = tuple(self.robot.parts)
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
@@ -121,8 +122,7 @@ class OfflinePlant:
 
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
         """
-        names = list(self.robot.parts)
-        if others := [names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if names[p] != part]:
+        if others := [self._names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if self._names[p] != part]:
             raise InvalidValue(f"act({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
         self.begin(part, target)
         return self.advance()[0][1]
@@ -137,7 +137,7 @@ class OfflinePlant:
                 low, high = limits[i]
                 raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
         self.controller.set_attractor(part, target)
-        index = list(self.robot.parts).index(part)
+        index = self._names.index(part)
         asked = self.time - self.dt  # in the tick just over, as live: the next one is the first to see it
         self._tests[index] = asked, asked + self.controller.gains.settle.first_look
         self._parts[index, ACTING] = 1
@@ -162,14 +162,14 @@ class OfflinePlant:
         """That many ticks, whatever the actions under way are at, and what happened in each."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
-            rows.append(self._run(min(left, CHUNK), record=True))
+            rows.append(self._run(min(left, CHUNK), traced=True))
             left -= len(rows[-1])
         return Trace.of(np.concatenate(rows))
 
-    def _run(self, most: int, record: bool = False) -> Array:
+    def _run(self, most: int, traced: bool = False) -> Array:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
-        kept = record or self._digest is not None
-        rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept)
+        kept = traced or self._digest is not None
+        rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept, traced)
         if done:
             self._pose = None
             self._ticks += done
@@ -183,10 +183,10 @@ class OfflinePlant:
         return rows
 
     def _outcome(self, index: int) -> tuple[str, Outcome]:
-        name = list(self.robot.parts)[index]
+        name = self._names[index]
         first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
         duration = self.time - self.dt - float(self._tests[index, 0])
-        return name, Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched(self.model.evaluate(self._q))[name])
+        return name, Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
