@@ -1,5 +1,7 @@
 """The simulated robot: the motors, and the offline plant that runs them with model and controller in one process."""
 
+from mobee.simulation.batch import run_batch as run_batch
 from mobee.simulation.motors import Motors as Motors
 from mobee.simulation.parameters import MotorParameters as MotorParameters
 from mobee.simulation.plant import OfflinePlant as OfflinePlant
+from mobee.simulation.trace import Trace as Trace

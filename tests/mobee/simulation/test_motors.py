@@ -9,6 +9,7 @@ from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue
 from mobee.simulation.motors import MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
+from tests.mobee.simulation.motor_oracle import Oracle
 
 STEP = 0.005
 ALL = slice(None)
@@ -156,6 +157,89 @@ def test_what_is_on_its_way_when_the_mode_changes_is_not_read_in_the_wrong_unit(
     assert m.velocities == pytest.approx(np.full(3, speed))
     run(m, 0.005)
     assert m.velocities == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+EACH = {"lag": (0.0, 0.05, 0.1), "delay": (0.0, 0.02, 0.035), "backlash": (0.0, 0.004, 0.02), "friction": (0.0, 0.1, 0.3)}
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("parameters", [MotorParameters(), IDEAL, MotorParameters(**EACH)], ids=["published", "ideal", "each"])
+def test_whatever_is_commanded_the_motors_do_what_the_oracle_does(parameters: MotorParameters, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    m, oracle = motors(parameters), Oracle(two_part_arm(), parameters, np.zeros(3), STEP)
+    for _ in range(40):
+        where = slice(*sorted(rng.integers(0, 4, 2)))
+        mode = rng.choice(["position", "velocity", "torque", "hold"])
+        reference = None if mode == "hold" else rng.normal(size=where.stop - where.start) * rng.choice([0.1, 3.0, 30.0])
+        m.command(where, mode, reference)
+        oracle.command(where, mode, reference)
+        m.load = oracle.load = rng.normal(size=3)
+        for _ in range(rng.integers(1, 30)):
+            m.drive(STEP)
+            m.integrate()
+            oracle.step()
+        assert np.array_equal(m.q, oracle.q)
+        assert np.array_equal(m.motor_velocities, oracle.motor_v)
+        assert np.array_equal(m.velocities, oracle.velocity)
+
+
+def test_friction_takes_its_velocity_and_holds_what_is_told_less() -> None:
+    m = motors(replace(IDEAL, lag=0.05, friction=(0.0, 0.2, 0.2)))
+    m.command(ALL, "velocity", np.array([0.5, 0.5, -0.15]))
+    run(m, 1.0)
+    assert m.velocities == pytest.approx([0.5, 0.3, 0.0], abs=1e-6)
+
+
+def test_a_load_pulls_a_motor_in_torque_mode_and_the_same_torque_carries_it() -> None:
+    m = motors()
+    m.command(ALL, "torque", np.array([0.0, 0.0, 2.0]))
+    m.load = np.array([0.0, 2.0, 2.0])
+    run(m, 0.5)
+    assert m.in_torque.all() and m.torques.tolist() == [0.0, 0.0, 2.0]
+    assert m.q[1] < -0.05
+    assert m.q[[0, 2]].tolist() == [0.0, 0.0]
+
+
+def test_torques_move_a_joint_through_its_play_and_a_block_stops_the_motor_behind_it() -> None:
+    m = motors(replace(IDEAL, backlash=0.02))
+    m.command(ALL, "torque", np.full(3, 1.0))
+    run(m, 0.1)
+    assert m.q[0] > 0.001
+    m.drive(STEP)
+    m.adopt(m.q)
+    assert m.motor_velocities.tolist() == [0.0] * 3
+
+
+def test_another_substep_keeps_what_is_on_its_way() -> None:
+    m = motors(replace(IDEAL, delay=0.02))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    for _ in range(2):
+        m.drive(0.005)
+        m.integrate()
+    moved = []
+    for _ in range(30):
+        m.drive(0.001)
+        m.integrate()
+        moved.append(m.q[0] > 0.0)
+    assert 10 <= moved.index(True) <= 20
+
+
+def test_parameters_of_another_number_of_motors_are_refused() -> None:
+    with pytest.raises(InvalidValue, match="friction of 2 motors: the robot has 3"):
+        motors(replace(IDEAL, friction=(0.1, 0.1)))
+
+
+def test_a_seed_that_is_no_whole_number_is_refused() -> None:
+    with pytest.raises(InvalidValue, match="seed"):
+        motors(seed=0.5)  # type: ignore[arg-type]
+
+
+def test_motors_that_do_not_live_never_move() -> None:
+    m = Motors(two_part_arm(), MotorParameters(), 0, np.zeros(3), np.array([True, False, True]))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    run(m, 0.5)
+    assert m.q[1] == 0.0 and m.q[0] == m.q[2] > 0.1
+    assert m.encoders(3, 0.02)[1] == 0.0
 
 
 def test_substeps_cover_the_tick() -> None:
