@@ -30,10 +30,14 @@ def load_mujoco() -> Any:
 class MujocoPeer:
     """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo never tests them together."""
 
-    def __init__(self, robot: Robot, objects: Mapping[str, WorldObject]) -> None:
+    def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None) -> None:
+        """`servo`: the gain of velocity servos on all joints, for who lets it step; no gravity then."""
         self._mujoco = load_mujoco()
         self._coupling = robot.coupling
-        self.model = _spec(self._mujoco, robot, objects).compile()
+        spec = _spec(self._mujoco, robot, objects)
+        if servo is not None:
+            _drive(self._mujoco, spec, len(robot.joints), servo)
+        self.model = spec.compile()
         self.data = self._mujoco.MjData(self.model)
         geoms = [shape.name for shape in robot.shapes] + list(objects)
         self._volume = np.empty(self.model.ngeom, dtype=np.intp)  # of each geom: MuJoCo numbers them body by body
@@ -53,6 +57,10 @@ class MujocoPeer:
         self._mujoco.mj_kinematics(self.model, data)
         self._mujoco.mj_collision(self.model, data)
         return int(data.ncon)
+
+    def step(self, count: int) -> None:
+        """Advance by that many of the model's time steps."""
+        self._mujoco.mj_step(self.model, self.data, nstep=count)
 
     def touching(self) -> tuple[Ints, Array]:
         """The pairs (c, 2) of volumes in contact at the last detection, smaller index first, and their greatest depths (c,) m."""
@@ -87,8 +95,15 @@ def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
     return spec
 
 
+def _drive(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
+    spec.option.gravity = np.zeros(3)
+    for index in range(joints):
+        servo = spec.add_actuator(name=f"servo{index}", target=f"joint{index}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_velocity(gain)
+
+
 def _add(mujoco: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
-    kinds = {"sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "box": mujoco.mjtGeom.mjGEOM_BOX}
+    kinds = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in ("sphere", "capsule", "cylinder", "box")}
     size = np.zeros(3)
     size[: len(volume.size)] = volume.size
     size[slice(None) if volume.kind == "box" else slice(1, None)] /= 2.0  # MuJoCo has half lengths

@@ -12,6 +12,7 @@ BENCHES = {
     "lockstep": "the live processes in lockstep, in multiples of real time",
     "agree": "the live processes in lockstep against the offline plant: one law",
     "live": "the live processes in real time: how late commands are",
+    "plant": "the offline plant beside MuJoCo's stepper",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rounds", type=positive_whole, metavar="N", help="turns of everything that is timed (default: 15)")
     parser.add_argument("--quick", action="store_true", help="5 rounds of 500 poses, 50 poses to compare")
     parser.add_argument(
-        "--figure", type=_picture, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)"
+        "--figure", type=picture, metavar="FILE", help="draw cost against objects and primitives instead (.png, .svg, .pdf)"
     )
 
 
@@ -61,7 +61,8 @@ def _figure(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _picture(text: str) -> Path:
+def picture(text: str) -> Path:
+    """A file for a figure, as an argument."""
     path = Path(text)
     if path.suffix not in _PICTURES:
         raise argparse.ArgumentTypeError(f"{text!r} is no picture; valid endings: {', '.join(_PICTURES)}")

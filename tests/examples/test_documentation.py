@@ -55,6 +55,11 @@ def test_the_weight_of_a_robot_is_told(tmp_path: Path) -> None:
     assert 10.0 < energy < 100.0  # J above the waist
 
 
+def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
+    (flow,) = blocks("docs/plant.md", tmp_path)
+    assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
+
+
 def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
     _, check, _ = blocks("docs/robots.md", tmp_path)
     assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [

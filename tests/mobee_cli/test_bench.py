@@ -81,3 +81,19 @@ def test_a_figure_that_cannot_be_written_is_refused_before_anything_is_measured(
     with pytest.raises(SystemExit, match="2"):
         main(["bench", "model", "--figure", given])
     assert given in capsys.readouterr().err
+
+
+def test_the_plant_is_timed_beside_mujoco_and_repeats_itself() -> None:
+    pytest.importorskip("mujoco")
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        code = main(["bench", "plant", "--quick", "--json"])
+    result = json.loads(said.getvalue())
+    assert result["same_hash"]
+    assert [(one["name"], one["least"]) for one in result["requirements"]] == [
+        ("one arm, times real time", 2000.0),
+        ("one arm, actions/s", 700.0),
+        ("three agents at the table, transitions/s", 1500.0),
+    ]
+    assert result["one_arm"]["seconds_per_action"] == pytest.approx(6.4, abs=1.0)
+    assert result["times_mujoco"] == pytest.approx(result["mujoco_us_per_tick"] / result["one_arm"]["us_per_tick"])
+    assert code == (0 if all(one["passed"] for one in result["requirements"]) else 1)
