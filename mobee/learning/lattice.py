@@ -56,6 +56,8 @@ class Lattice:
         self.columns: Ints = indices - part.start
         """Where the lattice joints stand among the motors of the part, shape (d,)."""
         self._limits = robot.limits[indices]
+        self._spans, self._fractions = np.ptp(self._limits, axis=1), np.array(self.levels)
+        self._strides = len(self.levels) ** np.arange(len(joints))
         low, high = robot.limits[part.slice].T
         self._rest_pose = low + rest * (high - low)
 
@@ -112,9 +114,9 @@ class Lattice:
             )
         if not np.isfinite(given).all():
             raise InvalidValue(f"q of {self.part} is not finite: {given.tolist()}.")
-        fraction = (given - self._limits[:, 0]) / np.ptp(self._limits, axis=1)
-        digits = np.abs(fraction[:, None] - np.array(self.levels)).argmin(axis=1)
-        return int(digits @ len(self.levels) ** np.arange(len(digits)))
+        fraction = (given - self._limits[:, 0]) / self._spans
+        digits = np.abs(fraction[:, None] - self._fractions).argmin(axis=1)
+        return int(digits @ self._strides)
 
     def target(self, state: int) -> Array:
         """The state's sample as a pose of the whole part, its other motors at rest: shape (n_part,), in [rad]."""

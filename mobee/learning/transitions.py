@@ -63,6 +63,7 @@ class TransitionModel:
         for chosen in INITIAL[initial]:
             counts, reward = kail_update(counts, chosen)
         self._counts: Array = np.where(exists[:, :, None], counts, 0.0)  # (S, A, bins), 0 where there is no bin
+        self._probabilities: Array = self._counts / np.maximum(self._counts.sum(axis=-1, keepdims=True), 1.0)
         stay = np.broadcast_to(np.arange(len(space))[:, None], exists.shape)
         self._outcomes: Ints = np.where(exists[:, :, None], np.stack([stay, space.goals], axis=-1), 0)
         self._bins: Ints = np.where(exists, len(counts), 0)
@@ -86,9 +87,8 @@ class TransitionModel:
 
     @property
     def probabilities(self) -> Array:
-        """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action."""
-        normalised: Array = self._counts / np.maximum(self._counts.sum(axis=-1, keepdims=True), 1.0)
-        return normalised
+        """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
+        return _read_only(self._probabilities)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
         """States observed and their counts T(s, a), imagined ones included, in order of first observation."""
@@ -108,8 +108,10 @@ class TransitionModel:
         chosen, counts, reward = self._update(state, action, outcome)
         if len(counts) > self._counts.shape[-1]:
             self._counts = np.pad(self._counts, ((0, 0), (0, 0), (0, 1)))
+            self._probabilities = np.pad(self._probabilities, ((0, 0), (0, 0), (0, 1)))
             self._outcomes = np.pad(self._outcomes, ((0, 0), (0, 0), (0, 1)))
         self._counts[state, action, : len(counts)] = counts
+        self._probabilities[state, action] = self._counts[state, action] / self._counts[state, action].sum()
         self._outcomes[state, action, chosen] = outcome
         self._bins[state, action] = len(counts)
         self._reward[state, action] = reward

@@ -119,13 +119,14 @@ def held(whole: Ints, fixed: Array, state: Array, motor: int, dt: float) -> floa
 def drive(motors: Ints, whole: Ints, fixed: Array, state: Array, line: Array, at: Ints, dt: float) -> None:
     """Advance the motor sides by a substep of dt [s].  `line` (rows, n): what is on its way; `at` (1,): the row written last."""
     rows = len(line)
-    now = (at[0] + 1) % rows
+    now = at[0] + 1 if at[0] + 1 < rows else 0
     at[0] = now
     for index in range(len(motors)):
         i = motors[index]
         mode, before = whole[MODE, i], state[MOTOR_V, i]
         line[now, i] = wanted(whole, fixed, state, i)
-        asked = line[(now + rows - whole[DELAY, i]) % rows, i]
+        then = now - whole[DELAY, i]
+        asked = line[then if then >= 0 else then + rows, i]
         state[LEFT, i] = asked if mode == TORQUE else 0.0
         if mode == HOLD:
             after = held(whole, fixed, state, i, dt)
