@@ -99,7 +99,7 @@ def advance(integers: Ints, floats: Array, q: Array, dt: float, attractor: Array
         own = state[OWN_VELOCITY, i]
         a = acceleration(q[i], own, attractor[i], force[i], floats[o + STIFFNESS], floats[o + MAX_SPRING], floats[o + DAMPING])
         v = bounded(own + a * dt, state[SENT, i], floats[o + MAX_SPEED], floats[o + MAX_ACCELERATION] * dt)
-        state[OWN_ACCELERATION, i] = (v - own) / dt
+        state[OWN_ACCELERATION, i] = (v - state[SENT, i]) / dt  # of what is sent: after `hold` the own velocity is 0 and that is not
         state[OWN_VELOCITY, i] = v
         state[SENT, i] = v
         state[REFERENCE, i] = led(state[REFERENCE, i], q[i], v, dt, floats[o + REACH], floats[o + LOW], floats[o + HIGH])
