@@ -22,6 +22,8 @@ from mobee.robot.robot import Array
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
 
+LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far more than any squash lets through, far less than overflows in it
+
 
 class Controller:
     """Eq. 5.7 over all motors of a robot, every tick a command.
@@ -128,7 +130,7 @@ class Controller:
 
     def force(self, f: Array) -> None:
         """Apply a force in configuration space, (n,) rad/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
-        self._client = _checked("force", f, len(self.robot.motors))
+        self._client = _checked_force("force", f, len(self.robot.motors))
 
     def push(self, marker: str, f: Array) -> None:
         """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
@@ -136,7 +138,7 @@ class Controller:
         Per unit mass: J^T f is in rad/s^2 before it is squashed.
         """
         self.robot.marker(marker)
-        self._pushes[marker] = _checked(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
+        self._pushes[marker] = _checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
         """End all forces of the client."""
@@ -174,8 +176,8 @@ class Controller:
     def step(self, q: Array, dt: float, forces: Forces | None = None) -> Command:
         """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model.
 
-        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), and for a q or forces that are
-        not finite.
+        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), for a q that is not finite, and for
+        forces that are not or whose sum is beyond LARGEST_FORCE.
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
@@ -183,7 +185,7 @@ class Controller:
         q = _checked("q", q, n)
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
-        total = _checked("forces", forces.total, n) + self.client_force(q)
+        total = _checked_force("forces", forces.total, n) + self.client_force(q)
         packed = self._packed
         if self.modality == "torque":
             self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
@@ -212,4 +214,12 @@ def _checked(what: str, value: Array, length: int) -> Array:
     if not math.isfinite(array.dot(array)) and not np.isfinite(array).all():  # the first is quick, but overflows
         worst = int(np.argmax(np.nan_to_num(np.abs(array), nan=np.inf)))
         raise InvalidValue(f"{what}: number {worst} is {array[worst]}; must be {length} finite numbers")
+    return array
+
+
+def _checked_force(what: str, value: Array, length: int) -> Array:
+    """A copy of what must be that many numbers of at most LARGEST_FORCE."""
+    array = _checked(what, value, length)
+    if np.abs(array).max(initial=0.0) > LARGEST_FORCE:
+        raise InvalidValue(f"{what}: {array[np.abs(array).argmax()]:.3g}; must be at most {LARGEST_FORCE:g} in size")
     return array

@@ -12,6 +12,7 @@ from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
 from mobee.collision.touch import links_moved
+from mobee.control.controller import LARGEST_FORCE
 from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service
@@ -80,6 +81,10 @@ class GoalDesk:
     def _apply(self, part: str, request: Force) -> None:
         if (request.marker is None) != (request.push is None):
             raise InvalidValue("a push needs both, the marker and the force")
+        largest = LARGEST_FORCE / len(self._robot.parts)  # so that the law takes their sum, whatever other clients push with
+        for number in (*(request.f or ()), *(request.push or ())):
+            if abs(number) > largest:
+                raise InvalidValue(f"a force of {number:.3g}; must be at most {largest:.3g} in size")
         if request.f is None and request.marker is None:
             self.clear(part)
             return

@@ -12,6 +12,7 @@ from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
+from mobee.control.controller import LARGEST_FORCE
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body
@@ -92,6 +93,9 @@ class ControllerNode:
         self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt / clock.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
+        if max(map(abs, (*forces.limits, *forces.constraints, *forces.collision)), default=0.0) > LARGEST_FORCE / 3:
+            self._service.bus.reject("value", f"forces of tick {forces.re_k}: larger than any law makes them")
+            return
         self._forces = forces
         if self._clock is not None and forces.re_k >= self._clock.k:
             self._step()
@@ -154,7 +158,7 @@ class ControllerNode:
 
     def _are_fresh(self, forces: ForcesMessage, k: int) -> bool:
         """Whether they answer a tick near k, and were formed of states of all parts near that tick: a contact concerns many."""
-        return abs(k - forces.re_k) <= OLDEST and max(forces.part_age.values(), default=0) <= STALE
+        return abs(k - forces.re_k) <= OLDEST and all(forces.part_age.get(part, STALE + 1) <= STALE for part in self._robot.parts)
 
     def _supervise(self, clock: Clock, fresh: bool) -> None:
         """Arm what can be armed; what is not under control has no action and rests where it is."""

@@ -346,7 +346,7 @@ class FakeModel:
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
         self.touched: dict[str, list[str]] = {}
-        self.part_age: dict[str, int] = {}  # ns
+        self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
         rig.listen(keys.CLOCK, self._answer)
 

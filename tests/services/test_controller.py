@@ -121,7 +121,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 def run(stage: Stage) -> Iterator[Stage]:
     """The stage in a new run with all parts under control."""
     stage.sim.frozen, stage.sim.silent, stage.sim.refuses_to_arm = False, set(), set()
-    stage.model.silent, stage.model.behind, stage.model.touched, stage.model.part_age = False, 0, {}, {}
+    stage.model.silent, stage.model.behind, stage.model.touched, stage.model.part_age = False, 0, {}, dict.fromkeys(PARTS, 0)
     stage.model.collision[:] = 0.0
     stage.sim.new_run()
     stage.under_control()
@@ -267,6 +267,17 @@ def test_forces_of_a_posture_in_which_one_part_is_old_are_no_forces(run: Stage) 
     run.model.part_age["left_arm"] += 1
     run.ticks(2)
     assert run.statuses() == {"held"}
+    del run.model.part_age["left_arm"]
+    run.ticks(2)
+    assert run.statuses() == {"held"}
+
+
+def test_forces_too_large_to_add_up_are_refused_and_the_robot_holds(run: Stage) -> None:
+    run.model.collision[:] = 1e308
+    run.play(lambda: run.statuses() == {"held"}, "the hold", ticks=10)
+    assert run.rig.stat("controller").rejected["value"] >= 3
+    run.model.collision[:] = 0.0
+    run.under_control()
 
 
 def test_forces_from_the_future_are_no_forces(run: Stage) -> None:
@@ -432,6 +443,18 @@ def test_a_wrong_force_is_refused(run: Stage) -> None:
     assert "does not move" in refused("force", lambda: run.force("left_arm", epoch, marker="right_palm", push=[0.0, 0.0, 1.0]))
     refused("length", lambda: run.force("left_arm", epoch, f=[1.0]))
     refused("epoch", lambda: run.force("left_arm", epoch - 1, f=[0.0] * 16))
+
+
+def test_forces_of_any_size_leave_the_law_with_numbers(run: Stage) -> None:
+    owned = {part: run.own(part, f"agent_{part}")[1] for part in ("torso", "left_arm")}
+    for part, epoch in owned.items():
+        refused("force", lambda part=part, epoch=epoch: run.force(part, epoch, marker="left_palm", push=[1.7e308, 0.0, 0.0]))
+        refused("force", lambda part=part, epoch=epoch: run.force(part, epoch, f=[-1e300] * len(ROBOT.part(part))))
+        run.force(part, epoch, marker="left_palm", push=[1e8, -1e8, 1e8])
+        run.force(part, epoch, f=[-1e8] * len(ROBOT.part(part)))
+    run.ticks(20)
+    assert run.statuses() == {"idle"}
+    assert 0.01 < np.abs([*run.motion("torso").dq, *run.motion("left_arm").dq]).max() <= 1.1
 
 
 def test_forces_end_with_a_hold_and_with_their_owner(run: Stage) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mobee.control import Controller, Forces, Gains
+from mobee.control.controller import LARGEST_FORCE
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
@@ -183,6 +184,7 @@ def test_hold_stops_one_part_within_the_acceleration_limit_and_leaves_the_other(
     assert not controller.velocity[1:].any() and controller.velocity[0] == v[0]
     command = controller.step(before, DT)
     assert np.abs(command.velocity - v).max() <= controller.robot.motor_table[0].max_acceleration * DT
+    assert controller.acceleration == pytest.approx((command.velocity - v) / DT)  # what a torque command is made of
     end = follow(controller, before, 2.0)[-1]
     assert end[1:] == pytest.approx(before[1:], abs=0.05)
     assert end[0] > before[0] + 0.1
@@ -220,6 +222,25 @@ def test_bad_input_is_refused() -> None:
 def test_a_misspelt_attribute_is_refused() -> None:
     with pytest.raises(AttributeError, match="atractor"):
         arm_controller().atractor = GOAL
+
+
+@BOTH
+def test_forces_of_any_size_that_is_taken_leave_the_law_with_numbers(gains: Gains) -> None:
+    controller = arm_controller(gains=gains)
+    marker = next(iter(controller.robot.markers))
+    for size in (LARGEST_FORCE, -LARGEST_FORCE):
+        controller.reset(STRETCHED)
+        controller.force(np.full(3, size))
+        controller.push(marker, np.array([size, -size, size]))
+        velocity = controller.step(STRETCHED, DT, Forces(np.full(3, size), np.zeros(3), np.zeros(3))).velocity
+        assert np.sign(velocity).tolist() == [np.sign(size)] * 3
+    for beyond in (1.01 * LARGEST_FORCE, 1.7e308):
+        with pytest.raises(InvalidValue, match="at most 1e[+]09"):
+            controller.force(np.full(3, beyond))
+        with pytest.raises(InvalidValue, match="at most 1e[+]09"):
+            controller.push(marker, np.array([0.0, -beyond, 0.0]))
+        with pytest.raises(InvalidValue, match="at most 1e[+]09"):
+            controller.step(STRETCHED, DT, Forces(np.full(3, beyond), np.zeros(3), np.zeros(3)))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
