@@ -25,7 +25,7 @@ PATIENCE = 300.0  # s that a process waits for another that compiles
 
 
 def load() -> None:
-    """Import what is compiled; after an install or an edit this takes half a minute, with progress on standard error."""
+    """Import what is compiled; after an install or an edit this takes about a minute, with progress on standard error."""
     if MODULES[-1] in sys.modules:
         return
     from mobee.engine.compiled import FOLDER

@@ -48,7 +48,7 @@ class Progress(event.Listener):
         if self._total > 0:
             return
         self._total = sum(len(_DECORATED.findall(file.read_text())) for file in compiled_sources())
-        say(f"compiling the engine into {self._folder}, once after an install or an edit: about half a minute ...")
+        say(f"compiling the engine into {self._folder}, once after an install or an edit: about a minute ...")
 
     def on_end(self, event: Any) -> None:
         """A function is compiled."""
