@@ -1,7 +1,7 @@
 """A humanoid that learns by curiosity to plan and to reach, while a reactive layer keeps it safe."""
 
 from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
-from mobee.control import Command, Controller, Forces, Gains, constraint_forces
+from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, constraint_forces, reach_path
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.lattice import Lattice
@@ -13,7 +13,7 @@ from mobee.plant import Outcome, Plant
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
-from mobee.simulation import MotorParameters, OfflinePlant
+from mobee.simulation import MotorParameters, OfflinePlant, run_batch
 
 __all__ = [
     "ActionInterrupted",
@@ -33,6 +33,8 @@ __all__ = [
     "Outcome",
     "Plant",
     "Pose",
+    "ReachPath",
+    "Reacher",
     "Robot",
     "RobotFileError",
     "TransitionModel",
@@ -46,7 +48,9 @@ __all__ = [
     "join_robots",
     "load_robot",
     "load_world",
+    "reach_path",
     "run",
+    "run_batch",
     "sphere",
     "value_iteration",
 ]

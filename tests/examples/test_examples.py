@@ -33,7 +33,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 
 def test_each_example_has_its_own_number_and_fits_a_hundred_lines() -> None:
-    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 9)]
+    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 10)]
     assert {path.name: len(path.read_text().splitlines()) for path in EXAMPLES.values() if len(path.read_text().splitlines()) > 100} == {}
 
 
@@ -109,3 +109,12 @@ def test_08_sees_the_left_arm_move_and_leaves_nothing_running(tmp_path: Path) ->
     ticks, angles = zip(*seen, strict=True)
     assert len(seen) == 5 and list(ticks) == sorted(set(ticks))
     assert np.ptp(angles) > 1
+
+
+def test_09_reaches_what_is_in_reach_and_rests_before_what_is_not(tmp_path: Path) -> None:
+    text = printed("09", tmp_path)
+    assert numbers(r"in advance: reached after \d+ steps, (\S+) mm from", text)[0] <= 1.0
+    outcome = r" s, palm (\S+) cm from the target, 0 solids touch"
+    assert numbers(r"in front: reached after \S+" + outcome, text)[0] <= 0.5
+    assert numbers(r"out of reach: stuck after \S+" + outcome, text)[0] > 10
+    assert numbers(r"under the table's top: stuck after \S+" + outcome, text)[0] > 5

@@ -1,0 +1,45 @@
+"""A hand is drawn to a point: once as a path in advance, once as a force while everything else acts too (thesis Algorithm 5).
+
+`reach_path` is kinematics alone. A `Reacher` pulls at the marker through the Jacobian transpose, tick by tick, and the limits,
+constraints and contacts of example 04 act as ever. Out of reach it rests where it is nearest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import mobee
+
+PATIENCE = 20.0  # s
+
+robot = mobee.load_robot("icub")
+model = mobee.Model(robot, mobee.load_world("table"))
+home = model.evaluate(robot.home).position("left_palm")
+targets = {
+    "in front": home + [-0.05, 0.0, 0.10],
+    "out of reach": home + [-0.50, 0.0, 0.10],
+    "under the table's top": home + [-0.02, 0.0, -0.15],
+}
+
+path = mobee.reach_path(model, "left_palm", targets["in front"], robot.home)
+print(f"in advance: {path.end} after {len(path.q) - 1} steps, {1000 * path.distance:.1f} mm from the target\n")
+
+plant = mobee.OfflinePlant(model, seed=0)
+
+
+def measured() -> np.ndarray:
+    """What the encoders of all motors say, in rad."""
+    return np.concatenate([plant.measure(part) for part in robot.parts])
+
+
+for name, target in targets.items():
+    reacher = mobee.Reacher(plant.controller, "left_palm", target)
+    begin, status = plant.time, "reaching"
+    while status == "reaching" and plant.time < begin + PATIENCE:
+        status = reacher.update(measured(), plant.dt)
+        plant.tick()
+    reacher.stop(measured())
+    pose = model.evaluate(plant.motors.q)
+    solids = sum(contact.kind == "solid" for contact in pose.contacts)
+    away = 100 * np.linalg.norm(pose.position("left_palm") - target)
+    print(f"{name}: {status} after {plant.time - begin:.1f} s, palm {away:.1f} cm from the target, {solids} solids touch")
