@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
+from experiments.options import positive_number, positive_whole
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 
@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a setting: services.model.contact_forces=false",
     )
     parser.add_argument("--headless", action="store_true", help="leave the monitor out")
-    parser.add_argument("--duration", type=_seconds, metavar="S", help="seconds of real time to run, from when all services are ready")
-    parser.add_argument("--ticks", type=_whole, metavar="N", help="lockstep: end after so many ticks of the robot (shared.mode=lock)")
+    parser.add_argument("--duration", type=positive_number, metavar="S", help="seconds to run, from when all services are ready")
+    parser.add_argument("--ticks", type=positive_whole, metavar="N", help="lockstep: end after so many ticks (shared.mode=lock)")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     parser.add_argument("--endpoint", metavar="ADDRESS", help="where the router listens (default: the scenario's, or tcp/127.0.0.1:7447)")
     parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="where the run's folder is made (default: runs)")
@@ -47,19 +47,3 @@ def run(arguments: argparse.Namespace) -> int:
             runs=arguments.runs,
         )
     )
-
-
-def _whole(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number of ticks")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not 0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number of seconds")
-    return seconds
