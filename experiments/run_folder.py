@@ -7,7 +7,8 @@ import platform
 import re
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,25 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
     if begun != name:
         raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
     return options
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Keep other processes away from a run meanwhile; raises InvalidValue if one is at it, OSError if config.json cannot be opened."""
+    with (folder / CONFIG).open("r+") as config:
+        _lock(config.fileno(), folder)
+        yield  # let go when the file is closed, at the latest when the process ends
+
+
+def _lock(config: int, folder: Path) -> None:
+    try:
+        import fcntl
+    except ImportError:  # not on Windows: there, nobody is kept away
+        return
+    try:
+        fcntl.flock(config, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InvalidValue(f"{folder}: another process is at this run. Wait until it ends, or begin a new run without --resume.") from None
 
 
 def newest_run(runs: Path, name: str) -> Path:

@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import RESULTS, given_run, new_run, newest_run, options_of, write
+from experiments.run_folder import RESULTS, given_run, held, new_run, newest_run, options_of, write
 from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
 
@@ -66,7 +66,7 @@ def _list(arguments: argparse.Namespace) -> int:
 
 def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser], given: Sequence[str]) -> argparse.Namespace:
     """Options of the run; those of a run that is resumed are its own unless they are given again."""
-    notes = (experiment.__doc__ or "").strip()
+    notes = _wrapped((experiment.__doc__ or "").strip())
     parser = make_parser(
         prog=f"mobee experiment run {experiment.NAME}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -82,12 +82,19 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     return parser.parse_args(given)
 
 
+def _wrapped(notes: str) -> str:
+    """Paragraphs, filled to the terminal's width."""
+    columns = shutil.get_terminal_size().columns
+    return "\n\n".join(textwrap.fill(" ".join(text.split()), columns, break_on_hyphens=False) for text in notes.split("\n\n"))
+
+
 def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     try:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
         folder = options.resume or new_run(options.runs, experiment.NAME, own)
-        results = experiment.run(options, folder)
-        write(folder / RESULTS, results)
+        with held(folder):
+            results = experiment.run(options, folder)
+            write(folder / RESULTS, results)
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
     except KeyboardInterrupt:

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import mobee
-from experiments.run_folder import given_run, new_run, newest_run, options_of
+from experiments.run_folder import given_run, held, new_run, newest_run, options_of
 
 
 def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
@@ -39,3 +39,11 @@ def test_a_folder_that_is_not_there_is_answered_with_the_newest(tmp_path):
     assert given_run(folder, tmp_path, "flood") == folder
     with pytest.raises(mobee.InvalidValue, match=f"there is no such folder. The newest run of 'flood' is {folder}"):
         given_run(tmp_path / "nope", tmp_path, "flood")
+
+
+def test_a_run_belongs_to_one_process_at_a_time(tmp_path):
+    folder = new_run(tmp_path, "flood", {})
+    with held(folder), pytest.raises(mobee.InvalidValue, match="another process is at this run. Wait until it ends"), held(folder):
+        pytest.fail("two hold one run")
+    with held(folder):
+        assert options_of(folder, "flood") == {}

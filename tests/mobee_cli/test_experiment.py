@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.registry import EXPERIMENTS
+from experiments.run_folder import held
 from mobee_cli.__main__ import main
 
 ROOT = Path(__file__).parents[2]
@@ -38,6 +39,23 @@ def test_a_run_leaves_its_options_versions_records_and_results(tmp_path, capsys)
     options = json.loads((folder / "config.json").read_text())["options"]
     assert (options["objects"], options["edits"], options["seed"]) == (2, 3, 3)
     assert {path.name for path in folder.iterdir()} == {"config.json", "versions.json", "results.json", "flood.csv"}
+
+
+@pytest.mark.parametrize("name", list(EXPERIMENTS))
+def test_the_help_of_an_experiment_fits_the_terminal(name, capsys):
+    with pytest.raises(SystemExit):
+        main(["experiment", "run", name, "--help"])
+    assert all(len(line) <= 80 for line in capsys.readouterr().out.splitlines())
+
+
+def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path, capsys):
+    main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+    folder = Path(json.loads(capsys.readouterr().out)["run"])
+    before = (folder / "flood.csv").read_bytes()
+    with held(folder):
+        assert main(["experiment", "run", "flood", "--resume", str(folder)]) == 2
+    assert "another process is at this run" in capsys.readouterr().err
+    assert (folder / "flood.csv").read_bytes() == before
 
 
 def test_a_figure_is_drawn_of_the_newest_run(tmp_path, capsys):
