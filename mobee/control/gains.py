@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Any, Literal
+from numbers import Real
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -16,6 +17,7 @@ Law = Literal["default", "published_2014"]
 ClientSquash = Literal["each", "direction"]
 
 _OF_MOTORS = ("damping", "stiffness", "max_spring", "limit_width", "max_limit", "client_slope", "max_client", "weight")
+_NO_NUMBERS = ("law", "settle", "client_squash", "weights", "motors", "groups")
 Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor names; value)
 
 
@@ -58,8 +60,10 @@ class Gains:
             value = getattr(self, name)
             if isinstance(value, list):  # as JSON has it
                 object.__setattr__(self, name, _tuples(value))
-            if isinstance(value, float):
+            if name not in _NO_NUMBERS:
                 _require_positive(name, value)
+        if self.law not in get_args(Law):
+            raise UnknownName("law", self.law, get_args(Law))
         if isinstance(self.settle, dict):
             object.__setattr__(self, "settle", Settle(**self.settle))
         if self.client_squash not in ("each", "direction"):
@@ -169,5 +173,5 @@ def _first_match(values: Changes, motors: tuple[str, ...], common: float) -> Arr
 
 
 def _require_positive(name: str, value: float) -> None:
-    if not (value > 0 and np.isfinite(value)):
-        raise InvalidValue(f"gain {name} {value}: must be a finite number above 0")
+    if not (isinstance(value, Real) and value > 0 and np.isfinite(value)):
+        raise InvalidValue(f"gain {name} {value!r}: must be a finite number above 0")

@@ -75,6 +75,8 @@ class OfflinePlant:
             raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
         if isinstance(command_age, bool) or not isinstance(command_age, int) or command_age < 1:
             raise InvalidValue(f"command_age {command_age!r}: must be a whole number of ticks, at least 1")
+        if not isinstance(motors, MotorParameters | None):
+            raise InvalidValue(f"motors is {motors!r}; it must be MotorParameters, as MotorParameters.identified(name), or None.")
         self.model, self.robot, self.dt = model, model.robot, dt
         parameters = motors if motors is not None else MotorParameters()
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,9 @@ def test_named_sets() -> None:
         Gains.named("published_2013")
 
 
-@pytest.mark.parametrize("change", [{"damping": 0.0}, {"stiffness": np.inf}, {"weights": (("a", 0.5),)}])
+@pytest.mark.parametrize(
+    "change", [{"damping": 0.0}, {"damping": -5}, {"stiffness": np.inf}, {"stiffness": "50"}, {"weights": (("a", 0.5),)}]
+)
 def test_nonsense_is_refused_with_its_name(change: dict[str, object]) -> None:
     with pytest.raises(InvalidValue, match=next(iter(change)).rstrip("s")):
         replace(Gains.default(), **change)
@@ -62,10 +65,11 @@ def test_gains_with_motors_are_values() -> None:
     [
         ({"stifness": 1.0}, "Did you mean 'stiffness'"),
         ({"damping": -1.0}, r"damping of the motors '\*_elbow' -1"),
+        ({"damping": "much"}, "damping of the motors .* 'much': must be a finite number above 0"),
         ({"weight": 2}, "weight 2"),
     ],
 )
-def test_nonsense_for_some_motors_is_refused(changes: dict[str, float], said: str) -> None:
+def test_nonsense_for_some_motors_is_refused(changes: dict[str, Any], said: str) -> None:
     with pytest.raises((InvalidValue, UnknownName), match=said):
         Gains.default().with_motors("*_elbow", **changes)
 

@@ -163,5 +163,7 @@ def test_bad_input_is_refused() -> None:
         plant.advance()
     with pytest.raises(UnknownName, match="trunk"):
         plant.measure("trunc")
+    with pytest.raises(InvalidValue, match="motors is 'identified'; it must be MotorParameters"):
+        arm_plant(motors="identified")
     with pytest.raises(InvalidValue, match="tick"):
         arm_plant(gains=Gains.published_2014(), dt=0.04)
