@@ -72,6 +72,23 @@ def check_gains(scenario: Scenario) -> None:
         raise ConfigError(f"{scenario.where('shared.gains')}: gains differ: {said}. They share one law: set it once, as shared.gains.")
 
 
+def check_rate(scenario: Scenario) -> None:
+    """Raise ConfigError when the controller would answer no tick, since its gains are unstable at the robot's rate."""
+    from mobee.control.gains import Gains
+    from mobee.control.stability import require_stable
+    from mobee.robot.load import load_robot
+
+    configs = {part.entry.module: part.config for part in scenario.parts}
+    controller = configs.get("services.controller")
+    rate, gains = getattr(configs.get("services.robot_sim"), "rate", None), getattr(controller, "gains", None)
+    if controller is None or rate is None or gains is None:
+        return
+    try:
+        require_stable(load_robot(controller.robot), Gains.named(gains), 1.0 / rate)
+    except MobeeError as error:
+        raise ConfigError(f"{scenario.where('services.robot_sim.rate')}: rate {rate:g} Hz: {error}") from None
+
+
 def check_lockstep(scenario: Scenario) -> None:
     """Raise ConfigError when only some services keep step, or a number of ticks is asked for where none is exact."""
     modes = {part.who: part.config.mode for part in scenario.parts}

@@ -20,7 +20,16 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, LEASE, BusUnreachable, open_router, spare_threads
-from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_lockstep, check_ports, check_robots
+from services.launcher.checks import (
+    MissingExtra,
+    PortInUse,
+    check_extras,
+    check_gains,
+    check_lockstep,
+    check_ports,
+    check_rate,
+    check_robots,
+)
 from services.launcher.child import Program
 from services.launcher.engine import EngineMissing, compile_engine
 from services.launcher.run_directory import make_run_directory
@@ -34,6 +43,7 @@ INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
 
 _REDRAW = 0.5  # s
 _FOREVER = 1e6  # s
+_STILL = 5.0  # s, lockstep: a robot still at tick 0 so long after all are ready is told of
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,7 @@ def launch(options: Options) -> int:
         check_gains(scenario)
         check_lockstep(scenario)
         check_robots(scenario)
+        check_rate(scenario)
         check_extras(scenario)
         check_ports(scenario)
         compile_engine()
@@ -117,6 +128,8 @@ class _Run:
                 self._tell(f"all ready after {ready:.1f} s" if not self._supervisor.faults else "running without what was given up")
                 if not self._scenario.is_locked:  # in lockstep all count from tick 1 on: the clock on the wall must not show
                     self._mark()
+                else:
+                    self._service.inbox.at(time.monotonic() + _STILL, self._tell_what_is_waited_for)
                 begun = time.monotonic()
                 self._spin(self._options.duration or _FOREVER, self._supervisor.has_arrived)
                 self._ask_last()
@@ -176,6 +189,11 @@ class _Run:
     def _tell(self, text: str) -> None:
         self._service.log.info("%s", text)
         self._screen.tell(text)
+
+    def _tell_what_is_waited_for(self) -> None:
+        sim = self._supervisor.children.get("robot_sim")
+        if sim is not None and sim.stat is not None and sim.stat.numbers.get("tick") == 0.0:
+            self._tell(f"robot_sim has not begun: {sim.stat.text}")
 
     def _draw(self) -> None:
         self._screen.draw(self._children, self._directory)

@@ -107,6 +107,8 @@ def _robot_lines(summary: dict[str, Any]) -> list[str]:
 
 def _lockstep_lines(lockstep: dict[str, Any]) -> list[str]:
     verdict = "can be repeated" if lockstep["repeatable"] else "cannot be repeated, see the events"
+    if not lockstep["ticks"]:
+        verdict = "never begun: somebody did not answer tick 0"
     return [
         f"  lockstep        {lockstep['ticks']} ticks at {_say(lockstep['speed'], '', 1)} x real time; {verdict}",
         f"  states          sha256 {lockstep['states_sha256']}",

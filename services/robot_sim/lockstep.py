@@ -35,6 +35,10 @@ class Lockstep:
         self._began = time.monotonic()
         return not self._barrier.absent()
 
+    def waits_for(self) -> str:
+        """Who has not answered tick 0, for people."""
+        return ", ".join(self._barrier.absent()) or "nobody"
+
     def wait(self, k: int) -> None:
         """Until tick k is answered; then its commands are admitted, whatever the order in which they came.
 

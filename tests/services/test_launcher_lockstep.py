@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from services.common.config import ConfigError
-from services.launcher.checks import check_lockstep, check_robots
+from services.launcher.checks import check_lockstep, check_rate, check_robots
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.summary import as_text, summarise
 from tests.services.test_launcher_summary import RUN, child
@@ -74,3 +74,9 @@ def test_the_summary_says_whether_the_run_can_be_repeated_and_what_its_states_we
     assert not spoilt["lockstep"]["repeatable"]
     assert "cannot be repeated" in as_text(spoilt)
     assert (RUN | summarise([]))["lockstep"] is None
+
+
+def test_a_rate_at_which_the_controller_would_answer_nothing_is_refused() -> None:
+    check_rate(read_scenario("lockstep"))
+    with pytest.raises(ConfigError, match="services.robot_sim.rate.*rate 5 Hz: gains unstable at steps of 0.2 s"):
+        check_rate(read_scenario("lockstep", ["services.robot_sim.rate=5"]))

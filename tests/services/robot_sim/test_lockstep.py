@@ -99,6 +99,7 @@ def bench(started: Bench) -> Iterator[Bench]:
 def test_tick_0_is_repeated_until_answered_and_then_each_tick_waits(bench: Bench) -> None:
     wait_for(lambda: len(bench.clocks) >= 3, "tick 0 again")
     assert {clock.k for clock in bench.clocks} == {0}
+    assert bench.rig.stat("robot_sim").text.endswith("waits for controller")
     bench.begin()
     time.sleep(0.3)
     assert bench.k == 1
