@@ -12,7 +12,6 @@ from typing import Any
 from experiments.launched import summary_of
 from experiments.progress import Progress
 
-RATES = (100, 200, 500, 1000)  # Hz
 QUICK_ENOUGH = {200: 2.0, 1000: 4.0}  # ticks that the age may have at most (p99), up to that rate
 
 

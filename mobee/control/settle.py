@@ -31,8 +31,10 @@ class Settle:
 
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration", "interval", "timeout"):
-            if not getattr(self, name) > 0:
-                raise InvalidValue(f"settle {name} {getattr(self, name)}: must be above 0")
+            if not 0 < getattr(self, name) < np.inf:
+                raise InvalidValue(f"settle {name} {getattr(self, name)}: must be finite and above 0")
+        if not 0 <= self.first_look < np.inf:
+            raise InvalidValue(f"settle first_look {self.first_look} s: must be a finite time, not negative")
 
     @property
     def numbers(self) -> Array:

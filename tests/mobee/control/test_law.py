@@ -75,3 +75,9 @@ def test_the_reference_of_a_motor_that_is_never_moved_is_within_its_limits() -> 
     packed = pack(ICUB, replace(Gains.default(), weights=(("*", 0.0),)))
     state = law().at_rest(packed.integers, packed.floats, ICUB.limits[:, 1] + 0.1)
     assert state[REFERENCE] == pytest.approx(ICUB.limits[:, 1])
+
+
+def test_all_that_the_default_law_pulls_with_together_is_weaker_than_a_limit() -> None:
+    gains = Gains.default()
+    spring, client, limit = (gains.of_motors(name, ICUB.motors) for name in ("max_spring", "max_client", "max_limit"))
+    assert (spring + 2.0 * client < limit).all()  # f_config and f_work are bounded each by itself

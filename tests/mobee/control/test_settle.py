@@ -48,3 +48,9 @@ def test_looks_missed_by_a_late_caller_are_not_made_up_for() -> None:
 def test_a_threshold_of_zero_is_refused() -> None:
     with pytest.raises(InvalidValue, match="speed 0"):
         Settle(speed=0.0, acceleration=1.0)
+
+
+@pytest.mark.parametrize("change", [{"timeout": np.inf}, {"interval": np.nan}, {"first_look": np.nan}, {"first_look": -1.0}])
+def test_times_that_would_never_end_an_action_are_refused(change: dict[str, float]) -> None:
+    with pytest.raises(InvalidValue, match=f"settle {next(iter(change))}"):
+        Settle(speed=0.02, acceleration=0.9, **change)
