@@ -192,7 +192,7 @@ class _Run:
 
     def _tell_what_is_waited_for(self) -> None:
         sim = self._supervisor.children.get("robot_sim")
-        if sim is not None and sim.stat is not None and sim.stat.numbers.get("tick") == 0.0:
+        if not self._over() and sim is not None and sim.stat is not None and sim.stat.numbers.get("tick") == 0.0:
             self._tell(f"robot_sim has not begun: {sim.stat.text}")
 
     def _draw(self) -> None:

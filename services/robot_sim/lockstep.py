@@ -35,9 +35,10 @@ class Lockstep:
         self._began = time.monotonic()
         return not self._barrier.absent()
 
-    def waits_for(self) -> str:
-        """Who has not answered tick 0, for people."""
-        return ", ".join(self._barrier.absent()) or "nobody"
+    def overture(self) -> str:
+        """What tick 0 waits for, in words."""
+        absent = self._barrier.absent()
+        return f"waits for {', '.join(absent)}" if absent else "about to begin"
 
     def wait(self, k: int) -> None:
         """Until tick k is answered; then its commands are admitted, whatever the order in which they came.

@@ -184,7 +184,7 @@ class Node:
         if self._lockstep is None:
             return text, numbers
         speed = self._lockstep.speed(self._dt)
-        pace = f"lockstep at {speed:.1f} x real time" if self._bus.k > 0 else f"waits for {self._lockstep.waits_for()}"
+        pace = f"lockstep at {speed:.1f} x real time" if self._bus.k > 0 else self._lockstep.overture()
         return f"{text}, {pace}", {**numbers, **self._lockstep.numbers(), "speed": speed}
 
     def _words(self) -> Mapping[str, str]:
