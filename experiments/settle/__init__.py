@@ -24,7 +24,8 @@ from experiments.options import positive_number, positive_whole
 from experiments.progress import Progress
 from experiments.records import Records, read_records
 from experiments.settle.figure import draw
-from experiments.settle.responses import Response, postures, responses
+from experiments.settle.responses import Response, model, postures, responses
+from mobee.errors import UnknownName
 
 NAME = "settle"
 CLAIM = "motors alone and whole postures settle in seconds without overshoot, alike at control periods of 1 to 20 ms"
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Step every motor, then whole postures, at every period with both gain sets."""
+    _require_motors(arguments.motors)
     path = folder / RECORDS
     done = {(r.gains, r.period_ms, r.step) for r in read_responses(path)}
     targets = postures(arguments.postures, arguments.seed)
@@ -56,6 +58,13 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                     records.append(response.record())
                     progress.show(share, f"{gains}, {period:g} ms: {response.step}")
     return results(read_responses(path))
+
+
+def _require_motors(names: Sequence[str] | None) -> None:
+    known = model().robot.motors
+    for name in names or ():
+        if name not in known:
+            raise UnknownName("motor", name, known)
 
 
 def read_responses(path: Path) -> list[Response]:

@@ -8,7 +8,7 @@ import pytest
 from experiments import settle
 from experiments.control.ride import Ride
 from experiments.settle.responses import judge, motor_step, postures
-from mobee import Model, load_robot
+from mobee import Model, UnknownName, load_robot
 
 ICUB = load_robot("icub")
 DT = 0.01
@@ -63,3 +63,10 @@ def test_a_small_run_is_told_and_drawn_and_not_done_twice(tmp_path) -> None:
     assert settle.run(arguments, tmp_path) == found
     assert (tmp_path / settle.RECORDS).read_bytes() == written
     assert settle.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_unknown_motor_is_refused_before_anything_is_run(tmp_path) -> None:
+    arguments = argparse.Namespace(gains=["default"], periods=[20.0], postures=1, motors=["l_elbw"], seed=0)
+    with pytest.raises(UnknownName, match="Did you mean 'l_elbow'"):
+        settle.run(arguments, tmp_path)
+    assert not list(tmp_path.iterdir())
