@@ -83,6 +83,7 @@ class OfflinePlant:
         from mobee.simulation.runner import Runner  # machine code, which `import mobee` does not load
 
         self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
+        self._alive = alive
         self._ticks = 0
         self._parts = np.array([[p.start, p.start + len(p), 0, 0] for p in self.robot.parts.values()], dtype=np.int64).reshape(-1, PART)
         self._tests = np.zeros((len(self._parts), 2))
@@ -132,6 +133,8 @@ class OfflinePlant:
     def begin(self, part: str, target: Array) -> None:
         """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test."""
         where = self.robot.part(part)
+        if not self._alive[where.slice].any():
+            raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
         limits = self.robot.limits[where.slice]
         if np.shape(target) == (len(where),):
             outside = ~((target >= limits[:, 0]) & (target <= limits[:, 1]))

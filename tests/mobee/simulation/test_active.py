@@ -79,3 +79,9 @@ def test_a_pattern_that_means_nothing_is_refused_with_the_nearest_name() -> None
         OfflinePlant(Model(load_robot("icub")), active=["left_am"])
     with pytest.raises(InvalidValue, match="at least one"):
         OfflinePlant(Model(load_robot("icub")), active=[])
+
+
+def test_a_part_that_is_not_active_cannot_act() -> None:
+    plant = OfflinePlant(Model(load_robot("icub")), active=["left_arm"])
+    with pytest.raises(InvalidValue, match="torso cannot act: none of its motors is active"):
+        plant.act("torso", np.zeros(3))
