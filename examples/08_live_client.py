@@ -24,6 +24,7 @@ from bus_schema import keys
 from bus_schema.messages import State
 from services.common.config import ServiceConfig
 from services.common.service import Service
+from services.common.session import BusUnreachable
 
 LOOKS, EVERY, PATIENCE = 5, 1.0, 30.0  # times, s, s
 
@@ -70,7 +71,10 @@ if __name__ == "__main__":
     parser.add_argument("--endpoint", help="router of a running system; left out: one is started")
     given = parser.parse_args().endpoint
     if given:
-        watch(given)
+        try:
+            watch(given)
+        except BusUnreachable as error:
+            raise SystemExit(str(error)) from None
     else:
         with own_system() as endpoint:
             watch(endpoint)
