@@ -70,8 +70,8 @@ def report(result: dict[str, Any]) -> str:
             f"{one['seconds_per_action']:>10.2f}"
         )
     lines.append(
-        f"MuJoCo's stepper, one arm: {result['mujoco_us_per_tick']:.1f} us a tick, {result['times_mujoco']:.1f} times ours. It solves"
-        " rigid-body dynamics and contact, which our motors do not have; it has no model, law or encoders."
+        f"MuJoCo's stepper, one arm: {result['mujoco_us_per_tick']:.1f} us a tick, {result['times_mujoco']:.1f} times ours. It solves\n"
+        "rigid-body dynamics and contact, which our motors do not have; it has no model,\nlaw or encoders."
     )
     lines += [
         f"  {one['name']:<44}{one['found']:9.0f}, required {one['least']:g}, aim {one['aim']:g}  {'pass' if one['passed'] else 'SHORT'}"

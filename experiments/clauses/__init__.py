@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                     progress.show(state.tries / tries, f"{gains}, {kind}: worst {state.worst:.2f} degrees after {state.tries} tries")
                 found.setdefault(gains, {})[kind] = results(state)
     held = [found[gains]["attractors"] for gains in found if gains == "default"]
-    passed = all(part["largest_violation_deg"] < ALLOWED for part in held)
+    passed = all(part["largest_violation_deg"] < ALLOWED for part in held) if held else None  # the claim is about the default gains
     return {"passed": passed, "allowed_deg": ALLOWED, **found}
 
 

@@ -91,7 +91,7 @@ def results(found: Sequence[Response]) -> dict[str, Any]:
                 }
     judged = [r for r in found if r.gains == "default"]
     passed = all(r.is_settled and r.overshoot <= OVERSHOOT and r.settling <= (TOGETHER if r.is_posture else ALONE) for r in judged)
-    return {"passed": passed, "each": "median and worst", **table}
+    return {"passed": passed if judged else None, "each": "median and worst", **table}
 
 
 def _median_and_worst(values: Sequence[float]) -> list[float]:

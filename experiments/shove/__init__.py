@@ -69,7 +69,8 @@ def results(found: list[Shoved]) -> dict[str, Any]:
                 "back_within_mm": max((s.away_mm for s in mine if s.force <= GENTLE), default=0.0),
             }
     judged = [s for s in found if s.law == "default" and s.force <= GENTLE]
-    return {"passed": all(s.solid_mm == 0.0 and s.clause_deg <= 0.0 and s.away_mm <= BACK for s in judged), **table}
+    passed = all(s.solid_mm == 0.0 and s.clause_deg <= 0.0 and s.away_mm <= BACK for s in judged)
+    return {"passed": passed if judged else None, **table}  # the claim is about the default gains
 
 
 def figure(folder: Path) -> Path:
