@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import re
+import shutil
 import subprocess
 import time
 from collections.abc import Iterator, Mapping
@@ -34,6 +35,12 @@ def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
     write(folder / CONFIG, {"experiment": name, "options": dict(options)})
     write(folder / VERSIONS, _versions())
     return folder
+
+
+def discard_unused(folder: Path) -> None:
+    """Remove the folder of a run that was refused: it holds what `new_run` has made and nothing else; otherwise it stays."""
+    if {path.name for path in folder.iterdir()} <= {CONFIG, VERSIONS}:
+        shutil.rmtree(folder)
 
 
 def options_of(folder: Path, name: str) -> dict[str, Any]:

@@ -12,9 +12,10 @@ from typing import Any
 
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import RESULTS, given_run, held, new_run, newest_run, options_of, write
+from experiments.run_folder import RESULTS, discard_unused, given_run, held, new_run, newest_run, options_of, write
 from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
+from mobee_cli.results_text import results_text
 
 RUNS = Path("runs")
 _NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it goes on
@@ -93,7 +94,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
         folder = options.resume or new_run(options.runs, experiment.NAME, own)
         with held(folder):
-            results = experiment.run(options, folder)
+            results = _results(experiment, options, folder)
             write(folder / RESULTS, results)
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
@@ -103,8 +104,17 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:
         print(f"run: {folder}")
-        _print(results, "")
+        print(results_text(results, shutil.get_terminal_size().columns))  # 80 in a pipe
     return FAILED if results.get("passed") is False else 0
+
+
+def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    try:
+        return experiment.run(options, folder)
+    except MobeeError:
+        if options.resume is None:
+            discard_unused(folder)
+        raise
 
 
 def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:
@@ -112,15 +122,3 @@ def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:
     path = experiment.figure(given_run(arguments.folder, runs, name) if arguments.folder else newest_run(runs, name))
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0
-
-
-def _print(results: dict[str, Any], indent: str) -> None:
-    for key, value in results.items():
-        label = f"{indent}{str(key).replace('_', ' ')}:"
-        if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
-            print(label)
-            _print(value, f"{indent}  ")
-        elif isinstance(value, dict):
-            print(label, ", ".join(f"{inner} -> {what}" for inner, what in value.items()) or "none")
-        else:
-            print(label, f"{value:.4g}" if isinstance(value, float) else value)

@@ -11,6 +11,7 @@ import pytest
 
 from experiments.registry import EXPERIMENTS
 from experiments.run_folder import held
+from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main
 
 ROOT = Path(__file__).parents[2]
@@ -106,7 +107,24 @@ def test_a_wrong_option_of_an_experiment_is_said_in_one_line(option, capsys):
 def test_a_failed_verdict_fails_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.flood.run", lambda arguments, folder: {"passed": False, "torn": {"rows": 3}})
     assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 1
-    assert "torn: rows -> 3" in capsys.readouterr().out
+    assert "torn:\n  rows: 3\n" in capsys.readouterr().out
+
+
+def test_a_refused_run_leaves_no_folder(tmp_path, capsys):
+    assert main(["experiment", "run", "settle", "--motors", "l_elbo", "--runs", str(tmp_path)]) == 2
+    assert "Did you mean 'l_elbow'" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_refused_after_its_first_record_keeps_it(tmp_path, monkeypatch):
+    def refuse(arguments, folder):
+        (folder / "records.csv").write_text("depth\n1.0\n")
+        raise InvalidValue("no more")
+
+    monkeypatch.setattr("experiments.flood.run", refuse)
+    assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 2
+    (folder,) = tmp_path.iterdir()
+    assert (folder / "records.csv").read_text() == "depth\n1.0\n"
 
 
 def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):

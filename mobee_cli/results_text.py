@@ -1,0 +1,93 @@
+"""The results of an experiment as text that fits a terminal: lines, and tables where many results have the same names."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+GAP = 2  # spaces between the columns of a table
+STEP = 2  # spaces that a level is farther in
+
+
+def results_text(results: Mapping[str, Any], width: int) -> str:
+    """Results, of the types that JSON has, in lines of at most `width` characters where words allow it."""
+    return "\n".join(_entries(results, "", width))
+
+
+def _entries(results: Mapping[str, Any], indent: str, width: int) -> Iterator[str]:
+    for columns, group in groupby(results.items(), key=lambda entry: _columns(entry[1])):
+        rows = dict(group)
+        if columns and len(rows) > 1:
+            yield from _table(rows, columns, indent, width)
+        else:
+            for key, value in rows.items():
+                yield from _entry(_words(key), value, indent, width)
+
+
+def _columns(value: Any) -> tuple[str, ...]:
+    """The names in a row of a table; () for what is no row."""
+    return tuple(value) if isinstance(value, dict) and not any(isinstance(cell, dict) for cell in value.values()) else ()
+
+
+def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
+    if not isinstance(value, dict) or not value:
+        yield textwrap.fill(
+            f"{label}: {_cell(value)}",
+            width,
+            initial_indent=indent,
+            subsequent_indent=f"{indent}{' ' * STEP}",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        return
+    yield f"{indent}{label}:"
+    yield from _entries(value, indent + " " * STEP, width)
+
+
+def _table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str], indent: str, width: int) -> Iterator[str]:
+    """A row a result, over it the names of what is in its columns, a word a line."""
+    labels = [_words(label) for label in rows]
+    stub = len(indent) + max(map(len, labels))
+    cells = {name: [_cell(row[name]) for row in rows.values()] for name in columns}
+    widths = {name: max(map(len, [*_words(name).split(), *cells[name]])) for name in columns}
+    for block in _blocks(columns, widths, width - stub):
+        heads = [_words(name).split() for name in block]
+        height = max(map(len, heads))
+        lines = [[""] * (height - len(head)) + head for head in heads]
+        for row in zip(*lines, strict=True):
+            yield (" " * stub + _line(row, block, widths)).rstrip()
+        for i, label in enumerate(labels):
+            yield f"{indent}{label}".ljust(stub) + _line([cells[name][i] for name in block], block, widths)
+
+
+def _blocks(columns: Sequence[str], widths: Mapping[str, int], room: int) -> Iterator[list[str]]:
+    """Columns that fit side by side; those that do not go into a further table."""
+    block: list[str] = []
+    taken = 0
+    for name in columns:
+        if block and taken + GAP + widths[name] > room:
+            yield block
+            block, taken = [], 0
+        block.append(name)
+        taken += GAP + widths[name]
+    yield block
+
+
+def _line(cells: Sequence[str], block: Sequence[str], widths: Mapping[str, int]) -> str:
+    return "".join(" " * GAP + cell.rjust(widths[name]) for cell, name in zip(cells, block, strict=True))
+
+
+def _words(name: str) -> str:
+    return str(name).replace("_deg_s", " deg/s").replace("_", " ")
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, list | tuple | dict):
+        return ", ".join(map(_cell, value)) or "none"  # a dict here is an empty one
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

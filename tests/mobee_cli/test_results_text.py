@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import hypothesis.strategies as st
+from hypothesis import given
+
+from mobee_cli.results_text import results_text
+
+NAMES = st.text("abcdefgh_", min_size=1, max_size=12)
+SCALARS = st.none() | st.booleans() | st.integers(-999, 999) | st.floats(-1e3, 1e3) | st.text("abc ", max_size=12)
+RESULTS = st.recursive(SCALARS | st.lists(SCALARS, max_size=2), lambda inner: st.dictionaries(NAMES, inner, max_size=5), max_leaves=20)
+
+
+def test_results_of_the_same_names_are_a_table():
+    found = {"default": {"left_hand": {"depth_mm": 0.0, "pair": None}, "chest": {"depth_mm": 1.23456, "pair": "a in b"}}}
+    assert results_text(found, 40).splitlines() == [
+        "default:",
+        "             depth",
+        "                mm    pair",
+        "  left hand      0       -",
+        "  chest      1.235  a in b",
+    ]
+
+
+def test_columns_beyond_the_width_are_in_a_further_table():
+    found = {str(row): {"one": 1, "two": 2, "three": 3} for row in (7, 8)}
+    assert results_text(found, 12).splitlines() == ["   one  two", "7    1    2", "8    1    2", "   three", "7      3", "8      3"]
+
+
+def test_what_stands_alone_is_a_line_each():
+    found = {"passed": True, "judged": None, "objective": [1.0, 0.5], "found": {}, "claims": {"nothing touches": False}}
+    said = ["passed: yes", "judged: -", "objective: 1, 0.5", "found: none", "claims:", "  nothing touches: no"]
+    assert results_text(found, 80).splitlines() == said
+
+
+@given(st.dictionaries(NAMES, RESULTS, max_size=5))
+def test_every_line_fits_the_terminal(results):
+    assert all(len(line) <= 80 for line in results_text(results, 80).splitlines())
