@@ -1,0 +1,1 @@
+"""What the experiments of the thesis' chapter 7 share."""

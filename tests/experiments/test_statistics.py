@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from experiments.statistics import interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
+from mobee.errors import InvalidValue
+
+numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40)
+whole = st.lists(st.integers(0, 6), min_size=1, max_size=15)
+
+
+@given(numbers)
+def test_the_interquartile_mean_is_scipys_trimmed_mean(values):
+    assert interquartile_mean(values) == pytest.approx(stats.trim_mean(values, 0.25), abs=1e-9)
+
+
+def test_the_interquartile_mean_leaves_outliers_out():
+    assert interquartile_mean([1e9, 3.0, 5.0, -1e9]) == 4.0
+
+
+@given(whole, whole)
+def test_the_probability_of_improvement_is_mann_whitneys_u_by_the_number_of_pairs(first, second):
+    u = stats.mannwhitneyu(first, second, method="asymptotic").statistic if len({*first, *second}) > 1 else len(first) * len(second) / 2
+    assert probability_of_improvement(first, second) == pytest.approx(u / (len(first) * len(second)))
+
+
+def test_the_interval_is_scipys_percentile_bootstrap():
+    values = np.random.default_rng(3).gamma(2.0, size=30)
+    theirs = stats.bootstrap(
+        (values,), interquartile_mean, method="percentile", vectorized=False, n_resamples=20_000, rng=1
+    ).confidence_interval
+    assert interval(values, resamples=20_000) == pytest.approx(
+        (theirs.low, theirs.high), abs=0.02
+    )  # 4 standard errors of two bootstraps' ends
+
+
+def test_the_interval_covers_the_truth_as_often_as_it_says():
+    rng = np.random.default_rng(5)
+    covered = [low < 2.0 < high for low, high in (interval(rng.normal(2.0, 1.0, 40), np.mean, seed=i, resamples=300) for i in range(200))]
+    assert 0.88 <= np.mean(covered) <= 0.99
+
+
+def test_strata_keep_the_difference_between_them_out_of_the_interval():
+    values, strata = np.repeat([0.0, 100.0], 10), np.repeat(["easy", "hard"], 10)
+    assert interval(values, np.mean, strata) == (50.0, 50.0)
+    low, high = interval(values, np.mean)
+    assert high - low > 20.0
+
+
+def test_the_interval_follows_its_seed():
+    values = np.random.default_rng(0).normal(size=12)
+    assert interval(values, seed=1) == interval(values, seed=1) != interval(values, seed=2)
+
+
+def test_a_ratio_has_an_interval_in_which_both_groups_are_drawn():
+    rng = np.random.default_rng(1)
+    above, below = rng.normal(1600.0, 20.0, 12), rng.normal(3300.0, 150.0, 10)
+    low, high = ratio_interval(above, below)
+    assert low < ratio(above, below) < high
+    theirs = stats.bootstrap((above, below), ratio, method="percentile", vectorized=False, n_resamples=5000, rng=2).confidence_interval
+    assert (low, high) == pytest.approx((theirs.low, theirs.high), abs=0.003)
+
+
+@pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0, 2.0]]])
+def test_values_without_a_mean_are_refused(values):
+    with pytest.raises(InvalidValue, match="finite numbers"):
+        interquartile_mean(values)
+
+
+def test_each_value_needs_a_stratum():
+    with pytest.raises(InvalidValue, match="one label for each of the 2 values"):
+        interval([1.0, 2.0], strata=["a"])
