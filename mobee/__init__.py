@@ -6,8 +6,10 @@ from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileE
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.lattice import Lattice
 from mobee.learning.parallel import run
+from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
+from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.robot.join import join_robots
@@ -37,8 +39,10 @@ __all__ = [
     "Reacher",
     "Robot",
     "RobotFileError",
+    "Space",
     "TransitionModel",
     "UnknownName",
+    "Voronoi",
     "World",
     "WorldObject",
     "box",

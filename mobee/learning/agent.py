@@ -9,7 +9,7 @@ import numpy as np
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.explorers import EXPLORERS, choose
-from mobee.learning.lattice import Lattice
+from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
 from mobee.plant import Outcome, Plant
@@ -39,7 +39,7 @@ class CuriousAgent:
 
     def __init__(
         self,
-        space: Lattice,
+        space: Space,
         plant: Plant,
         explorer: str = "curious",
         seed: int = 0,

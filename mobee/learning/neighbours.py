@@ -1,26 +1,36 @@
-"""Which states the actions of a lattice state aim at."""
+"""Which states the actions of a state aim at, and which sample is nearest."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from mobee.robot.robot import Array, Ints
 
 NO_ACTION = -1
-DISTANCE_DECIMALS = 9  # distances that agree to here are a tie, whatever the rounding of the fractions
+DISTANCE_DECIMALS = 9  # squared distances that agree to here are a tie, whatever the rounding of the fractions
+ROWS = 1000  # states whose candidates are in memory at a time
 
 
-def lattice_digits(levels: int, joints: int) -> Ints:
-    """The level of each joint in each state, first joint fastest: shape (levels ** joints, joints)."""
-    return np.arange(levels**joints)[:, None] // levels ** np.arange(joints) % levels
+def lattice_strides(sizes: Sequence[int]) -> Ints:
+    """By how much the state's number grows with each joint's level, shape (joints,): the first joint is the fastest."""
+    return np.cumprod([1, *sizes[:-1]]).astype(np.intp)
 
 
-def equidistant_goals(digits: Ints, levels: int) -> Ints:
+def lattice_digits(sizes: Sequence[int]) -> Ints:
+    """The level of each joint in each state, shape (S, joints), from the number of levels of each joint."""
+    digits: Ints = np.arange(np.prod(sizes))[:, None] // lattice_strides(sizes) % np.array(sizes)
+    return digits
+
+
+def equidistant_goals(digits: Ints, sizes: Sequence[int]) -> Ints:
     """The states one lattice step away along one joint, ascending: shape (S, A), padded with NO_ACTION (thesis 7.2)."""
     states = np.arange(len(digits))
-    strides = levels ** np.arange(digits.shape[1])
+    strides = lattice_strides(sizes)
     down = np.where(digits > 0, states[:, None] - strides, NO_ACTION)[:, ::-1]
-    up = np.where(digits < levels - 1, states[:, None] + strides, NO_ACTION)
+    up = np.where(digits < np.array(sizes) - 1, states[:, None] + strides, NO_ACTION)
     goals = np.concatenate([down, up], axis=1)
     missing = goals == NO_ACTION
     to_the_left = np.argsort(missing, axis=1, kind="stable")
@@ -30,16 +40,37 @@ def equidistant_goals(digits: Ints, levels: int) -> Ints:
 def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
     """The nearest other points of each point, ties drawn at random, ascending: shape (S, count).
 
-    One row at a time: memory grows with S, time with S squared.
+    Memory grows with S times count; so does time, where few points are equally far.
     """
     rng = np.random.default_rng(tie_seed)
     goals = np.empty((len(points), count), dtype=np.intp)
-    for state, point in enumerate(points):
-        distance = np.round(((points - point) ** 2).sum(axis=1), DISTANCE_DECIMALS)
-        distance[state] = np.inf
-        last = np.partition(distance, count - 1)[count - 1]
-        certain = np.flatnonzero(distance < last)
-        tied = np.flatnonzero(distance == last)
-        drawn = rng.choice(tied, size=count - len(certain), replace=False)
-        goals[state] = np.sort(np.concatenate([certain, drawn]))
+    search = tree(points)
+    for first in range(0, len(points), ROWS):
+        some = points[first : first + ROWS]
+        reach = np.sqrt(search.query(some, count + 1)[0][:, -1] ** 2 + 10.0 ** (1 - DISTANCE_DECIMALS))
+        near = search.query_ball_point(some, reach, return_sorted=True)
+        for state, candidates in enumerate(near, start=first):
+            goals[state] = _drawn(state, np.array(candidates), points, count, rng)
     return goals
+
+
+def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.random.Generator) -> Ints:
+    """The `count` nearest of the candidates, the state itself left out, ties at the last rank drawn, ascending."""
+    others = candidates[candidates != state]
+    distance = np.round(((points[others] - points[state]) ** 2).sum(axis=1), DISTANCE_DECIMALS)
+    last = np.partition(distance, count - 1)[count - 1]
+    certain = others[distance < last]
+    drawn = rng.choice(others[distance == last], size=count - len(certain), replace=False)
+    return np.sort(np.concatenate([certain, drawn]))
+
+
+def tree(points: Array) -> Any:
+    """A k-d tree of points, shape (S, d)."""
+    from scipy.spatial import KDTree  # 0.1 s, more than the rest of learning takes to import
+
+    return KDTree(points)
+
+
+def nearest(search: Any, point: Array) -> int:
+    """The index of the point of a tree that is nearest to one, shape (d,)."""
+    return int(search.query(point)[1])

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mobee.errors import InvalidValue, UnknownName
-from mobee.learning.lattice import Lattice
 from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
 from mobee.robot.robot import Array, Ints
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -54,7 +54,7 @@ class TransitionModel:
         initial: "50-50" (each action is imagined to fail once and succeed once) or "60-40" (to succeed twice).
     """
 
-    def __init__(self, space: Lattice, initial: str = "50-50") -> None:
+    def __init__(self, space: Space, initial: str = "50-50") -> None:
         if initial not in INITIAL:
             raise UnknownName("initial", initial, INITIAL)
         self.space, self.initial = space, initial

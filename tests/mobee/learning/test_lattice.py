@@ -156,3 +156,36 @@ def test_states_and_actions_beyond_the_space_are_refused():
     for call in (lambda: arm().actions(81), lambda: arm().target(-1), lambda: arm().goal(0, 16)):
         with pytest.raises(InvalidValue, match="valid are 0 to"):
             call()
+
+
+def test_each_joint_may_have_levels_of_its_own():
+    joints = ["l_shoulder_pitch", "l_elbow"]
+    each = [(0.1, 0.9), (0.2, 0.5, 0.8)]
+    space = Lattice(toy_robot(), joints, each, neighbours="equidistant")
+    low, high = space.robot.limits[[space.robot.motor_index(name) for name in joints]].T
+    expected = [(pitch, elbow) for elbow in each[1] for pitch in each[0]]  # pitch fastest
+    assert space.samples == pytest.approx(low + np.array(expected) * (high - low))
+    assert space.actions(2).tolist() == [0, 3, 4]
+    assert [space.state_of(q) for q in space.samples] == list(range(6))
+    by_name = Lattice(toy_robot(), joints, dict(zip(joints[::-1], each[::-1], strict=True)), neighbours="equidistant")
+    assert by_name.settings == space.settings
+    assert space.settings["levels"] == [list(one) for one in each]
+
+
+def test_the_same_levels_for_each_joint_are_those_for_all():
+    assert arm([(0.25, 0.5, 0.75)] * 4).settings == arm().settings
+    assert arm().settings["levels"] == [0.25, 0.5, 0.75]
+
+
+@pytest.mark.parametrize(
+    ("levels", "error", "message"),
+    [
+        ({"l_elbow": (0.2, 0.8)}, InvalidValue, "levels of l_shoulder_pitch are missing"),
+        ({"l_elbow": (0.2, 0.8), "l_elbo": (0.2, 0.8)}, UnknownName, "Did you mean 'l_elbow'"),
+        ([(0.2, 0.8)] * 3, InvalidValue, "levels of 3 joints given"),
+        ([(0.2, 0.8), 0.5], InvalidValue, "at least two ascending fractions"),
+    ],
+)
+def test_levels_that_do_not_fit_the_joints_are_refused(levels, error, message):
+    with pytest.raises(error, match=message):
+        Lattice(toy_robot(), ["l_shoulder_pitch", "l_elbow"], levels)

@@ -1,0 +1,166 @@
+"""The state-action space of one part: states are the Voronoi cells of samples, actions go to samples of other states (thesis 6.2, 6.3)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue
+from mobee.learning.neighbours import NO_ACTION, nearest, tree
+from mobee.robot.robot import Array, Ints, Part, Robot
+
+MAX_STATES = 100_000  # beyond this the space is no learning problem on a robot any more (thesis 7.4)
+NEIGHBOURS = 16  # of the thesis' arms
+
+
+class Space:
+    """States and actions of one part, given by their samples and goals; `Lattice` and `Voronoi` make them.
+
+    A state is the set of poses that are nearer to its sample than to any other, in fractions of the joint ranges; an
+    action is the index of the state it aims at among the state's goals.
+
+    Args:
+        robot: whose motors they are.
+        joints: motor names, all of one part.
+        samples: (S, d) rad, one pose of the joints a state.
+        goals: (S, A) the state that each action aims at; -1, after the last action of a row, where a state has fewer.
+        rest: fraction of its range at which every other motor of the part is kept.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
+    """
+
+    def __init__(self, robot: Robot, joints: Sequence[str], samples: ArrayLike, goals: ArrayLike, rest: float = 0.5) -> None:
+        part, indices = checked_joints(robot, joints)
+        if not 0.0 <= rest <= 1.0:
+            raise InvalidValue(f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay.")
+        self.robot, self.part, self.joints, self.rest = robot, part.name, tuple(joints), rest
+        self.columns: Ints = indices - part.start
+        """Where the joints stand among the motors of the part, shape (d,)."""
+        self.samples: Array = _checked_samples(samples, len(joints))
+        """The centre of each state, shape (S, d), in [rad]."""
+        self.goals: Ints = _checked_goals(goals, len(self.samples))
+        """Goal state of every action, shape (S, A), -1 where a state has no such action."""
+        self._counts: list[int] = (self.goals != NO_ACTION).sum(axis=1).tolist()
+        self._low, self._spans = robot.limits[indices, 0], np.ptp(robot.limits[indices], axis=1)
+        low, high = robot.limits[part.slice].T
+        self._rest_pose = low + rest * (high - low)
+        for array in (self.samples, self.goals, self.columns):
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    def __repr__(self) -> str:
+        kind = type(self).__name__
+        return f"<{kind} of {self.part}: {len(self)} states, {self.state_actions} state-actions>"
+
+    @property
+    def state_actions(self) -> int:
+        """How many pairs of a state and an action there are."""
+        return sum(self._counts)
+
+    def actions(self, state: int) -> Ints:
+        """Goal states in ascending order: action a of the state aims at the a-th of them."""
+        row: Ints = self.goals[self._checked_state(state), : self._counts[state]]
+        return row
+
+    def goal(self, state: int, action: int) -> int:
+        """The state at whose sample the action sets the attractor."""
+        if not 0 <= action < self._counts[self._checked_state(state)]:
+            raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {self._counts[state] - 1}.")
+        return int(self.goals[state, action])
+
+    def state_of(self, q: ArrayLike) -> int:
+        """The state whose sample is nearest in fractions of the joint ranges; a lattice takes the lower one on a border.
+
+        `q`: rad, shape (d,): the joints in their order here, or shape (n_part,): all motors of the part.  When both
+        have the same length it is read as the joints; `q_part[space.columns]` is right in either case.
+        """
+        given = np.asarray(q, dtype=np.float64)
+        if given.shape == self._rest_pose.shape != self.columns.shape:
+            given = given[self.columns]
+        if given.shape != self.columns.shape:
+            raise InvalidValue(
+                f"q has shape {given.shape}: give the {len(self.joints)} joints ({', '.join(self.joints)}) "
+                f"or all {len(self._rest_pose)} motors of {self.part}, in rad."
+            )
+        if not np.isfinite(given).all():
+            raise InvalidValue(f"q of {self.part} is not finite: {given.tolist()}.")
+        return self._cell((given - self._low) / self._spans)
+
+    def target(self, state: int) -> Array:
+        """The state's sample as a pose of the whole part, its other motors at rest: shape (n_part,), in [rad]."""
+        pose: Array = self._rest_pose.copy()
+        pose[self.columns] = self.samples[self._checked_state(state)]
+        return pose
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
+        content = np.round(self.samples, 6).tobytes() + self.goals.astype("<i8").tobytes()
+        digest = hashlib.sha256(content).hexdigest()[:16]
+        return {"robot": self.robot.name, "joints": list(self.joints), "rest": self.rest, "digest": digest}
+
+    def _cell(self, fraction: Array) -> int:
+        """The state of a pose in fractions of the joint ranges, shape (d,)."""
+        return nearest(self._tree, fraction)
+
+    @cached_property
+    def _tree(self) -> Any:
+        return tree((self.samples - self._low) / self._spans)
+
+    def _checked_state(self, state: int) -> int:
+        if not 0 <= state < len(self._counts):
+            raise InvalidValue(f"{self.part} has no state {state!r}: valid are 0 to {len(self._counts) - 1}.")
+        return state
+
+
+def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
+    """The part that the joints belong to and their indices among the robot's motors; refuses what makes no space."""
+    if isinstance(joints, str) or len(joints) == 0:
+        raise InvalidValue(f"joints={joints!r}: give a list of motor names of one part, e.g. {list(robot.motors[:2])}.")
+    if len(set(joints)) < len(joints):
+        raise InvalidValue(f"joints={list(joints)} names a motor twice.")
+    indices = np.array([robot.motor_index(name) for name in joints], dtype=np.intp)
+    parts = sorted({robot.motor_table[i].part for i in indices})
+    if len(parts) > 1:
+        raise InvalidValue(f"joints={list(joints)} lie in several parts ({', '.join(parts)}): make one lattice, and one agent, a part.")
+    for name, (low, high) in zip(joints, robot.limits[indices], strict=True):
+        if not low < high:
+            raise InvalidValue(f"motor {name!r} of {robot.name} cannot move (limits {low} to {high} rad): leave it out of the lattice.")
+    return robot.part(parts[0]), indices
+
+
+def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
+    """How many nearest samples; 16, or all others where there are fewer, if None.  `also`: what else the message calls valid."""
+    if neighbours is None:
+        return min(NEIGHBOURS, states - 1)
+    if isinstance(neighbours, bool) or not isinstance(neighbours, int) or not 1 <= neighbours < states:
+        raise InvalidValue(f"neighbours={neighbours!r}: give a whole number from 1 to {states - 1}{also}.")
+    return neighbours
+
+
+def _checked_samples(samples: ArrayLike, joints: int) -> Array:
+    given = np.array(samples, dtype=np.float64)
+    if given.ndim != 2 or given.shape[1] != joints or len(given) < 2 or not np.isfinite(given).all():
+        raise InvalidValue(
+            f"samples have shape {given.shape}: give at least two finite poses of the {joints} joints, shape (S, {joints}), in rad."
+        )
+    return given
+
+
+def _checked_goals(goals: ArrayLike, states: int) -> Ints:
+    given = np.array(goals, dtype=np.intp)
+    if given.ndim != 2 or len(given) != states or not ((given >= NO_ACTION) & (given < states)).all():
+        raise InvalidValue(
+            f"goals have shape {given.shape}: give one row of states 0 to {states - 1} for each of the {states} states, -1 at the end."
+        )
+    if (np.diff((given == NO_ACTION).astype(np.int8), axis=1) < 0).any() or (given[:, 0] == NO_ACTION).any():
+        raise InvalidValue("goals: give each state at least one action, and -1 only after its last one.")
+    return given

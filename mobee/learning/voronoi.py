@@ -1,0 +1,83 @@
+"""Random samples instead of a lattice: states are their Voronoi cells (thesis 6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue
+from mobee.learning.neighbours import nearest_goals
+from mobee.learning.space import MAX_STATES, Space, checked_joints, checked_neighbours
+from mobee.robot.robot import Array, Ints, Robot
+
+
+class Voronoi(Space):
+    """States are the Voronoi cells of samples drawn at random, or given; actions go to the nearest samples.
+
+    Near means in fractions of the joint ranges.  Thousands of states take seconds and memory in proportion.
+
+    Args:
+        robot: whose motor limits the samples are drawn within.
+        joints: motor names, all of one part.
+        samples: how many to draw uniformly in the joint ranges, or the samples themselves, shape (S, d), in [rad].
+        seed: of the draw; of no effect where the samples are given.
+        neighbours: how many nearest samples each state has actions to.  When left out: 16, or all others where there are fewer.
+        tie_seed: seed of the draw among equally near samples at the last rank (given samples may have ties).
+        rest: fraction of its range at which every other motor of the part is kept.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        joints: Sequence[str],
+        samples: int | ArrayLike,
+        seed: int = 0,
+        neighbours: int | None = None,
+        tie_seed: int = 0,
+        rest: float = 0.5,
+    ) -> None:
+        _, indices = checked_joints(robot, joints)
+        limits = robot.limits[indices]
+        drawn = isinstance(samples, (int, np.integer))
+        poses = _drawn_samples(samples, limits, seed) if drawn else _checked_within(samples, limits, joints)
+        self.seed, self.tie_seed = seed if drawn else None, tie_seed
+        self.neighbours = checked_neighbours(neighbours, len(poses))
+        goals: Ints = nearest_goals((poses - limits[:, 0]) / np.ptp(limits, axis=1), self.neighbours, tie_seed)
+        super().__init__(robot, joints, poses, goals, rest)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
+        made = {"samples": len(self), "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
+        return super().settings | made
+
+
+def _drawn_samples(samples: Any, limits: Array, seed: int) -> Array:
+    if isinstance(samples, bool) or not 2 <= samples <= MAX_STATES:
+        raise InvalidValue(
+            f"samples={samples!r}: give how many to draw, 2 to {MAX_STATES}, or an array of poses (S, {len(limits)}) in rad."
+        )
+    low, high = limits.T
+    return np.random.default_rng(seed).uniform(low, high, size=(samples, len(limits)))
+
+
+def _checked_within(samples: ArrayLike, limits: Array, joints: Sequence[str]) -> Array:
+    given = np.asarray(samples, dtype=np.float64)
+    if given.ndim != 2 or given.shape[1] != len(joints) or not 2 <= len(given) <= MAX_STATES:
+        raise InvalidValue(
+            f"samples have shape {given.shape}: give 2 to {MAX_STATES} poses of {', '.join(joints)}, shape (S, {len(joints)}), in rad."
+        )
+    outside = ~((given >= limits[:, 0]) & (given <= limits[:, 1]))
+    if outside.any():
+        sample, joint = np.argwhere(outside)[0]
+        low, high = limits[joint]
+        raise InvalidValue(f"sample {sample} has {joints[joint]} at {given[sample, joint]}: valid is {low:.4g} to {high:.4g} rad.")
+    if len(np.unique(given, axis=0)) < len(given):
+        raise InvalidValue("samples: two are the same pose, so one of them would have no cell; leave one out.")
+    return given
