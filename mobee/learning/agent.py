@@ -93,8 +93,8 @@ class CuriousAgent:
 
     def decide(self, state: int) -> int:
         """The action to take in a state."""
-        scores = EXPLORERS[self.explorer](self, state)
         rng = np.random.default_rng([self.seed, zlib.crc32(self.part.encode()), self.transitions])
+        scores = EXPLORERS[self.explorer](self, state, rng)
         action = choose(scores, rng)
         self._pending = state, action
         return action

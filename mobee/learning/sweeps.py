@@ -4,53 +4,138 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.engine.compiled import entry_exact
+from mobee.engine.compiled import entry_exact, inner_exact
 from mobee.robot.robot import Array, Ints
 
+BAD_REWARD, BAD_OUTCOME = -1, -2  # instead of the number of sweeps
 _ROUNDING = 4.0 * 2.0**-52  # of a value: changes as small as this may cycle for ever
+_EVALUATED = 60  # improvements that are followed by an evaluation; those after them are plain sweeps, which converge from anywhere
+_EVALUATIONS = 100  # sweeps of one evaluation at most
 
 
-@entry_exact("float64[:,::1](float64[:,:,::1], int64[:,:,::1], float64[:,::1], float64[::1], float64, float64)")
-def sweep(probabilities: Array, outcomes: Ints, reward: Array, values: Array, discount: float, tolerance: float) -> Array:
-    """Jacobi sweeps until no action value changes by `tolerance`: `values` (S,) change in place, action values (S, A) are returned.
+@inner_exact
+def _pack(
+    probabilities: Array,
+    outcomes: Ints,
+    reward: Array,
+    discount: float,
+    first: Ints,
+    ends: Ints,
+    weights: Array,
+    following: Ints,
+    rewards: Array,
+    actions: Ints,
+) -> int:
+    """One row for each action that exists, without empty bins.
 
-    `probabilities` and `outcomes` (S, A, B), `reward` (S, A); what has no probability, or a reward of -inf, is no action: its value
-    is -inf.  A state without actions keeps its value.
+    State s has the rows first[s] .. first[s + 1], a row the bins ends[row] .. ends[row + 1]; `weights` are the discounted
+    probabilities.  Returns the number of rows, or what is wrong.
     """
-    states, actions, bins = outcomes.shape
-    weights, following = np.empty(states * actions * bins), np.empty(states * actions * bins, dtype=np.int64)
-    most = states * actions
-    state, action, ends = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
-    rewards, before = np.empty(most), np.empty(most)
-    rows, used = 0, 0
-    for s in range(states):
-        for a in range(actions):
-            first = used
-            for b in range(bins if reward[s, a] != -np.inf else 0):
-                if probabilities[s, a, b] > 0.0:
+    rows, used, ends[0] = 0, 0, 0
+    for s in range(outcomes.shape[0]):
+        first[s] = rows
+        for a in range(outcomes.shape[1]):
+            if reward[s, a] == -np.inf:
+                continue
+            for b in range(outcomes.shape[2]):
+                if probabilities[s, a, b] != 0.0:
+                    if not 0 <= outcomes[s, a, b] < outcomes.shape[0]:
+                        return BAD_OUTCOME
                     weights[used], following[used] = discount * probabilities[s, a, b], outcomes[s, a, b]
                     used += 1
-            if used > first:
-                state[rows], action[rows], rewards[rows], ends[rows], before[rows] = s, a, reward[s, a], used, values[s]
+            if used > ends[rows]:
+                if not np.isfinite(reward[s, a]):
+                    return BAD_REWARD
+                rewards[rows], actions[rows] = reward[s, a], a
                 rows += 1
-    best, found = values.copy(), np.full((states, actions), -np.inf)
-    while True:
-        change, largest, first, last = 0.0, 0.0, 0, -1
-        for row in range(rows):
-            s, value = state[row], 0.0
-            for k in range(first, ends[row]):
-                value += weights[k] * values[following[k]]
-            first = ends[row]
-            value += rewards[row]
-            change, largest = max(change, abs(value - before[row])), max(largest, abs(value))
-            before[row] = value
-            if s != last or value > best[s]:
-                best[s] = value
-            last = s
-        for s in range(states):
-            values[s] = best[s]
-        if not change >= tolerance or change <= _ROUNDING * largest:
-            break
+                ends[rows] = used
+    first[outcomes.shape[0]] = rows
+    return rows
+
+
+@inner_exact
+def _evaluate(chosen: Ints, ends: Ints, weights: Array, following: Ints, rewards: Array, values: Array, tolerance: float) -> None:
+    """Sweeps over one row a state, each using the newest values, until none changes by `tolerance`."""
+    for _ in range(_EVALUATIONS):
+        change = 0.0
+        for s in range(len(values)):
+            row = chosen[s]
+            if row >= 0:
+                value = rewards[row]
+                for k in range(ends[row], ends[row + 1]):
+                    value += weights[k] * values[following[k]]
+                change = max(change, abs(value - values[s]))
+                values[s] = value
+        if change < tolerance:
+            return
+
+
+@entry_exact(
+    """int64(Array(float64, 3, "C", readonly=True), Array(int64, 3, "C", readonly=True), Array(float64, 2, "C", readonly=True),
+             float64[::1], float64[:,::1], float64, float64, boolean, boolean)"""
+)
+def solve(
+    probabilities: Array,
+    outcomes: Ints,
+    reward: Array,
+    values: Array,
+    found: Array,
+    discount: float,
+    tolerance: float,
+    relative: bool,
+    evaluate: bool,
+) -> int:
+    """Sweep over all actions until no value changes by `tolerance`; `values` (S,) change in place, `found` (S, A) is filled.
+
+    Every sweep finds all action values from the old state values, then all state values (Algorithm 7, which looks at the
+    changes of the action values).  With `evaluate` each is followed by sweeps over the best action of each state alone
+    (modified policy iteration, which looks at the changes of the state values).
+
+    `probabilities` and `outcomes` (S, A, B) are read where they are; what has no probability, or a `reward` (S, A) of -inf, is
+    no action: its value is -inf.  A state without actions keeps its value.  Returns the number of sweeps over all actions, or
+    what is wrong.
+    """
+    states, most = len(values), reward.size
+    first, ends = np.empty(states + 1, dtype=np.int64), np.empty(most + 1, dtype=np.int64)
+    weights, following = np.empty(outcomes.size), np.empty(outcomes.size, dtype=np.int64)
+    rewards, actions = np.empty(most), np.empty(most, dtype=np.int64)
+    rows = _pack(probabilities, outcomes, reward, discount, first, ends, weights, following, rewards, actions)
+    if rows < 0:
+        return rows
+    limit, largest = tolerance, 0.0
     for row in range(rows):
-        found[state[row], action[row]] = before[row]
-    return found
+        largest = max(largest, abs(rewards[row]))
+    if relative and largest > 0.0:
+        limit *= largest
+    new, chosen, before, sweeps = values.copy(), np.empty(states, dtype=np.int64), np.empty(rows), 0
+    for s in range(states):
+        before[first[s] : first[s + 1]] = values[s]
+    while True:
+        change, largest = 0.0, 0.0
+        for s in range(states):
+            best, at = -np.inf, -1
+            for row in range(first[s], first[s + 1]):
+                value = 0.0
+                for k in range(ends[row], ends[row + 1]):
+                    value += weights[k] * values[following[k]]
+                value += rewards[row]
+                if not evaluate and abs(value - before[row]) > change:
+                    change = abs(value - before[row])
+                before[row] = value
+                if value > best:
+                    best, at = value, row
+            chosen[s] = at
+            if at >= 0:
+                new[s], largest = best, max(largest, abs(best))
+                if evaluate and abs(best - values[s]) > change:
+                    change = abs(best - values[s])
+        values[:], sweeps = new, sweeps + 1
+        if change < limit or change <= _ROUNDING * largest:
+            break
+        if evaluate and sweeps <= _EVALUATED:
+            _evaluate(chosen, ends, weights, following, rewards, values, 0.5 * (1.0 - discount) * limit)
+    found[:] = -np.inf
+    for s in range(states):
+        for row in range(first[s], first[s + 1]):
+            found[s, actions[row]] = before[row]
+    return sweeps

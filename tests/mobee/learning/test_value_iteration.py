@@ -1,38 +1,14 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.transitions import TransitionModel
-from mobee.learning.value_iteration import value_iteration
+from mobee.learning.value_iteration import METHODS, value_iteration
+from tests.mobee.learning.tables import Table, chain, random_problem
 from tests.mobee.learning.toys import arm
-
-
-@dataclass
-class Table:
-    """A model given by its tables."""
-
-    outcomes: np.ndarray
-    probabilities: np.ndarray
-
-
-def policy_iteration(model, reward, discount):
-    """The oracle: dense matrices, exact linear solves."""
-    states, actions, _ = model.outcomes.shape
-    dense = np.zeros((states, actions, states))
-    np.add.at(dense, (*np.ogrid[:states, :actions, :1][:2], model.outcomes), model.probabilities)
-    policy = reward.argmax(axis=1)
-    while True:
-        rows = np.arange(states)
-        v = np.linalg.solve(np.eye(states) - discount * dense[rows, policy], reward[rows, policy])
-        q = np.where(reward == -np.inf, -np.inf, reward + discount * dense @ v)
-        better = q.max(axis=1) > q[rows, policy] + 1e-13
-        if not better.any():
-            return v, q
-        policy = np.where(better, q.argmax(axis=1), policy)
 
 
 def experienced(neighbours, seed, transitions=400):
@@ -44,38 +20,105 @@ def experienced(neighbours, seed, transitions=400):
     return model
 
 
+def residual(model, reward, discount, values):
+    """The largest change of a value by one more sweep, states without actions left out."""
+    exists = model.probabilities.any(axis=-1) & (reward != -np.inf)
+    found = np.where(exists, reward + discount * (model.probabilities * values[model.outcomes]).sum(axis=-1), -np.inf)
+    acting = exists.any(axis=1)
+    return np.abs(found[acting].max(axis=1) - values[acting]).max(initial=0.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(60))
+def test_values_of_random_problems_are_those_of_policy_iteration(seed, method):
+    model, reward, discount = random_problem(seed)
+    v, q = value_iteration(model, reward, discount, tolerance=1e-12, relative=True, method=method)
+    exact_v, exact_q = policy_iteration(model, reward, discount)
+    assert np.array_equal(np.isfinite(q), np.isfinite(exact_q))
+    size = np.abs(exact_v).max(initial=1.0)
+    assert np.abs(v - exact_v).max() < 1e-9 * size
+    assert np.abs(q[np.isfinite(q)] - exact_q[np.isfinite(q)]).max(initial=0.0) < 1e-9 * size
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("relative", [False, True])
+@pytest.mark.parametrize("seed", range(20))
+def test_one_more_sweep_changes_no_value_by_the_tolerance(seed, relative, method):
+    model, reward, discount = random_problem(seed)
+    exists = model.probabilities.any(axis=-1) & (reward != -np.inf)
+    start = np.where(exists.any(axis=1), np.random.default_rng(seed).normal(scale=100.0, size=len(reward)), 0.0)
+    v, _ = value_iteration(model, reward, discount, 1e-4, start, relative, method)
+    scale = np.abs(reward[exists]).max(initial=0.0) if relative and exists.any() else 1.0
+    assert residual(model, reward, discount, v) < 1e-4 * scale
+
+
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("neighbours", [16, "equidistant"])
-@pytest.mark.parametrize("discount", [0.0, 0.5, 0.9, 0.99])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_values_are_those_of_exact_policy_iteration(neighbours, discount, sign):
+def test_values_of_an_experienced_model_are_those_of_policy_iteration(neighbours, sign, method):
     model = experienced(neighbours, seed=1)
     reward = np.where(model.reward == -np.inf, -np.inf, sign * model.reward)
-    v, q = value_iteration(model, reward, discount, tolerance=1e-12)
-    exact_v, exact_q = policy_iteration(model, reward, discount)
+    v, q = value_iteration(model, reward, 0.99, tolerance=1e-12, method=method)
+    exact_v, _ = policy_iteration(model, reward, 0.99)
     assert np.abs(v - exact_v).max() < 1e-9
     assert np.array_equal(q == -np.inf, reward == -np.inf)
-    finite = np.isfinite(q)
-    assert np.abs(q[finite] - exact_q[finite]).max() < 1e-9
-    assert np.array_equal(v, q.max(axis=1))
 
 
-def chain():
-    """Six states in a row, one action a state: on to the next; the last stays."""
-    following = np.minimum(np.arange(6) + 1, 5)
-    return Table(following[:, None, None], np.ones((6, 1, 1))), np.array([[-1.0]] * 5 + [[0.0]])
+def test_sweeps_are_those_of_algorithm_7():
+    model = experienced(16, seed=4)
+    exists = model.reward != -np.inf
+    v, before = np.zeros(81), np.where(exists, 0.0, -np.inf)
+    while True:
+        q = np.where(exists, model.reward + 0.9 * (model.probabilities * v[model.outcomes]).sum(axis=-1), -np.inf)
+        change, before, v = np.abs(q[exists] - before[exists]).max(), q, q.max(axis=1)
+        if change < 1e-3:
+            break
+    found_v, found_q = value_iteration(model, model.reward)
+    assert found_v == pytest.approx(v, abs=1e-14)
+    assert found_q[exists] == pytest.approx(q[exists], abs=1e-14)
 
 
-def test_negative_rewards_spread_along_the_chain():
-    v, _ = value_iteration(*chain())
+@pytest.mark.parametrize("method", METHODS)
+def test_a_relative_tolerance_makes_the_plan_independent_of_the_unit_of_the_reward(method):
+    model = experienced("equidistant", seed=5)
+    options = {"tolerance": 0.01, "relative": True, "method": method}
+    _, q = value_iteration(model, model.reward, **options)
+    _, small = value_iteration(model, model.reward / 1024, **options)
+    assert np.array_equal(small * 1024, q)
+
+
+def test_without_any_reward_a_relative_tolerance_is_an_absolute_one():
+    model, _ = chain()
+    v, _ = value_iteration(model, np.zeros((6, 1)), tolerance=1e-3, start=np.full(6, 50.0), relative=True)
+    assert 0 < v.max() < 1e-2
+
+
+def test_it_reads_the_tables_of_a_model_where_they_are(monkeypatch):
+    model = experienced(16, seed=6)
+    seen = []
+    from mobee.learning import sweeps
+
+    solve = sweeps.solve
+    monkeypatch.setattr(sweeps, "solve", lambda *arrays: seen.append(arrays[:3]) or solve(*arrays))
+    value_iteration(model, model.reward)
+    assert all(
+        np.shares_memory(given, own) for given, own in zip(seen[0], (model.probabilities, model.outcomes, model.reward), strict=True)
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_negative_rewards_spread_along_the_chain(method):
+    v, _ = value_iteration(*chain(), method=method)
     assert v == pytest.approx([-4.0951, -3.439, -2.71, -1.9, -1, 0], abs=1e-9)
 
 
-def test_values_fall_after_a_warm_start_when_a_reward_fell():
-    model, reward = chain()
+@pytest.mark.parametrize("method", METHODS)
+def test_values_fall_after_a_warm_start_when_a_reward_fell(method):
+    model, _ = chain()
     high = np.zeros((6, 1))
     high[5] = 1.0
     before, _ = value_iteration(model, high, tolerance=1e-12)
-    after, _ = value_iteration(model, 0.1 * high, tolerance=1e-12, start=before)
+    after, _ = value_iteration(model, 0.1 * high, tolerance=1e-12, start=before, method=method)
     assert after == pytest.approx(0.1 * before, abs=1e-9)
     assert before[5] == pytest.approx(10.0)
 
@@ -124,9 +167,26 @@ def test_entries_without_an_action_are_ignored():
         {"reward": np.full((6, 1), np.nan)},
         {"reward": np.full((6, 1), np.inf)},
         {"start": np.zeros(5)},
+        {"start": np.full(6, np.nan)},
+        {"method": "gauss"},
+        {"tolerance": np.nan},
     ],
 )
 def test_arguments_out_of_range_are_refused(options):
     model, reward = chain()
-    with pytest.raises(InvalidValue, match="valid|give"):
+    with pytest.raises(MobeeError, match="[Vv]alid|give"):
         value_iteration(model, **({"reward": reward} | options))
+
+
+def test_a_model_that_leads_out_of_its_states_is_refused():
+    model, reward = chain()
+    for state in (6, -1):
+        model.outcomes[5] = state
+        with pytest.raises(InvalidValue, match="valid are 0 to 5"):
+            value_iteration(model, reward)
+
+
+def test_tables_of_unequal_shape_are_refused():
+    model, reward = chain()
+    with pytest.raises(InvalidValue, match=r"valid is \(S, A, B\)"):
+        value_iteration(Table(model.outcomes, np.ones((6, 1, 2))), reward)
