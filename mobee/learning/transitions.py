@@ -2,93 +2,91 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from mobee.errors import InvalidValue, UnknownName
+from mobee.learning.beliefs import DebiasedCounts
+from mobee.learning.bins import read_only, widened
+from mobee.learning.divergence import information_gain
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
 from mobee.robot.robot import Array, Ints
 
-Scalar = TypeVar("Scalar", bound=np.generic)
 STAY, GOAL = 0, 1  # the first two bins of every state-action
-INITIAL = {"50-50": (STAY, GOAL), "60-40": (STAY, GOAL, GOAL)}  # imagined observations: Algorithm 8 and table 7.1
-
-
-def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
-    """KL(P || T) in nats of two distributions over the same bins, given as counts or probabilities (thesis eq. 6.5).
-
-    `p`, `t`: shape (bins,), every component above zero (else it is undefined, thesis 6.4.2); they are normalised here.
-    """
-    new, old = np.asarray(p, dtype=np.float64), np.asarray(t, dtype=np.float64)
-    if new.ndim != 1 or new.shape != old.shape or not len(new):
-        raise InvalidValue(f"distributions of shapes {new.shape} and {old.shape}: give two vectors over the same bins.")
-    if not ((new > 0).all() and (old > 0).all() and np.isfinite(new).all() and np.isfinite(old).all()):
-        raise InvalidValue(f"KL divergence needs components above zero, given {new.tolist()} and {old.tolist()}: leave empty bins out.")
-    return _kl(new, old)
-
-
-def _kl(p: Array, t: Array) -> float:
-    p, t = p / p.sum(), t / t.sum()
-    return float((p * np.log(p / t)).sum())
-
-
-def kail_update(counts: Array, chosen: int) -> tuple[Array, float]:
-    """One observation by Algorithm 6: the new counts and the information gain in nats.
-
-    `counts`: (bins,), the T of the thesis' tables; `chosen`: the bin observed, or len(counts) for an outcome never seen before.
-    """
-    before = np.append(counts, 1.0) if chosen == len(counts) else counts
-    after = before.copy()
-    after[chosen] += 1.0
-    return after, _kl(after, before)
+INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # their imagined counts: Algorithm 8 and table 7.1
+NEW_BIN = 1.0  # the imagined count of every other bin: Algorithm 6
+DIVERGENCES = ("kail", "kl")
 
 
 class TransitionModel:
-    """Outcome counts of every state-action in bins of variable number, with 'Kail' divergence as reward (thesis 6.4.3).
+    """Outcome counts of every state-action in bins of variable number, and the last information gain as reward (thesis 6.4.3).
+
+    An observation takes the same few microseconds however large the space, and memory grows with what was observed.
 
     Args:
         space: the states and actions.
         initial: "50-50" (each action is imagined to fail once and succeed once) or "60-40" (to succeed twice).
+        divergence: what an observation pays: "kail" (Algorithm 6: over the bins of the state-action) or "kl" (thesis 6.4.2: over all
+            states, each imagined once).  The probabilities are the same with both.
+        forgetting: in (0, 1]; the real counts of a state-action are multiplied by it before each of its observations.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
     """
 
-    def __init__(self, space: Space, initial: str = "50-50") -> None:
+    def __init__(self, space: Space, initial: str = "50-50", divergence: str = "kail", forgetting: float = 1.0) -> None:
         if initial not in INITIAL:
             raise UnknownName("initial", initial, INITIAL)
-        self.space, self.initial = space, initial
+        if divergence not in DIVERGENCES:
+            raise UnknownName("divergence", divergence, DIVERGENCES)
+        if not 0.0 < forgetting <= 1.0:
+            raise InvalidValue(f"forgetting={forgetting!r}: valid are 0 (exclusive) to 1, which forgets nothing.")
+        self.space, self.initial, self.divergence, self.forgetting = space, initial, divergence, float(forgetting)
+        stay, goal = INITIAL[initial]
+        self._first_two = stay + goal
         exists = space.goals != NO_ACTION
-        counts, reward = np.empty(0), 0.0
-        for chosen in INITIAL[initial]:
-            counts, reward = kail_update(counts, chosen)
-        self._counts: Array = np.where(exists[:, :, None], counts, 0.0)  # (S, A, bins), 0 where there is no bin
-        self._probabilities: Array = self._counts / np.maximum(self._counts.sum(axis=-1, keepdims=True), 1.0)
-        stay = np.broadcast_to(np.arange(len(space))[:, None], exists.shape)
-        self._outcomes: Ints = np.where(exists[:, :, None], np.stack([stay, space.goals], axis=-1), 0)
-        self._bins: Ints = np.where(exists, len(counts), 0)
-        self._reward: Array = np.where(exists, reward, -np.inf)
+        self._imagined: Array = np.array([stay, goal])  # of each bin, as long as the bins of the widest state-action
+        self._counts: Array = np.where(exists[:, :, None], self._imagined, 0.0)  # (S, A, bins), 0 where there is no bin
+        self._probabilities: Array = self._counts / (stay + goal)
+        states = np.broadcast_to(np.arange(len(space))[:, None], exists.shape)
+        self._outcomes: Ints = np.where(exists[:, :, None], np.stack([states, space.goals], axis=-1), 0)
+        self._bins: Ints = np.where(exists, 2, 0)
+        self._later: dict[tuple[int, int, int], int] = {}  # which bin: of outcomes that are neither stay nor goal
+        self._weight: Array = np.zeros(exists.shape)  # sum of the real counts
         self._tries: Ints = np.zeros(exists.shape, dtype=np.intp)
+        first = information_gain(1.0, len(space)) if divergence == "kl" else information_gain(goal - 1.0, stay + goal - 1.0)
+        self._reward: Array = np.where(exists, first, -np.inf)
+        self._debiased: dict[tuple[float, float], DebiasedCounts] = {}
 
     @property
     def reward(self) -> Array:
         """The last information gain of each state-action, shape (S, A), in nats; -inf where there is no action (read only)."""
-        return _read_only(self._reward)
+        return read_only(self._reward)
 
     @property
     def tries(self) -> Ints:
         """How often each state-action was really observed, shape (S, A) (read only)."""
-        return _read_only(self._tries)
+        return read_only(self._tries)
 
     @property
     def outcomes(self) -> Ints:
         """The state of each bin in order of first observation, shape (S, A, B); meaningless where the probability is 0."""
-        return _read_only(self._outcomes)
+        return read_only(self._outcomes)
 
     @property
     def probabilities(self) -> Array:
         """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
-        return _read_only(self._probabilities)
+        return read_only(self._probabilities)
+
+    @property
+    def counts(self) -> Array:
+        """T(s, a) of the thesis, imagined observations included, shape (S, A, B), 0 where there is no bin (read only)."""
+        return read_only(self._counts)
+
+    @property
+    def imagined(self) -> Array:
+        """How much of each bin's count is imagined, shape (B,): the first two are stay and goal (read only)."""
+        return read_only(self._imagined)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
         """States observed and their counts T(s, a), imagined ones included, in order of first observation."""
@@ -96,38 +94,80 @@ class TransitionModel:
         used = self._bins[state, action]
         return self._outcomes[state, action, :used].copy(), self._counts[state, action, :used].copy()
 
+    def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
+        """What to plan with: the real counts alone over a weak prior, kept up to date with this model.
+
+        `goal`, `stay`: counts imagined instead of Algorithm 8's, the first above 0.  The same numbers give the same object.
+        """
+        if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
+            raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")
+        if (goal, stay) not in self._debiased:
+            real = np.where(self._counts > 0.0, self._counts - self.imagined, 0.0)
+            self._debiased[goal, stay] = DebiasedCounts(self, real, self._weight, goal, stay)
+        return self._debiased[goal, stay]
+
     def gain(self, state: int, action: int, outcome: int) -> float:
         """The reward that observing this outcome would pay now, in nats; changes nothing."""
-        return self._update(state, action, outcome)[2]
+        return self._gain(state, action, self._bin(state, action, outcome))
 
     def observe(self, state: int, action: int, outcome: int) -> float:
         """Count one real transition and return its reward in nats (Algorithm 6).
 
         Raises InvalidValue for a state or action that the space does not have.
         """
-        chosen, counts, reward = self._update(state, action, outcome)
-        if len(counts) > self._counts.shape[-1]:
-            self._counts = np.pad(self._counts, ((0, 0), (0, 0), (0, 1)))
-            self._probabilities = np.pad(self._probabilities, ((0, 0), (0, 0), (0, 1)))
-            self._outcomes = np.pad(self._outcomes, ((0, 0), (0, 0), (0, 1)))
-        self._counts[state, action, : len(counts)] = counts
-        self._probabilities[state, action] = self._counts[state, action] / self._counts[state, action].sum()
-        self._outcomes[state, action, chosen] = outcome
-        self._bins[state, action] = len(counts)
+        chosen = self._bin(state, action, outcome)
+        reward = self._gain(state, action, chosen)
+        used = self._bins.item(state, action)
+        if self.forgetting < 1.0:
+            known, imagined = self._counts[state, action, :used], self._imagined[:used]
+            known[:] = (known - imagined) * self.forgetting + imagined
+        if chosen == used:
+            self._append(state, action, outcome)
+            used += 1
+        counts = self._counts[state, action]
+        counts[chosen] += 1.0
+        weight = self._weight.item(state, action) * self.forgetting + 1.0
+        self._weight[state, action] = weight
+        np.divide(counts, weight + self._imagined_total(used), out=self._probabilities[state, action])
         self._reward[state, action] = reward
         self._tries[state, action] += 1
+        for beliefs in self._debiased.values():
+            beliefs.update(state, action, counts[:used] - self._imagined[:used], weight)
         return reward
 
-    def _update(self, state: int, action: int, outcome: int) -> tuple[int, Array, float]:
-        states, counts = self.bins(state, action)
+    def _gain(self, state: int, action: int, chosen: int) -> float:
+        used = self._bins.item(state, action)
+        real, weight = 0.0, self._weight.item(state, action) * self.forgetting
+        imagined = self._imagined.item(chosen) if chosen < used else NEW_BIN
+        if chosen < used:
+            real = (self._counts.item(state, action, chosen) - imagined) * self.forgetting
+        if self.divergence == "kl":
+            return information_gain(1.0 + real, len(self.space) + weight)
+        return information_gain(imagined + real, self._imagined_total(max(used, chosen + 1)) + weight)
+
+    def _bin(self, state: int, action: int, outcome: int) -> int:
+        """The bin of an outcome, the next free one if it is new."""
+        goal = self.space.goal(state, action)
+        if outcome == state:
+            return STAY
+        if outcome == goal:
+            return GOAL
         if not 0 <= outcome < len(self.space):
             raise InvalidValue(f"{self.space.part} has no state {outcome!r}: valid are 0 to {len(self.space) - 1}.")
-        seen = np.flatnonzero(states == outcome)
-        chosen = int(seen[0]) if len(seen) else len(states)
-        return chosen, *kail_update(counts, chosen)
+        return self._later.get((state, action, outcome)) or self._bins.item(state, action)
 
+    def _append(self, state: int, action: int, outcome: int) -> None:
+        bin_ = self._bins.item(state, action)
+        if bin_ == len(self._imagined):
+            self._imagined = np.append(self._imagined, NEW_BIN)
+            self._counts, self._probabilities = widened(self._counts), widened(self._probabilities)
+            self._outcomes = widened(self._outcomes)
+            for beliefs in self._debiased.values():
+                beliefs.widen()
+        self._later[state, action, outcome] = bin_
+        self._counts[state, action, bin_] = NEW_BIN
+        self._outcomes[state, action, bin_] = outcome
+        self._bins[state, action] = bin_ + 1
 
-def _read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    view = array.view()
-    view.flags.writeable = False
-    return view
+    def _imagined_total(self, used: int) -> float:
+        return self._first_two + (used - 2) * NEW_BIN

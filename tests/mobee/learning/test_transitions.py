@@ -6,32 +6,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
-from mobee.learning.transitions import TransitionModel, kail_update, kl_divergence
-from tests.mobee.learning.toys import arm
+from mobee.learning.divergence import kl_divergence
+from mobee.learning.transitions import TransitionModel
+from tests.mobee.learning.toys import arm, torso
 
 PRINTED = 5e-5
 S, ACTION, GOAL = 0, 0, 1  # the first action of state 0 aims at state 1
 OTHERS = (5, 6, 7)
 
 
+def kail_update(counts, chosen):
+    """One observation by Algorithm 6 to the letter: the new counts and the information gain."""
+    before = np.append(counts, 1.0) if chosen == len(counts) else counts
+    after = before.copy()
+    after[chosen] += 1.0
+    return after, kl_divergence(after, before)
+
+
 def rewards(observations: list[int], initial: str = "50-50") -> list[float]:
     model = TransitionModel(arm(neighbours="equidistant"), initial)
     assert model.space.goal(S, ACTION) == GOAL
     return [model.reward[S, ACTION]] + [model.observe(S, ACTION, s) for s in observations]
-
-
-@pytest.mark.parametrize(
-    ("p", "t", "printed"),
-    [
-        ((1, 2, 1), (1, 1, 1), 0.0589),
-        ((2, 1, 1), (1, 1, 1), 0.0589),
-        ((1, 1, 2, 1, 1), (1,) * 5, 0.0487),
-        ((1, 1, 1, 2, 1, 1, 1), (1,) * 7, 0.0398),
-    ],
-    ids=["6.6", "6.7", "6.8", "6.9"],
-)
-def test_equations_6_6_to_6_9(p, t, printed):
-    assert kl_divergence(p, t) == pytest.approx(printed, abs=PRINTED)
 
 
 @pytest.mark.parametrize(
@@ -152,11 +147,71 @@ def test_unknown_states_actions_and_initialisations_are_refused():
         with pytest.raises(InvalidValue, match="valid are 0 to"):
             model.observe(s, a, outcome)
     assert model.tries.sum() == 0
-    with pytest.raises(UnknownName, match="Did you mean '50-50'"):
-        TransitionModel(arm(), "50-5")
+    for options, message in (({"initial": "50-5"}, "Did you mean '50-50'"), ({"divergence": "kial"}, "Did you mean 'kail'")):
+        with pytest.raises(UnknownName, match=message):
+            TransitionModel(arm(), **options)
 
 
-@pytest.mark.parametrize(("p", "t"), [((1, 0), (1, 1)), ((1, 1), (1, 0)), ((1,), (1, 1)), ((), ()), ((1, np.nan), (1, 1))])
-def test_divergence_is_refused_where_it_is_undefined(p, t):
-    with pytest.raises(InvalidValue, match="bins"):
-        kl_divergence(p, t)
+@pytest.mark.parametrize("forgetting", [0, 1.1, -1, float("nan")])
+def test_a_forgetting_out_of_range_is_refused(forgetting):
+    with pytest.raises(InvalidValue, match="forgets nothing"):
+        TransitionModel(arm(), forgetting=forgetting)
+
+
+observations = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 1), st.sampled_from([0, 1, 3, 9, 40])), max_size=40)
+
+
+@given(observations, st.sampled_from([1.0, 0.9, 0.5]))
+def test_plain_kl_pays_what_the_dense_distributions_over_all_states_say(observed, forgetting):
+    model = TransitionModel(arm(neighbours="equidistant"), divergence="kl", forgetting=forgetting)
+    dense = np.ones((6, 2, 81))
+    for s, a, outcome in observed:
+        old = 1.0 + forgetting * (dense[s, a] - 1.0)
+        dense[s, a] = old
+        dense[s, a, outcome] += 1.0
+        assert model.observe(s, a, outcome) == pytest.approx(kl_divergence(dense[s, a], old), abs=1e-12)
+
+
+def test_plain_kl_depends_on_the_number_of_states_and_tells_no_success_from_failure():
+    few, many = TransitionModel(torso(), divergence="kl"), TransitionModel(arm(), divergence="kl")
+    assert few.reward[0, 0] == few.gain(0, 0, 0) == few.gain(0, 0, few.space.goal(0, 0)) == few.gain(0, 0, 26)
+    assert few.reward[0, 0] == pytest.approx(kl_divergence([2] + [1] * 26, [1] * 27))
+    assert few.reward[0, 0] > 2 * many.reward[0, 0]
+    assert TransitionModel(torso()).reward[0, 0] == TransitionModel(arm()).reward[0, 0]
+
+
+def test_the_probabilities_do_not_depend_on_the_divergence():
+    models = [TransitionModel(arm(), divergence=divergence) for divergence in ("kail", "kl")]
+    for model in models:
+        for outcome in (5, 5, 0, 7):
+            model.observe(0, 1, outcome)
+    assert np.array_equal(models[0].probabilities, models[1].probabilities)
+
+
+@given(observations, st.sampled_from([0.9, 0.5]))
+def test_forgetting_shrinks_the_real_counts_and_keeps_the_imagined_ones(observed, forgetting):
+    model = TransitionModel(arm(neighbours="equidistant"), forgetting=forgetting)
+    real: dict[tuple[int, int], dict[int, float]] = {}
+    for s, a, outcome in observed:
+        counts = real.setdefault((s, a), {})
+        floor = {s: 2.0, model.space.goal(s, a): 2.0}
+        before = {k: forgetting * v for k, v in counts.items()} | {outcome: forgetting * counts.get(outcome, 0.0)}
+        bins = floor | before
+        old = {k: floor.get(k, 1.0) + before.get(k, 0.0) for k in bins}
+        new = old | {outcome: old[outcome] + 1.0}
+        real[s, a] = before | {outcome: before[outcome] + 1.0}
+        assert model.observe(s, a, outcome) == pytest.approx(kl_divergence(list(new.values()), list(old.values())), abs=1e-12)
+        states, counted = model.bins(s, a)
+        assert dict(zip(states.tolist(), counted.tolist(), strict=True)) == pytest.approx(new)
+        assert model.probabilities[s, a].sum() == pytest.approx(1.0)
+    assert model.tries.sum() == len(observed)
+
+
+def test_a_model_that_forgets_is_interested_again_and_unlearns_what_changed():
+    forgetful, faithful = TransitionModel(arm(), forgetting=0.8), TransitionModel(arm())
+    for model in (forgetful, faithful):
+        goal = model.space.goal(0, 0)
+        for outcome in [goal] * 100 + [0] * 10:
+            model.observe(0, 0, outcome)
+    assert forgetful.reward[0, 0] > faithful.reward[0, 0]
+    assert forgetful.probabilities[0, 0, 0] > 0.6 > 0.2 > faithful.probabilities[0, 0, 0]
