@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -59,10 +61,8 @@ class Lattice(Space):
         self.tie_seed = tie_seed
         low, high = robot.limits[indices].T
         super().__init__(robot, joints, low + fractions * (high - low), goals, rest)
-        self._strides = lattice_strides(sizes)
-        self._levels = np.full((len(sizes), max(sizes)), np.inf)
-        for row, one in zip(self._levels, self.levels, strict=True):
-            row[: len(one)] = one
+        self._strides: list[int] = lattice_strides(sizes).tolist()
+        self._borders = [_borders(one, *limits) for one, limits in zip(self.levels, robot.limits[indices], strict=True)]
 
     def __repr__(self) -> str:
         kind = "equidistant" if self.neighbours == "equidistant" else f"{self.neighbours} nearest"
@@ -73,11 +73,16 @@ class Lattice(Space):
         """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
         first = self.levels[0]
         levels = list(first) if set(self.levels) == {first} else [list(one) for one in self.levels]
-        return super().settings | {"levels": levels, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
+        return self._made | {"levels": levels, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
 
-    def _cell(self, fraction: Array) -> int:
-        digits = np.abs(fraction[:, None] - self._levels).argmin(axis=1)
-        return int(digits @ self._strides)
+    def _cell(self, q: Array) -> int:
+        # Cells are boxes.  Bare lists: NumPy takes longer for so few numbers.
+        return sum(n * bisect_left(borders, x) for n, borders, x in zip(self._strides, self._borders, q.tolist(), strict=True))
+
+
+def _borders(levels: Sequence[float], low: float, high: float) -> list[float]:
+    """Half way between the levels of a joint, in [rad]."""
+    return [float(low + (one + next_) / 2 * (high - low)) for one, next_ in pairwise(levels)]
 
 
 def _checked_levels(levels: Levels, joints: Sequence[str]) -> tuple[tuple[float, ...], ...]:

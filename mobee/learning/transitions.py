@@ -54,8 +54,10 @@ class TransitionModel:
         self._later: dict[tuple[int, int, int], int] = {}  # which bin: of outcomes that are neither stay nor goal
         self._weight: Array = np.zeros(exists.shape)  # sum of the real counts
         self._tries: Ints = np.zeros(exists.shape, dtype=np.intp)
-        first = information_gain(1.0, len(space)) if divergence == "kl" else information_gain(goal - 1.0, stay + goal - 1.0)
+        dense = divergence == "kl"
+        first = information_gain(1.0, len(space)) if dense else information_gain(goal - 1.0, stay + goal - 1.0)
         self._reward: Array = np.where(exists, first, -np.inf)
+        self._totals: Array = np.where(exists, float(len(space)) if dense else stay + goal, 0.0)
         self._debiased: dict[tuple[float, float], DebiasedCounts] = {}
 
     @property
@@ -82,6 +84,11 @@ class TransitionModel:
     def counts(self) -> Array:
         """T(s, a) of the thesis, imagined observations included, shape (S, A, B), 0 where there is no bin (read only)."""
         return read_only(self._counts)
+
+    @property
+    def totals(self) -> Array:
+        """N of the reward's closed form: the sum of the counts it is taken over, shape (S, A), 0 where there is no action (read only)."""
+        return read_only(self._totals)
 
     @property
     def imagined(self) -> Array:
@@ -128,7 +135,9 @@ class TransitionModel:
         counts[chosen] += 1.0
         weight = self._weight.item(state, action) * self.forgetting + 1.0
         self._weight[state, action] = weight
-        np.divide(counts, weight + self._imagined_total(used), out=self._probabilities[state, action])
+        total = weight + self._imagined_total(used)
+        np.divide(counts, total, out=self._probabilities[state, action])
+        self._totals[state, action] = total if self.divergence == "kail" else weight + len(self.space)
         self._reward[state, action] = reward
         self._tries[state, action] += 1
         for beliefs in self._debiased.values():

@@ -54,8 +54,9 @@ class Voronoi(Space):
     @property
     def settings(self) -> dict[str, Any]:
         """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
-        made = {"samples": len(self), "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
-        return super().settings | made
+        samples = len(self) if self.seed is not None else self.samples.tolist()
+        made = {"samples": samples, "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
+        return self._made | made | {"kind": "voronoi"}
 
 
 def _drawn_samples(samples: Any, limits: Array, seed: int) -> Array:

@@ -132,6 +132,7 @@ def test_probabilities_follow_the_counts_and_gain_foretells_the_reward(observati
         states, counts = model.bins(s, a)
         assert dict(zip(states.tolist(), counts.tolist(), strict=True)) == expected
     assert model.probabilities.sum(axis=-1)[model.space.goals != -1] == pytest.approx(1.0)
+    assert np.array_equal(model.totals, model.counts.sum(axis=-1))
     assert model.tries.sum() == len(observations)
 
 
@@ -170,6 +171,7 @@ def test_plain_kl_pays_what_the_dense_distributions_over_all_states_say(observed
         dense[s, a] = old
         dense[s, a, outcome] += 1.0
         assert model.observe(s, a, outcome) == pytest.approx(kl_divergence(dense[s, a], old), abs=1e-12)
+        assert model.totals[s, a] == pytest.approx(dense[s, a].sum())
 
 
 def test_plain_kl_depends_on_the_number_of_states_and_tells_no_success_from_failure():
