@@ -12,8 +12,10 @@ from mobee.errors import UnknownName
 EXPERIMENTS = {
     "babbling": "experiments.babbling",
     "clauses": "experiments.clauses",
+    "coverage": "experiments.coverage",
     "flood": "experiments.flood",
     "graze": "experiments.graze",
+    "hypercube": "experiments.hypercube",
     "identify": "experiments.identify",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
