@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from experiments.claims import Claim
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult

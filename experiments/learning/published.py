@@ -1,7 +1,7 @@
 """The settings of the published experiments, in one place (thesis chapter 7, paper section 3).
 
 The robot is `icub_2014` under the gains of 2014, at a control period of 20 ms, its motors those of the plant's defaults
-(docs/plant.md).  Motors that do not take part are rigid at home.
+(docs/plant.md).  Motors that do not take part are rigid at home; those of the arms half-way, as the goals of the actions have them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import mobee
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Motor, Robot
 
 ROBOT = "icub_2014"
 DT = 0.02  # s
@@ -32,9 +32,14 @@ Neighbours = int | Literal["equidistant"]
 
 @cache
 def robot(free: bool = False) -> Robot:
-    """The published robot; `free`: without its cable rows, so that no pose is forbidden."""
+    """The published robot, the arms' other motors at home in the middle of their range; `free`: without its cable rows."""
     loaded = mobee.load_robot(ROBOT)
-    return replace(loaded, clauses=()) if free else loaded
+    motors = tuple(replace(m, home=float(m.limits.mean())) if _is_idle(m) else m for m in loaded.motor_table)
+    return replace(loaded, motor_table=motors, clauses=() if free else loaded.clauses)
+
+
+def _is_idle(motor: Motor) -> bool:
+    return motor.part.endswith("_arm") and motor.name not in (*LEFT, *RIGHT)
 
 
 def arm_plant(
