@@ -1,0 +1,181 @@
+"""A world given as a table: where each action leads, with what probability.  For fast tests and for worlds whose truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from math import erf, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue
+from mobee.learning.bins import read_only
+from mobee.learning.lattice import Lattice
+from mobee.learning.neighbours import NO_ACTION, lattice_strides
+from mobee.learning.space import Space
+from mobee.plant import Outcome
+from mobee.robot.robot import Array, Ints
+
+DRAWS = 4096  # random numbers made at a time
+NEGLIGIBLE = 1e-4  # a probability
+
+
+class TabularPlant:
+    """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
+
+    It is an OutcomeModel too: the truth that an agent on it can learn.  What action number n of the plant draws
+    follows from the seed and n alone, so setting `state` and `actions` continues a run elsewhere.
+
+    Args:
+        space: the states and actions.
+        outcomes: states reached, shape (S, A, B).
+        probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state
+            that have the same goal cannot be told apart and must have the same outcomes.
+        seed: of the draws.
+        start: the state in which the part is at first.
+
+    Raises:
+        InvalidValue: the tables do not fit the space, or are no probabilities.
+    """
+
+    def __init__(self, space: Space, outcomes: ArrayLike, probabilities: ArrayLike, seed: int = 0, start: int = 0) -> None:
+        self.robot, self.space, self.seed = space.robot, space, seed
+        self._outcomes, self._probabilities = _checked(space, outcomes, probabilities)
+        self._cumulative: Array = np.cumsum(self._probabilities, axis=-1)
+        self._cumulative /= np.maximum(self._cumulative[:, :, -1:], NEGLIGIBLE)
+        self._action: list[dict[int, int]] = [
+            {int(goal): a for a, goal in reversed(list(enumerate(space.actions(s))))} for s in range(len(space))
+        ]
+        self.state = start
+        """Where the part is."""
+        self.actions = 0
+        """How many actions have ended."""
+        self._under_way: Array | None = None
+        self._block, self._uniform = -1, np.empty(0)
+
+    @property
+    def outcomes(self) -> Ints:
+        """The states that each action may reach, shape (S, A, B); meaningless where the probability is 0."""
+        return read_only(self._outcomes)
+
+    @property
+    def probabilities(self) -> Array:
+        """Their probabilities, shape (S, A, B), all 0 where there is no action (read only)."""
+        return read_only(self._probabilities)
+
+    def measure(self, part: str) -> Array:
+        """The sample of the state the part is in, shape (n_part,), in [rad]."""
+        self._checked_part(part)
+        return self.space.target(self.state)
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """Draw where the action ends that aims at `target` (n_part,) rad from the state the part is in; each takes 1 s."""
+        self._checked_part(part)
+        goal = self.space.state_of(target[self.space.columns])
+        action = self._action[self.state].get(goal)
+        if action is None:
+            raise InvalidValue(
+                f"state {self.state} of {part} has no action to {goal}: valid are {self.space.actions(self.state).tolist()}."
+            )
+        chosen = self._cumulative[self.state, action].searchsorted(self._draw(), side="right")
+        self.state = self._outcomes.item(self.state, action, chosen)
+        self.actions += 1
+        return Outcome(self.space.target(self.state), settled=True, duration=1.0)
+
+    def begin(self, part: str, target: Array) -> None:
+        """Start an action of the part; target (n_part,) rad."""
+        self._checked_part(part)
+        if self._under_way is not None:
+            raise InvalidValue(f"{part} has an action under way: wait for it with advance().")
+        self._under_way = target
+
+    def advance(self) -> list[tuple[str, Outcome]]:
+        """End the action under way."""
+        if self._under_way is None:
+            raise InvalidValue("no action is under way: begin one first.")
+        target, self._under_way = self._under_way, None
+        return [(self.space.part, self.act(self.space.part, target))]
+
+    def _draw(self) -> float:
+        block, index = divmod(self.actions, DRAWS)
+        if block != self._block:
+            self._block, self._uniform = block, np.random.default_rng([self.seed, block]).random(DRAWS)
+        return self._uniform.item(index)
+
+    def _checked_part(self, part: str) -> None:
+        if part != self.space.part:
+            raise InvalidValue(f"this plant has no part {part!r}: valid is {self.space.part!r}.")
+
+
+def ideal(space: Space) -> tuple[Ints, Array]:
+    """Outcomes and probabilities, shape (S, A, 1), of a world in which every action succeeds."""
+    exists = space.goals != NO_ACTION
+    outcomes: Ints = np.where(exists, space.goals, 0)[:, :, None]
+    return outcomes, exists[:, :, None].astype(np.float64)
+
+
+def half_space(
+    space: Lattice,
+    normal: Sequence[float] = (-1.0, 1.0, 1.0, 0.0),
+    depth: float = 0.9,
+    memory: float = 0.15,
+    noise: tuple[float, float] = (0.01, 0.06),
+) -> tuple[Ints, Array]:
+    """Outcomes and probabilities, shape (S, A, B), of a world in which a plane cuts off the extreme states, as cables do.
+
+    An action settles at the projection of its goal onto the free side, plus some memory of where it came from, plus
+    normal noise.  With the arm's four joints in the published order the plane cuts off the states with low pitch, high
+    roll and high yaw: 24, 51 and 78 of rank 3.
+
+    Args:
+        space: a lattice.
+        normal: of the plane, pointing at what is forbidden, one component a joint, in fractions of the ranges.
+        depth: where the plane lies: 0 at the extreme states' samples, 1 at the next ones'.
+        memory: share of the way from where the action ends to where it began.
+        noise: standard deviation a joint, in fractions of the range, of actions with a free goal and of the others.
+    """
+    if len(normal) != len(space.joints) or not any(normal):
+        raise InvalidValue(f"normal={normal!r}: give one component for each of {', '.join(space.joints)}, not all 0.")
+    unit = np.array(normal) / np.linalg.norm(normal)
+    low, high = space.robot.limits[[space.robot.motor_index(name) for name in space.joints]].T
+    samples = (space.samples - low) / (high - low)
+    heights = np.unique(np.round(samples @ unit, 9))
+    excess = np.maximum(samples @ unit - (heights[-1] - depth * (heights[-1] - heights[-2])), 0.0)
+    settled = samples - excess[:, None] * unit
+    rows = [
+        [_cells(space, settled[goal] + memory * (settled[s] - settled[goal]), noise[int(excess[goal] > 0)]) for goal in space.actions(s)]
+        for s in range(len(space))
+    ]
+    outcomes = np.zeros((*space.goals.shape, max(len(cells) for row in rows for cells in row)), dtype=np.intp)
+    probabilities = np.zeros(outcomes.shape)
+    for s, row in enumerate(rows):
+        for a, cells in enumerate(row):
+            outcomes[s, a, : len(cells)] = [state for state, _ in cells]
+            probabilities[s, a, : len(cells)] = np.array([p for _, p in cells]) / sum(p for _, p in cells)
+    return outcomes, probabilities
+
+
+def _cells(space: Lattice, mean: Array, deviation: float) -> list[tuple[int, float]]:
+    """The states in which a normally distributed pose lies, with their probabilities: cells of a lattice are boxes."""
+    each = []
+    strides = lattice_strides([len(levels) for levels in space.levels])
+    for stride, levels, x in zip(strides.tolist(), space.levels, mean.tolist(), strict=True):
+        borders = [(one + next_) / 2 for one, next_ in zip(levels, levels[1:], strict=False)]
+        below = [0.0, *(0.5 * (1.0 + erf((border - x) / deviation / sqrt(2.0))) for border in borders), 1.0]
+        share = [(stride * level, below[level + 1] - below[level]) for level in range(len(levels))]
+        each.append([(step, p) for step, p in share if p > NEGLIGIBLE])
+    joined = [(sum(step for step, _ in cell), float(np.prod([p for _, p in cell]))) for cell in product(*each)]
+    return [(state, p) for state, p in joined if p > NEGLIGIBLE]
+
+
+def _checked(space: Space, outcomes: ArrayLike, probabilities: ArrayLike) -> tuple[Ints, Array]:
+    states, shares = np.array(outcomes, dtype=np.intp), np.array(probabilities, dtype=np.float64)
+    if states.shape != shares.shape or states.ndim != 3 or states.shape[:2] != space.goals.shape:
+        raise InvalidValue(f"tables of shapes {states.shape} and {shares.shape}: give both as (S, A, B) with (S, A) = {space.goals.shape}.")
+    sums = np.where(space.goals == NO_ACTION, 0.0, 1.0)
+    if not (shares >= 0).all() or np.abs(shares.sum(axis=-1) - sums).max() > 1e-9:
+        raise InvalidValue("probabilities: give numbers from 0 that sum to 1 over each action's outcomes, and 0 where there is no action.")
+    if ((states < 0) | (states >= len(space)))[shares > 0].any():
+        raise InvalidValue(f"outcomes: valid are states 0 to {len(space) - 1}.")
+    return states, shares
