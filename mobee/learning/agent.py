@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import Any
 
 import numpy as np
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
+from mobee.learning.draws import Draws
+from mobee.learning.exploit import External, Goal
 from mobee.learning.explorers import EXPLORERS, choose
 from mobee.learning.space import Space
+from mobee.learning.plans import Plans
 from mobee.learning.transitions import TransitionModel
-from mobee.learning.value_iteration import value_iteration
+from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome, Plant
 from mobee.robot.robot import Array
 from mobee.store import Transition, TransitionStore
+
+BELIEFS = ("counts", "debiased")
+PURSUING = ("curious",)  # explorers that plan for an external reward
 
 
 class CuriousAgent:
@@ -26,14 +31,23 @@ class CuriousAgent:
     Args:
         space: states and actions of one part.
         plant: through which it acts; its robot must be the space's.
-        explorer: "curious", "random" or "least_tried".
+        explorer: a name in `mobee.learning.explorers.EXPLORERS`: "curious", "random", "least_tried", ...
         seed: decides ties; agents of different parts draw differently under the same seed.
         discount: of future rewards in the plan.
         initial: what actions are imagined to do before they are tried, "50-50" or "60-40".
         store: where transitions go and come from.
+        divergence: what an outcome is worth, "kail" or "kl".
+        forgetting: factor of a state-action's counts before each new observation of it, in (0, 1].
+        tolerance: of plans, see `value_iteration`.
+        relative: whether the tolerance is in units of the largest reward (the rewards fall below any fixed one), and a plan
+            starts from the values of the one before.  False, with tolerance=1e-3: Algorithm 7 as published.
+        beliefs: what plans trust, "counts" with the imagined outcomes, or "debiased" without them.
+        goal: an external reward to pursue: target states, an array (S, A), or a function of state, action and goal state.
+        goal_weight: the external reward times this is added to the intrinsic one; None: it replaces it.
 
     Raises:
-        UnknownName: no such explorer or initialisation.
+        UnknownName: no such explorer, initialisation, divergence or beliefs.
+        InvalidValue: a plant of another robot, a goal that the space does not have, or that the explorer ignores.
         MobeeError: the store holds transitions of this agent that were made under other settings.
     """
 
@@ -46,26 +60,39 @@ class CuriousAgent:
         discount: float = 0.9,
         initial: str = "50-50",
         store: TransitionStore | None = None,
+        *,
+        divergence: str = "kail",
+        forgetting: float = 1.0,
+        tolerance: float = 0.01,
+        relative: bool = True,
+        beliefs: str = "counts",
+        goal: Goal | None = None,
+        goal_weight: float | None = None,
     ) -> None:
-        if explorer not in EXPLORERS:
-            raise UnknownName("explorer", explorer, EXPLORERS)
+        for what, name, valid in (("explorer", explorer, EXPLORERS), ("beliefs", beliefs, BELIEFS)):
+            if name not in valid:
+                raise UnknownName(what, name, valid)
         if plant.robot.motors != space.robot.motors:
             raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
         self.space, self.plant, self.explorer = space, plant, explorer
         self.seed, self.discount, self.store = seed, discount, store
         self.part = space.part
-        self.model = TransitionModel(space, initial)
+        self.model = TransitionModel(space, initial, divergence, forgetting)
+        self.beliefs: OutcomeModel = self.model.debiased() if beliefs == "debiased" else self.model
+        """What plans are made with."""
         self.transitions = 0
         """How many transitions this agent has observed, those of its store included."""
         self.last: Transition | None = None
         """The newest transition."""
+        self._believes = beliefs
+        self._external = _external(space, goal, goal_weight, explorer)
+        self._plans = Plans(discount, tolerance, relative)
+        self._score, self._draws = EXPLORERS[explorer], Draws(space.part)
         self._state: int | None = None
         self._pending: tuple[int, int] | None = None
-        self._plan: tuple[Array, Array] | None = None
         if store is not None:
             store.bind(self.settings)
-            for transition in store.load():
-                self._learn(transition)
+            self._replay(store)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -76,6 +103,12 @@ class CuriousAgent:
             "seed": self.seed,
             "discount": self.discount,
             "initial": self.model.initial,
+            "divergence": self.model.divergence,
+            "forgetting": self.model.forgetting,
+            "tolerance": self._plans.tolerance,
+            "relative": self._plans.relative,
+            "beliefs": self._believes,
+            "goal": None if self._external is None else self._external.settings,
         }
 
     @property
@@ -85,17 +118,21 @@ class CuriousAgent:
             self._state = self._state_of(self.plant.measure(self.part))
         return self._state
 
-    def plan(self) -> tuple[Array, Array]:
-        """State and action values under the intrinsic reward, shapes (S,) and (S, A): once a transition (Algorithm 7)."""
-        if self._plan is None:
-            self._plan = value_iteration(self.model, self.model.reward, self.discount)
-        return self._plan
+    def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
+        """State and action values, shapes (S,) and (S, A), made once a transition (Algorithm 7).
+
+        `reward`: (S, A), else what the agent pursues: the intrinsic reward, or the goal's.  `beliefs`: else the agent's.
+        `key`: plans of one key start from the values of the one before.
+        """
+        plan = self._plans.made(key, reward, beliefs)
+        if plan is None:
+            plan = self._plans.make(key, reward, beliefs, self._pursued() if reward is None else reward, beliefs or self.beliefs)
+        return plan
 
     def decide(self, state: int) -> int:
         """The action to take in a state."""
-        rng = np.random.default_rng([self.seed, zlib.crc32(self.part.encode()), self.transitions])
-        scores = EXPLORERS[self.explorer](self, state, rng)
-        action = choose(scores, rng)
+        draws = self._draws.at(self.seed, self.transitions)
+        action = choose(self._score(self, state, draws), draws)
         self._pending = state, action
         return action
 
@@ -119,7 +156,7 @@ class CuriousAgent:
             reward=self.model.gain(state, action, following),
             settled=outcome.settled,
             duration=outcome.duration,
-            q=tuple(float(x) for x in outcome.q),
+            q=tuple(outcome.q.tolist()),
             touched=outcome.touched,
         )
         if self.store is not None:
@@ -131,6 +168,7 @@ class CuriousAgent:
     def interrupt(self) -> None:
         """Forget the action just decided: it ended without an outcome, and where the part is must be measured again."""
         self._state = self._pending = None
+        self._plans.undo()
 
     def step(self) -> float:
         """Decide, act and observe once; returns the reward in nats.
@@ -156,7 +194,17 @@ class CuriousAgent:
 
     def _learn(self, transition: Transition) -> None:
         self.model.observe(transition.s, transition.a, transition.s_next)
-        self.transitions, self.last, self._plan = transition.n, transition, None
+        self.transitions, self.last = transition.n, transition
+        self._plans.keep()
+
+    def _replay(self, store: TransitionStore) -> None:
+        """Learn from what is on record; each decision is made anew, so that plans start where they would have."""
+        for transition in store.load():
+            self._score(self, transition.s, self._draws.at(self.seed, self.transitions))
+            self._learn(transition)
+
+    def _pursued(self) -> Array:
+        return self.model.reward if self._external is None else self._external.combined(self.model.reward)
 
     def _decided(self) -> tuple[int, int]:
         if self._pending is None:
@@ -165,3 +213,13 @@ class CuriousAgent:
 
     def _state_of(self, q: Array) -> int:
         return self.space.state_of(q[self.space.columns])
+
+
+def _external(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
+    if goal is None:
+        if weight is not None:
+            raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
+        return None
+    if explorer not in PURSUING:
+        raise InvalidValue(f"the explorer {explorer!r} pursues no goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
+    return External(space, goal, weight)

@@ -6,6 +6,8 @@ import pytest
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.divergence import kl_divergence
+from mobee.learning.explorers import EXPLORERS
+from mobee.learning.lattice import Lattice
 from mobee.learning.lattice import Lattice
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
@@ -103,10 +105,19 @@ def test_agents_of_different_parts_draw_differently_under_one_seed():
     assert actions("l") != actions("r")
 
 
-@pytest.mark.parametrize("explorer", ["curious", "random", "least_tried"])
-def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, explorer):
+RESUMED = [{"explorer": name} for name in EXPLORERS] + [
+    {"beliefs": "debiased"},
+    {"divergence": "kl"},
+    {"forgetting": 0.9},
+    {"tolerance": 1e-3, "relative": False},
+    {"goal": [3], "goal_weight": 0.05},
+]
+
+
+@pytest.mark.parametrize("options", RESUMED, ids=str)
+def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, options):
     def make(name, plant):
-        return CuriousAgent(arm(), plant, explorer, seed=3, store=TransitionStore(tmp_path / name, "left_arm"))
+        return CuriousAgent(arm(), plant, seed=3, store=TransitionStore(tmp_path / name, "left_arm"), **options)
 
     whole = make("whole.sqlite", FickleDice(toy_robot(), seed=9))
     whole.run(90)
@@ -123,6 +134,8 @@ def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, explorer)
     assert again.store.load() == whole.store.load()
     assert np.array_equal(again.model.probabilities, whole.model.probabilities)
     assert np.array_equal(again.model.tries, whole.model.tries)
+    if options.get("explorer", "curious") == "curious":  # who plans only for those who look starts elsewhere
+        assert np.array_equal(again.plan()[1], whole.plan()[1])
 
 
 def test_a_transition_is_on_disk_before_the_next_action(tmp_path):
@@ -150,7 +163,17 @@ def test_a_transition_that_cannot_be_written_is_not_learnt(tmp_path):
 
 @pytest.mark.parametrize(
     ("changed", "key"),
-    [({"seed": 1}, "seed"), ({"discount": 0.5}, "discount"), ({"initial": "60-40"}, "initial"), ({"explorer": "random"}, "explorer")],
+    [
+        ({"seed": 1}, "seed"),
+        ({"discount": 0.5}, "discount"),
+        ({"initial": "60-40"}, "initial"),
+        ({"explorer": "random"}, "explorer"),
+        ({"divergence": "kl"}, "divergence"),
+        ({"forgetting": 0.99}, "forgetting"),
+        ({"tolerance": 1e-3}, "tolerance"),
+        ({"relative": False}, "relative"),
+        ({"beliefs": "debiased"}, "beliefs"),
+    ],
 )
 def test_a_store_made_under_other_settings_is_refused(tmp_path, changed, key):
     def make(**options):

@@ -69,10 +69,10 @@ def test_random_ignores_what_was_learnt():
 
 
 def test_only_curiosity_plans(monkeypatch):
-    def no_plan(*_):
+    def no_plan(*_, **__):
         raise AssertionError("planned")
 
-    monkeypatch.setattr("mobee.learning.agent.value_iteration", no_plan)
+    monkeypatch.setattr("mobee.learning.plans.value_iteration", no_plan)
     agent("random").step()
     agent("least_tried").step()
     with pytest.raises(AssertionError, match="planned"):

@@ -1,0 +1,51 @@
+"""The graph that a planner would have without experience: every action reaches its goal (a PRM, thesis 3.1.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from mobee.learning.space import Space
+from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.value_iteration import OutcomeModel
+from mobee.robot.robot import Array, Ints
+
+
+def steps_between(space: Space, start: int, targets: Ints) -> int:
+    """Actions of a shortest path from a state to the nearest target if every action reaches its goal; -1 if there is none."""
+    fewest = _steps(_graph(space), np.array([start]))[targets].min()
+    return int(fewest) if np.isfinite(fewest) else -1
+
+
+def passing(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[int, float]:
+    """The states inside the shortest intended paths, with the believed probability of getting into each and out of it on one.
+
+    The best of the entries and the best of the exits on such paths count.
+    """
+    graph = _graph(space)
+    there, on = _steps(graph, np.array([start])), _steps(graph.T.tocsr(), targets)
+    total = on[start]
+    if not np.isfinite(total):
+        return {}
+    states, actions = np.nonzero((space.goals != NO_ACTION) & (there[:, None] + 1.0 + on[space.goals] == total))
+    goals = space.goals[states, actions]
+    ends_there = beliefs.outcomes[states, actions] == goals[:, None]
+    chances = np.where(ends_there, beliefs.probabilities[states, actions], 0.0).sum(axis=1)
+    entry, leaving = np.zeros(len(space)), np.zeros(len(space))
+    np.maximum.at(entry, goals, chances)
+    np.maximum.at(leaving, states, chances)
+    inside = np.setdiff1d(np.intersect1d(states, goals), [start, *targets])
+    return {int(state): float(entry[state] * leaving[state]) for state in inside}
+
+
+def _graph(space: Space) -> csr_array:
+    states, actions = np.nonzero(space.goals != NO_ACTION)
+    shape = (len(space), len(space))
+    return csr_array((np.ones(len(states)), (states, space.goals[states, actions])), shape=shape)
+
+
+def _steps(graph: csr_array, sources: Ints) -> Array:
+    """Edges from the nearest of the sources to each state, shape (S,), infinite where there is no way."""
+    found: Array = dijkstra(graph, indices=sources, unweighted=True, min_only=True)
+    return found

@@ -1,0 +1,115 @@
+"""Plans from anywhere to target states, from what was learned of where actions really lead (thesis 6.5, 7.4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array, identity
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.linalg import spsolve
+
+from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.exploit import target_states
+from mobee.learning.intended import passing, steps_between
+from mobee.learning.space import Space
+from mobee.learning.value_iteration import OutcomeModel, value_iteration
+from mobee.robot.robot import Array, Ints
+
+DISCOUNT = 0.99  # near 1, the largest value has who needs the fewest actions on average
+TOLERANCE = 1e-12  # of values in [0, 1]
+RELIABLE = 0.5  # a state through which an action passes less often than this is held for unreliable
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A way to a target, and how far it can be trusted.
+
+    `path`: states from start to target.  `actions`: what to do in each but the last.  `probabilities`: that each action
+    ends where the path says.  `success`: that all of them do.  `steps`: actions until a target on average, when the planner
+    is asked again wherever one ends.  `shortest`: actions of a shortest path if every action reached its goal.
+    `avoided`: the states on such shortest paths, not on this one, that are held for unreliable, with the probability of
+    getting through each.
+    """
+
+    path: tuple[int, ...]
+    actions: tuple[int, ...]
+    probabilities: tuple[float, ...]
+    success: float
+    steps: float
+    shortest: int
+    avoided: dict[int, float]
+
+
+class Planner:
+    """The shortest reliable ways to target states: every action costs the same, and one that fails has to be done again.
+
+    Args:
+        space: states and actions.
+        beliefs: where actions lead, e.g. `model.debiased()`: with the imagined outcomes even sound actions look unreliable.
+        targets: one or more states.
+        discount: in [0, 1), a factor a step; the smaller it is, the more a short way is preferred over a reliable one.
+
+    Raises:
+        InvalidValue: no such state.
+    """
+
+    def __init__(self, space: Space, beliefs: OutcomeModel, targets: Any, discount: float = DISCOUNT) -> None:
+        self.space, self.beliefs, self.discount = space, beliefs, discount
+        self.targets: Ints = target_states(space, targets)
+        """The states to reach, ascending."""
+        reward, values = np.zeros(space.goals.shape), np.zeros(len(space))
+        reward[self.targets], values[self.targets] = -np.inf, 1.0  # nothing is done there: they keep their value
+        self.values, action_values = value_iteration(beliefs, reward, discount, TOLERANCE, values)
+        """The discounted value of being in each state, shape (S,): 1 in a target, 0 where no action leads to one."""
+        self.policy: Ints = action_values.argmax(axis=1)
+        """The action to take in each state, shape (S,); meaningless in a target and where the value is 0."""
+
+    def plan(self, start: int) -> Plan:
+        """The way from a state; raises InvalidValue for no such state, MobeeError if no way is known."""
+        path = [int(target_states(self.space, start)[0])]
+        probabilities: list[float] = []
+        while path[-1] not in self.targets:
+            following, probability = self._next(path[-1])
+            path.append(following)
+            probabilities.append(probability)
+        passed = passing(self.space, self.beliefs, path[0], self.targets)
+        return Plan(
+            path=tuple(path),
+            actions=tuple(int(self.policy[state]) for state in path[:-1]),
+            probabilities=tuple(probabilities),
+            success=float(np.prod(probabilities)),
+            steps=self._mean_steps(path[0]),
+            shortest=steps_between(self.space, path[0], self.targets),
+            avoided={state: chance for state, chance in passed.items() if chance < RELIABLE and state not in path},
+        )
+
+    def _next(self, state: int) -> tuple[int, float]:
+        """The likeliest outcome that is nearer to a target, and its probability."""
+        outcomes, probabilities = self._outcomes(state)
+        nearer = np.where(self.values[outcomes] > self.values[state], probabilities, 0.0)
+        if self.values[state] <= 0.0 or not nearer.any():
+            raise MobeeError(f"no way is known from state {state} of {self.space.part} to {self.targets.tolist()}: try other states.")
+        best = int(nearer.argmax())
+        return int(outcomes[best]), float(probabilities[best])
+
+    def _outcomes(self, state: int) -> tuple[Ints, Array]:
+        action = self.policy[state]
+        return self.beliefs.outcomes[state, action], self.beliefs.probabilities[state, action]
+
+    def _mean_steps(self, start: int) -> float:
+        """Actions until a target on average, from the states to which the policy can come (a linear system)."""
+        states = np.arange(len(self.space))
+        probabilities = self.beliefs.probabilities[states, self.policy]
+        probabilities[self.targets] = 0.0
+        rows = np.repeat(states, probabilities.shape[1])
+        outcomes = self.beliefs.outcomes[states, self.policy]
+        moves = csr_array((probabilities.ravel(), (rows, outcomes.ravel())), shape=(len(states), len(states)))
+        moves.eliminate_zeros()
+        reached = np.sort(breadth_first_order(moves, start, return_predecessors=False))
+        if (self.values[reached] <= 0.0).any():
+            return float("inf")
+        costs = (~np.isin(reached, self.targets)).astype(np.float64)
+        steps = spsolve((identity(len(reached)) - moves[reached][:, reached]).tocsc(), costs)
+        return float(np.atleast_1d(steps)[np.searchsorted(reached, start)])

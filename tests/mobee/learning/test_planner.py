@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.planner import Planner
+from tests.mobee.learning.toys import arm
+
+
+class Table:
+    """Every action reaches its goal, but for those that are given with the probability that it stays where it was."""
+
+    def __init__(self, space, fails=None):
+        shape = (*space.goals.shape, 2)
+        self.outcomes = np.zeros(shape, dtype=np.int64)
+        self.outcomes[:, :, 0], self.outcomes[:, :, 1] = space.goals, np.arange(len(space))[:, None]
+        self.probabilities = np.zeros(shape)
+        self.probabilities[space.goals >= 0, 0] = 1.0
+        for (state, goal), chance in (fails or {}).items():
+            action = space.actions(state).tolist().index(goal)
+            self.probabilities[state, action] = 1.0 - chance, chance
+        self.outcomes[space.goals < 0] = 0
+
+
+SPACE = arm(neighbours="equidistant")
+INTO_13 = {(s, 13): 0.9 for s in range(81) if 13 in SPACE.actions(s)}  # 13: the middle of the elbow's lowest level
+
+
+def test_where_all_is_sound_the_plan_is_a_shortest_path_and_avoids_nothing():
+    plan = Planner(SPACE, Table(SPACE), [80]).plan(0)
+    assert len(plan.path) == 9 and (plan.path[0], plan.path[-1]) == (0, 80)
+    for state, action, following in zip(plan.path, plan.actions, plan.path[1:], strict=False):
+        assert SPACE.goal(state, action) == following
+    assert plan.probabilities == (1.0,) * 8
+    assert (plan.success, plan.shortest, plan.avoided) == (1.0, 8, {})
+    assert plan.steps == pytest.approx(8.0)
+
+
+def test_a_plan_goes_round_what_fails_and_names_it():
+    plan = Planner(SPACE, Table(SPACE, INTO_13), [14]).plan(12)
+    assert 13 not in plan.path
+    assert (len(plan.actions), plan.shortest, plan.success) == (4, 2, 1.0)
+    assert plan.avoided == {13: pytest.approx(0.1)}
+
+
+def test_a_plan_takes_a_doubtful_action_where_going_round_takes_longer():
+    plan = Planner(SPACE, Table(SPACE, {pair: 0.4 for pair in INTO_13}), [14]).plan(12)
+    assert plan.path == (12, 13, 14)
+    assert plan.success == pytest.approx(0.6)
+    assert plan.steps == pytest.approx(1 / 0.6 + 1)
+    assert plan.avoided == {}
+
+
+@pytest.mark.parametrize("start", range(0, 81, 7))
+def test_the_mean_number_of_steps_is_that_of_a_robot_that_follows_the_policy(start):
+    rng = np.random.default_rng(start)
+    beliefs = Table(SPACE, {(s, int(g)): rng.uniform(0, 0.7) for s in range(81) for g in SPACE.actions(s)})
+    planner = Planner(SPACE, beliefs, [40])
+    taken = []
+    for _ in range(2000):
+        state, steps = start, 0
+        while state != 40:
+            action = planner.policy[state]
+            state = int(rng.choice(beliefs.outcomes[state, action], p=beliefs.probabilities[state, action]))
+            steps += 1
+        taken.append(steps)
+    assert np.mean(taken) == pytest.approx(planner.plan(start).steps, abs=5 * np.std(taken) / np.sqrt(2000) + 1e-9)
+
+
+def test_an_outcome_that_was_not_intended_is_used_where_it_is_known():
+    table = Table(SPACE)
+    action = SPACE.actions(0).tolist().index(1)
+    table.outcomes[0, action, 0] = 80  # as if the arm slipped through
+    plan = Planner(SPACE, table, [80]).plan(0)
+    assert (plan.path, plan.actions) == ((0, 80), (action,))
+    assert plan.shortest == 8
+
+
+def test_the_nearest_of_several_targets_is_taken_and_at_a_target_there_is_nothing_to_do():
+    planner = Planner(SPACE, Table(SPACE), [2, 80])
+    assert planner.plan(0).path[-1] == 2
+    there = planner.plan(80)
+    assert (there.path, there.actions, there.success, there.steps, there.shortest) == ((80,), (), 1.0, 0.0, 0)
+
+
+def test_where_no_way_leads_the_states_are_named():
+    table = Table(SPACE, {(s, 80): 1.0 for s in range(81) if 80 in SPACE.actions(s)})
+    with pytest.raises(MobeeError, match=r"from state 0 of left_arm to \[80\]"):
+        Planner(SPACE, table, [80]).plan(0)
+    with pytest.raises(InvalidValue, match="no such state. Valid are 0 to 80"):
+        Planner(SPACE, table, [81])
+    with pytest.raises(InvalidValue, match="no such state"):
+        Planner(SPACE, table, [80]).plan(-1)
