@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.draws import Draws
 from mobee.learning.exploit import External, Goal
 from mobee.learning.explorers import EXPLORERS, choose
-from mobee.learning.space import Space
 from mobee.learning.plans import Plans
+from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome, Plant

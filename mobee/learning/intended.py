@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from mobee.learning.space import Space
 from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.robot.robot import Array, Ints
 

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, identity
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import spsolve
 
-from mobee.errors import InvalidValue, MobeeError
+from mobee.errors import MobeeError
 from mobee.learning.exploit import target_states
 from mobee.learning.intended import passing, steps_between
 from mobee.learning.space import Space

@@ -8,7 +8,6 @@ from mobee.learning.agent import CuriousAgent
 from mobee.learning.divergence import kl_divergence
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
-from mobee.learning.lattice import Lattice
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
 from tests.mobee.learning.toys import TORSO, FickleDice, InstantPlant, Interrupting, arm, torso, toy_robot
