@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.learning.model_error import l1, model_error, most_likely
+
+
+@dataclass
+class Table:
+    outcomes: np.ndarray
+    probabilities: np.ndarray
+
+
+TRUTH = Table(np.array([[[0, 1], [1, 0]], [[1, 0], [0, 0]]]), np.array([[[1.0, 0.0], [0.5, 0.5]], [[0.95, 0.05], [0.0, 0.0]]]))
+
+
+@st.composite
+def tables(draw):
+    """Any bins, several of them of one state."""
+    bins = draw(st.integers(1, 5))
+    rng = np.random.default_rng(draw(st.integers(0, 9999)))
+    weights = rng.random((3, 2, bins)) * (rng.random((3, 2, bins)) < 0.7)
+    return Table(rng.integers(0, 3, (3, 2, bins)), weights / np.maximum(weights.sum(axis=-1, keepdims=True), 1e-300))
+
+
+def dense(table):
+    full = np.zeros((3, 2, 3))
+    np.add.at(full, (*np.ogrid[:3, :2, :1][:2], table.outcomes), table.probabilities)
+    return full
+
+
+@given(tables(), tables())
+def test_l1_is_that_of_the_dense_distributions(beliefs, truth):
+    expected = np.abs(dense(beliefs) - dense(truth)).sum(axis=-1)
+    known = truth.probabilities.any(axis=-1)
+    found = l1(beliefs, truth)
+    assert found[known] == pytest.approx(expected[known])
+    assert np.isnan(found[~known]).all()
+
+
+def test_the_truth_has_no_error_and_the_order_of_bins_does_not_matter():
+    swapped = Table(TRUTH.outcomes[:, :, ::-1], TRUTH.probabilities[:, :, ::-1])
+    assert l1(swapped, TRUTH)[:, 0] == pytest.approx([0, 0])
+    assert np.isnan(l1(TRUTH, TRUTH)[1, 1])
+
+
+def test_the_error_is_told_over_all_and_over_the_stochastic_actions():
+    beliefs = Table(np.zeros((2, 2, 1), dtype=int), np.ones((2, 2, 1)))  # all end in state 0
+    overall, stochastic = model_error(beliefs, TRUTH)
+    assert overall == pytest.approx((0.0 + 1.0 + 1.9) / 3)
+    assert stochastic == pytest.approx(1.0)
+    assert most_likely(TRUTH)[0, 1] == 0.5
+
+
+def test_without_stochastic_actions_their_error_is_not_a_number():
+    certain = Table(np.zeros((1, 1, 1), dtype=int), np.ones((1, 1, 1)))
+    assert model_error(certain, certain)[0] == 0.0
+    assert np.isnan(model_error(certain, certain)[1])
