@@ -17,6 +17,7 @@ EXPERIMENTS = {
     "graze": "experiments.graze",
     "hypercube": "experiments.hypercube",
     "identify": "experiments.identify",
+    "rank4": "experiments.rank4",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
     "tune": "experiments.tune",
