@@ -38,8 +38,8 @@ class Motors:
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-            raise InvalidValue(f"seed {seed!r}: must be a whole number")
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+            raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
         self._robot = robot
         self.parameters = parameters
         self.seed = int(seed) % 2**64

@@ -38,7 +38,7 @@ class OfflinePlant:
 
     Args:
         model: the robot in its world.
-        seed: of the encoders' noise, a whole number.
+        seed: of the encoders' noise, a whole number, 0 or more.
         gains: of the control law; None: the default ones.
         motors: their parameters; None: those that bring out the published findings.
         dt: the control tick [s].

@@ -229,9 +229,10 @@ def test_parameters_of_another_number_of_motors_are_refused() -> None:
         motors(replace(IDEAL, friction=(0.1, 0.1)))
 
 
-def test_a_seed_that_is_no_whole_number_is_refused() -> None:
+@pytest.mark.parametrize("seed", [0.5, True, -1])
+def test_a_seed_that_is_no_whole_number_from_0_is_refused(seed) -> None:
     with pytest.raises(InvalidValue, match="seed"):
-        motors(seed=0.5)  # type: ignore[arg-type]
+        motors(seed=seed)
 
 
 def test_motors_that_do_not_live_never_move() -> None:
