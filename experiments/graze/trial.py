@@ -10,7 +10,8 @@ from experiments.graze.approach import Table, Way
 from experiments.graze.client import SPEED, Client
 from experiments.graze.truth import Truth
 from mobee.control import Controller, Gains, SettleTest
-from mobee.control.reflex import Reflex, ReflexSettings
+from mobee.control.reflex import Reflex
+from mobee.control.reflex_settings import ReflexSettings
 from mobee.robot.robot import Array
 from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
 from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
@@ -20,8 +21,6 @@ from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
-
-LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far more than any squash lets through, far less than overflows in it
 
 
 class Controller:
@@ -81,7 +80,7 @@ class Controller:
 
     @attractor.setter
     def attractor(self, q: Array) -> None:
-        self._attractor = _checked("attractor", q, len(self.robot.motors))
+        self._attractor = checked("attractor", q, len(self.robot.motors))
 
     @property
     def velocity(self) -> Array:
@@ -125,11 +124,11 @@ class Controller:
     def set_attractor(self, part: str, q: Array) -> None:
         """Set the slice of q* that belongs to a part: (n_part,) rad."""
         where = self.robot.part(part)
-        self._attractor[where.slice] = _checked(f"attractor of {part}", q, len(where))
+        self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
 
     def force(self, f: Array) -> None:
         """Apply a force in configuration space, (n,) rad/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
-        self._client = _checked_force("force", f, len(self.robot.motors))
+        self._client = checked_force("force", f, len(self.robot.motors))
 
     def push(self, marker: str, f: Array) -> None:
         """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
@@ -137,7 +136,7 @@ class Controller:
         Per unit mass: J^T f is in rad/s^2 before it is squashed.
         """
         self.robot.marker(marker)
-        self._pushes[marker] = _checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
+        self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
         """End all forces of the client."""
@@ -146,7 +145,7 @@ class Controller:
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
-        q = _checked("q", q, len(self.robot.motors))
+        q = checked("q", q, len(self.robot.motors))
         self._attractor = q
         self._state = self._at_rest(q)
         self.last_forces = Forces(np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
@@ -181,10 +180,10 @@ class Controller:
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
         n = len(self._attractor)
-        q = _checked("q", q, n)
+        q = checked("q", q, n)
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
-        total = _checked_force("forces", forces.total, n) + self.client_force(q)
+        total = checked_force("forces", forces.total, n) + self.client_force(q)
         packed = self._packed
         if self.modality == "torque":
             self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
@@ -203,22 +202,3 @@ class Controller:
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
             self._compiled.add_client(integers, floats, projected, total)
-
-
-def _checked(what: str, value: Array, length: int) -> Array:
-    """A copy of what must be that many finite numbers."""
-    array = np.array(value, dtype=np.float64)
-    if array.shape != (length,):
-        raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
-    if not np.isfinite(array).all():
-        worst = int(np.argmax(np.nan_to_num(np.abs(array), nan=np.inf)))
-        raise InvalidValue(f"{what}: number {worst} is {array[worst]}; must be {length} finite numbers")
-    return array
-
-
-def _checked_force(what: str, value: Array, length: int) -> Array:
-    """A copy of what must be that many numbers of at most LARGEST_FORCE."""
-    array = _checked(what, value, length)
-    if np.abs(array).max(initial=0.0) > LARGEST_FORCE:
-        raise InvalidValue(f"{what}: {array[np.abs(array).argmax()]:.3g}; must be at most {LARGEST_FORCE:g} in size")
-    return array

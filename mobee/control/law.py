@@ -21,7 +21,6 @@ from mobee.control.layout import (
     F_MOTOR,
     FEEDFORWARD,
     FELT,
-    FIRST_LOOK,
     HIGH,
     I_ACTIVE,
     I_FELT,
@@ -119,13 +118,6 @@ def torque_of(floats: Array, motor: int, state: Array) -> float:
     wanted = INERTIA * state[OWN_ACCELERATION, motor] + FRICTION * state[OWN_VELOCITY, motor] + state[FEEDFORWARD, motor]
     most = floats[F_MOTOR + motor * MOTOR + MAX_TORQUE]
     return min(max(wanted, -most), most)
-
-
-@inner_exact
-def settle_begin(settle: Array, start: float, test: Array) -> None:
-    """Begin a settle test at time `start` [s]; `test` (2,) remembers it."""
-    test[BEGUN] = start
-    test[NEXT_LOOK] = start + settle[FIRST_LOOK]
 
 
 @inner_exact

@@ -12,7 +12,7 @@ from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
 from mobee.collision.touch import links_moved
-from mobee.control.controller import LARGEST_FORCE
+from mobee.control.checked import LARGEST_FORCE
 from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service

@@ -12,7 +12,7 @@ from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
-from mobee.control.controller import LARGEST_FORCE
+from mobee.control.checked import LARGEST_FORCE
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.body import Body

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from mobee.control.reflex import ReflexSettings
+from mobee.control.reflex_settings import ReflexSettings
 from services.common.config import ServiceConfig
 
 _SETTINGS = ReflexSettings()

@@ -26,9 +26,17 @@ class SolidContact:
 class Backend(Protocol):
     """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
 
-    motors: Motors  # q and velocities as they are now
-    world: World
     pairs_watched: int
+
+    @property
+    def motors(self) -> Motors:
+        """Where they are now, and how fast."""
+        ...
+
+    @property
+    def world(self) -> World:
+        """What is around the robot now."""
+        ...
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s]."""

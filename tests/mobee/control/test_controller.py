@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mobee.control import Controller, Forces, Gains
-from mobee.control.controller import LARGEST_FORCE
+from mobee.control.checked import LARGEST_FORCE
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.reflex import Reflex, ReflexSettings
+from mobee.control.reflex import Reflex
+from mobee.control.reflex_settings import ReflexSettings
 from mobee.control.violation import Violation
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
