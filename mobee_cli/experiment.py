@@ -13,7 +13,7 @@ from typing import Any
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
 from experiments.run_folder import RESULTS, discard_unused, given_run, held, new_run, newest_run, options_of, write
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
 from mobee_cli.results_text import results_text
 
@@ -79,8 +79,13 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     options = parser.parse_args(given)
     if options.resume is None:
         return options
-    parser.set_defaults(**options_of(options.resume, experiment.NAME))
-    return parser.parse_args(given)
+    begun = options_of(options.resume, experiment.NAME)
+    parser.set_defaults(**begun)
+    options = parser.parse_args(given)
+    seed = begun.get("seed")
+    if options.seed != seed:
+        raise InvalidValue(f"{options.resume} has seed {seed}, not {options.seed}, and keeps it. Begin a new run without --resume.")
+    return options
 
 
 def _wrapped(notes: str) -> str:

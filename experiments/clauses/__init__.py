@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         for gains in arguments.gains:
             for kind, tries in (("attractors", arguments.tries), ("forced", arguments.forced_tries)):
                 path = folder / f"{gains}-{kind}.json"
-                state = load(path, gains, kind == "forced", arguments.seed)
+                state = load(path) if path.exists() else Search(gains, kind == "forced", arguments.seed)
                 for _ in search(state, tries):
                     keep(path, state)
                     progress.show(state.tries / tries, f"{gains}, {kind}: worst {state.worst:.2f} degrees after {state.tries} tries")

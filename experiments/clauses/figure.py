@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.clauses.command import from_numbers
 from experiments.clauses.search import CLAUSES, Search, load
-from experiments.clauses.trial import ARMS, model, try_commands
+from experiments.control.arm_command import from_numbers
+from experiments.control.arm_try import ARMS, try_commands
+from experiments.control.colors import COLORS
 from experiments.control.margins import clause_label, clause_violations
+from experiments.control.models import icub_at_table
 from experiments.control.ride import GAINS
 from experiments.matplotlib_figure import new_figure
 from mobee import Gains
 from mobee.errors import InvalidValue
 
-COLORS = {"default": "tab:blue", "published_2014": "tab:orange"}
+TERMS = re.compile(r"(?<!or)(?<!>) (?=or |[+-][\d.]+ [a-z])")  # where a line of a clause ends
 DASHES = {False: "-", True: ":"}
 
 
 def draw(folder: Path) -> Path:
     """Three panels: worst so far against tries, worst of each clause, the worst tries over time."""
-    kept = [(gains, forced, folder / f"{gains}-{'forced' if forced else 'attractors'}.json") for gains in GAINS for forced in (False, True)]
-    states = [load(path, gains, forced, 0) for gains, forced, path in kept if path.exists()]
+    kept = [folder / f"{gains}-{kind}.json" for gains in GAINS for kind in ("attractors", "forced")]
+    states = [load(path) for path in kept if path.exists()]
     if not states:
         raise InvalidValue(f"{folder} has no search in it: it was stopped before the first hundred tries.")
     drawing = new_figure(14.0, 4.6)
@@ -42,7 +45,7 @@ def draw(folder: Path) -> Path:
         line(2.0, color="tab:red", linewidth=0.8, linestyle="--")
     course.set(xlabel="tries", ylabel="largest violation so far [deg along the normal]", title="The search")
     course.legend(fontsize=7)
-    labels = [clause_label(model().robot, i).replace(" or ", "\nor ") for i in range(CLAUSES)]
+    labels = [TERMS.sub("\n", clause_label(icub_at_table().robot, i)) for i in range(CLAUSES)]
     clauses.set_yticks(range(CLAUSES), labels, fontsize=6)
     clauses.set(xlabel="largest violation [deg], red: allowed", title="By clause (open bars: client pushes)", xlim=(-60.0, 12.0))
     over_time.set(xlabel="time [s]", ylabel="violation [deg]", title="The worst tries", ylim=(-40.0, None))
@@ -58,5 +61,5 @@ def _replay(state: Search) -> tuple[Any, Any]:
     known: dict[str, Any] = state.worst_try
     commands = [from_numbers(numbers) for numbers in known["commands"]]
     trial = try_commands(Gains.named(state.gains), commands, np.array(known["torso"]), known["seed"])
-    column = known["arm"] * (len(model().robot.clauses) // len(ARMS)) + known["clause"]
-    return trial.ride.times, np.rad2deg(clause_violations(model().robot, trial.ride.q)[:, column])
+    column = known["arm"] * (len(icub_at_table().robot.clauses) // len(ARMS)) + known["clause"]
+    return trial.ride.times, np.rad2deg(clause_violations(icub_at_table().robot, trial.ride.q)[:, column])

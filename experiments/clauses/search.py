@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.clauses.command import Command, as_numbers, from_numbers, random_command, vary
-from experiments.clauses.trial import ARMS, Trial, try_commands
+from experiments.control.arm_command import Command, as_numbers, from_numbers, random_command, vary
+from experiments.control.arm_try import ARMS, Trial, try_commands
 from mobee import Gains
 
 RANDOM = 0.3  # of the tries
@@ -37,9 +37,9 @@ class Search:
     worst_try: dict[str, list[float] | list[list[float]] | int] = field(default_factory=dict)  # commands, torso, seed, arm, clause
 
 
-def load(path: Path, gains: str, forced: bool, seed: int) -> Search:
-    """The search as it was kept, or a new one."""
-    return Search(**json.loads(path.read_text())) if path.exists() else Search(gains, forced, seed)
+def load(path: Path) -> Search:
+    """The search as it was kept."""
+    return Search(**json.loads(path.read_text()))
 
 
 def keep(path: Path, state: Search) -> None:

@@ -19,12 +19,14 @@ from typing import Any
 
 import numpy as np
 
+from experiments.control.models import icub
 from experiments.control.ride import GAINS
+from experiments.control.steps import postures
 from experiments.options import positive_number, positive_whole
 from experiments.progress import Progress
 from experiments.records import Records, read_records
 from experiments.settle.figure import draw
-from experiments.settle.responses import Response, model, postures, responses
+from experiments.settle.responses import Response, responses
 from mobee.errors import UnknownName
 
 NAME = "settle"
@@ -61,7 +63,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def _require_motors(names: Sequence[str] | None) -> None:
-    known = model().robot.motors
+    known = icub().robot.motors
     for name in names or ():
         if name not in known:
             raise UnknownName("motor", name, known)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from experiments.control.ride import GAINS, PERIOD
+from experiments.control.colors import COLORS
+from experiments.control.models import icub
+from experiments.control.ride import PERIOD
+from experiments.control.steps import motor_step, step_ride
 from experiments.matplotlib_figure import new_figure
-from experiments.settle.responses import Response, model, motor_step, step_ride
+from experiments.settle.responses import Response
 from mobee import Gains
 from mobee.errors import InvalidValue
 
-COLORS = {"default": "tab:blue", "published_2014": "tab:orange"}
 SHOWN = ("torso_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup")
+SHARES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # % of a step, marked
+ASIDE = {False: 0.96, True: 1.04}  # times its period is where a motor's, and a posture's, mark stands
 
 
 def draw(found: Sequence[Response], path: Path) -> Path:
@@ -23,38 +28,51 @@ def draw(found: Sequence[Response], path: Path) -> Path:
         raise InvalidValue(f"{path.parent} has no responses: it was stopped before the first.")
     drawing = new_figure(13.0, 4.2)
     time, overshoot, steps = drawing.subplots(1, 3)
-    for gains in GAINS:
-        mine = [r for r in found if r.gains == gains]
-        for kind, marker in (("motors", "o"), ("postures", "s")):
-            some = [r for r in mine if r.is_posture == (kind == "postures")]
-            periods = sorted({r.period_ms for r in some})
-            for axes, of in ((time, lambda r: r.settling), (overshoot, lambda r: 100.0 * r.overshoot)):
-                values = [[of(r) for r in some if r.period_ms == period] for period in periods]
-                low, middle, high = (np.array([f(v) for v in values]) for f in (np.min, np.median, np.max))
-                shift = 1.04 if kind == "postures" else 0.96
-                axes.errorbar(
-                    np.array(periods) * shift, middle, [middle - low, high - middle],
-                    color=COLORS[gains], marker=marker, markersize=4.0, capsize=2.0, linestyle="-" if kind == "motors" else ":",
-                    label=f"{gains}, {'each motor alone' if kind == 'motors' else 'torso and arms'}",
-                )  # fmt: skip
-    for axes, label in ((time, "settling time to 5 % [s]"), (overshoot, "overshoot [% of the step]")):
-        axes.set(xlabel="control period [ms]", ylabel=label, xscale="log", ylim=(0.0, None), title="median, least and most")
-        axes.set_xticks(ticks := sorted({r.period_ms for r in found}), [f"{tick:g}" for tick in ticks])
-        axes.minorticks_off()
+    _against_period(time, found, lambda r: r.settling)
+    time.set(ylabel="settling time to 5 % [s]", title="Settling: median, least and most")
     time.legend(fontsize=7)
-    for gains in GAINS:
-        numbers = Gains.named(gains)
-        for i, motor in enumerate(SHOWN):
-            start, end = motor_step(model().robot.motors.index(motor))
-            done = step_ride(numbers, 1e3 * PERIOD[gains], start, end, seed=i)
-            joint = model().robot.motors.index(motor)
-            share = (done.q[:, joint] - start[joint]) / (end - start)[joint]
-            label = f"{gains}: {', '.join(SHOWN)}" if i == 0 else None
-            steps.plot(done.times, share, color=COLORS[gains], alpha=0.5, linewidth=1.0, label=label)
-    steps.axhline(1.0, color="0.5", linewidth=0.8)
-    steps.set(xlabel="time [s]", ylabel="share of the step", title="Steps of single motors", xlim=(0.0, 5.0))
-    steps.legend(fontsize=6, loc="lower right")
+    _against_period(overshoot, found, lambda r: 100.0 * r.overshoot)
+    overshoot.set(ylabel="overshoot [% of the step]", title="Overshoot: median, least and most", yscale="symlog", ylim=(0.0, None))
+    overshoot.set_yticks(SHARES, [f"{share:g}" for share in SHARES])
+    _single_steps(steps, list(dict.fromkeys(r.gains for r in found)))
     for axes in (time, overshoot, steps):
         axes.grid(alpha=0.2)
     drawing.savefig(path, dpi=150)
     return path
+
+
+def _against_period(axes: Any, found: Sequence[Response], value: Callable[[Response], float]) -> None:
+    periods = sorted({r.period_ms for r in found})
+    for gains, is_posture in dict.fromkeys((r.gains, r.is_posture) for r in found):
+        mine = [r for r in found if (r.gains, r.is_posture) == (gains, is_posture)]
+        at = sorted({r.period_ms for r in mine})
+        values = [[value(r) for r in mine if r.period_ms == period] for period in at]
+        low, middle, high = (np.array([of(v) for v in values]) for of in (min, np.median, max))
+        axes.errorbar(
+            np.array(at) * ASIDE[is_posture],
+            middle,
+            [middle - low, high - middle],
+            color=COLORS[gains],
+            marker="s" if is_posture else "o",
+            markersize=4.0,
+            capsize=2.0,
+            linestyle=":" if is_posture else "-",
+            label=f"{gains}, {'torso and arms' if is_posture else 'each motor alone'}",
+        )
+    axes.set(xlabel="control period [ms]", xscale="log", xlim=(periods[0] / 1.3, periods[-1] * 1.3), ylim=(0.0, None))
+    axes.set_xticks(periods, [f"{period:g}" for period in periods])
+    axes.minorticks_off()
+
+
+def _single_steps(axes: Any, sets: Sequence[str]) -> None:
+    for gains in sets:
+        for i, motor in enumerate(SHOWN):
+            joint = icub().robot.motors.index(motor)
+            start, end = motor_step(joint)
+            done = step_ride(Gains.named(gains), 1e3 * PERIOD[gains], start, end, seed=i)
+            share = (done.q[:, joint] - start[joint]) / (end - start)[joint]
+            axes.plot(done.times, share, color=COLORS[gains], alpha=0.5, linewidth=1.0, label=None if i else gains)
+    axes.axhline(1.0, color="0.5", linewidth=0.8)
+    axes.set(xlabel="time [s]", ylabel="share of the step", title=", ".join(SHOWN), xlim=(0.0, 5.0))
+    axes.title.set_fontsize(9)
+    axes.legend(fontsize=7, loc="lower right")

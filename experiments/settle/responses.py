@@ -1,42 +1,30 @@
-"""Steps of one motor or of many, and what is measured of the response."""
+"""The steps of a run: every motor alone, then whole postures one after the other."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from experiments.control.margins import clause_violations
-from experiments.control.ride import Ride, place, ride
+from experiments.control.models import icub
 from experiments.control.row import Row
-from mobee import Gains, Model, load_robot
+from experiments.control.steps import judge, motor_step, step_ride
+from mobee import Gains
 from mobee.robot.robot import Array
-from mobee.simulation import OfflinePlant
-
-STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, of the range: the smaller is the step of a motor alone
-BAND = 0.05  # of the step
-REST = 1.0  # s, the end of a ride, in which nothing may move
-WORTH = np.deg2rad(5.0)  # a smaller step of a motor among others is not judged
-TIME_CONSTANTS = 24.0  # a ride lasts so many of damping / stiffness
-LATTICE = {"torso": 3, "left_arm": 7, "right_arm": 7}
-MIDDLE = (0.25, 0.75)  # of the range of a motor in a posture
-MARGIN = np.deg2rad(15.0)  # from every constraint, of a posture
 
 
 @dataclass(frozen=True, slots=True)
 class Response(Row):
-    """A row of settle.csv."""
+    """A row of settle.csv: which step, and what `control.steps.Measured` says of it."""
 
     gains: str
     period_ms: float
     step: str  # the motor, or "posture 3"
-    settling: float  # s
-    overshoot: float  # of the step
-    error_deg: float  # between rest and attractor
-    rest_deg: float  # standard deviation at rest
+    settling: float
+    overshoot: float
+    error_deg: float
+    rest_deg: float
     is_settled: bool
 
     @property
@@ -45,86 +33,23 @@ class Response(Row):
         return self.step.startswith("posture ")
 
 
-@lru_cache(maxsize=1)
-def model() -> Model:
-    """The iCub alone."""
-    return Model(load_robot("icub"))
-
-
 def responses(
     gains: str, period_ms: float, motors: Sequence[str] | None, targets: Sequence[Array], seed: int, done: Collection[object]
 ) -> Iterator[Response]:
     """All steps that are not done yet; motors that the gain set never moves are left out."""
-    robot = model().robot
-    numbers = Gains.named(gains)
+    robot, numbers = icub().robot, Gains.named(gains)
     weight = numbers.weight(robot.motors)
+
+    def respond(step: str, start: Array, end: Array, number: int) -> Response:
+        found = judge(step_ride(numbers, period_ms, start, end, seed + number), start, end)
+        return Response(gains, period_ms, step, **asdict(found))
+
     for i, motor in enumerate(robot.motors):
         if weight[i] and (motors is None or motor in motors) and (gains, period_ms, motor) not in done:
-            start, end = motor_step(i)
-            yield judge(step_ride(numbers, period_ms, start, end, seed + i), start, end, gains, period_ms, motor)
+            yield respond(motor, *motor_step(i), i)
     before = robot.home
     for number, target in enumerate(targets):
-        name = f"posture {number}"
-        if (gains, period_ms, name) not in done:
-            end = np.where(weight > 0, target, robot.home)
-            yield judge(step_ride(numbers, period_ms, before, end, seed + number), before, end, gains, period_ms, name)
-        before = np.where(weight > 0, target, robot.home)
-
-
-def motor_step(motor: int) -> tuple[Array, Array]:
-    """From below the middle of a motor's range to above it, the others at home."""
-    robot = model().robot
-    low, high = robot.limits[motor]
-    size = min(STEP, SHARE * (high - low))
-    start, end = robot.home.copy(), robot.home.copy()
-    start[motor], end[motor] = (low + high - size) / 2.0, (low + high + size) / 2.0
-    return start, end
-
-
-def postures(count: int, seed: int) -> list[Array]:
-    """Random postures of torso and arms, one after the other from home, with nothing in the way that any field would feel."""
-    robot, rng = model().robot, np.random.default_rng(seed)
-    found = [robot.home]
-    while len(found) <= count:
-        q = robot.home.copy()
-        for part, motors in LATTICE.items():
-            where = slice(robot.parts[part].start, robot.parts[part].start + motors)
-            low, high = robot.limits[where].T
-            q[where] = low + rng.uniform(*MIDDLE, motors) * (high - low)
-        # Motors get there at different times, so the way is not the line: the torso first, then the arms, and the other way round.
-        ways = np.linspace(0.0, 1.0, 11)[:, None, None]
-        torso = np.arange(len(q)) < robot.parts["torso"].slice.stop
-        corners = np.stack([np.where(torso, q, found[-1]), np.where(torso, found[-1], q)])
-        sides = np.stack([np.stack([found[-1], found[-1], found[-1]]), np.stack([*corners, q]), np.stack([q, q, q])])
-        path = np.concatenate([a + ways * (b - a) for a, b in pairwise(sides)]).reshape(-1, len(q))
-        if clause_violations(robot, path).max() < -MARGIN and not len(model().evaluate(path).table):
-            found.append(q)
-    return found[1:]
-
-
-def step_ride(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> Ride:
-    """At rest at `start` (n,) rad, then the attractor is `end`."""
-    plant = OfflinePlant(model(), seed, gains, dt=period_ms / 1e3)
-    place(plant, start)
-    plant.controller.attractor = end
-    return ride(plant, TIME_CONSTANTS * gains.damping / gains.stiffness)
-
-
-def judge(done: Ride, start: Array, end: Array, gains: str, period_ms: float, step: str) -> Response:
-    """Measure the joints that had to go WORTH or farther."""
-    moved = np.abs(end - start) >= WORTH
-    rest = done.last(REST).q[:, moved]
-    final = rest.mean(axis=0)
-    beyond = (done.q[:, moved] - final) / (end - start)[moved]
-    outside = np.abs(beyond) > BAND
-    settling = done.dt * max(int(np.flatnonzero(row)[-1]) + 1 if row.any() else 0 for row in outside.T)
-    return Response(
-        gains,
-        period_ms,
-        step,
-        settling,
-        overshoot=float(np.maximum(beyond, 0.0).max()),
-        error_deg=float(np.rad2deg(np.abs(end[moved] - final).max())),
-        rest_deg=float(np.rad2deg(rest.std(axis=0).max())),
-        is_settled=bool(settling <= done.times[-1] - REST),
-    )
+        end = np.where(weight > 0, target, robot.home)
+        if (gains, period_ms, f"posture {number}") not in done:
+            yield respond(f"posture {number}", before, end, number)
+        before = end

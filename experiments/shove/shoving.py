@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
 from experiments.control.depths import deepest
 from experiments.control.margins import clause_violations, limit_violations
+from experiments.control.models import icub_at_table
 from experiments.control.ride import PERIOD, ride
 from experiments.control.row import Row
-from mobee import Gains, Model, load_robot, load_world
+from mobee import Gains
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
@@ -23,10 +23,10 @@ BEFORE, SHOVE, AFTER = 1.0, 0.4, 6.0  # s
 AT_STOP = np.deg2rad(0.01)
 # Root frame: x backwards, y right, z up.
 DIRECTIONS = {
-    "down, to the table": (0.0, 0.0, -1.0),
-    "back, to the body": (1.0, 0.0, 0.0),
-    "inward, to the other hand": (0.0, 1.0, 0.0),
-    "up, to the face": (0.5, 0.4, 0.75),
+    "down-to-table": (0.0, 0.0, -1.0),
+    "back-to-body": (1.0, 0.0, 0.0),
+    "inward-to-other-hand": (0.0, 1.0, 0.0),
+    "up-to-face": (0.5, 0.4, 0.75),
     "outward": (0.0, -1.0, 0.0),
 }
 
@@ -46,12 +46,6 @@ class Shoved(Row):
     stop_deg_s: float  # fastest arrival at a hard stop
     away_mm: float  # of the hand from where it was, at the end
     pair: str  # of solids, the deepest
-
-
-@lru_cache(maxsize=1)
-def model() -> Model:
-    """The iCub at the table."""
-    return Model(load_robot("icub"), load_world("table"))
 
 
 class Shove:
@@ -78,14 +72,14 @@ def shove(law: str, direction: str, force: float, seed: int) -> Shoved:
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
         gains = replace(gains, weights=(("*", 0.0),))
-    plant = OfflinePlant(model(), seed, gains, dt=PERIOD[gains.law])
+    plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])
     push = force * np.array(DIRECTIONS[direction]) / np.linalg.norm(DIRECTIONS[direction])
     home = plant.robot.home
     done = ride(plant, BEFORE + SHOVE + AFTER, Shove(plant, push, BEFORE, BEFORE + SHOVE))
-    hand = model().evaluate(done.q).position(MARKER)
+    hand = icub_at_table().evaluate(done.q).position(MARKER)
     start = hand[round(BEFORE / plant.dt) - 1]
     away = np.linalg.norm(hand - start, axis=1)
-    depths = deepest(model(), done.q)
+    depths = deepest(icub_at_table(), done.q)
     inside = limit_violations(plant.robot, home[None])[0] < -AT_STOP
     arriving = np.diff(done.q, axis=0, prepend=home[None]) / done.dt * (limit_violations(plant.robot, done.q) > -AT_STOP)
     return Shoved(

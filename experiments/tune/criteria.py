@@ -8,14 +8,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from experiments.clauses.command import Command, random_command
-from experiments.clauses.trial import try_commands
+from experiments.control.arm_command import Command, random_command
+from experiments.control.arm_try import try_commands
 from experiments.control.depths import deepest
+from experiments.control.models import icub_at_table
 from experiments.control.ride import ride
 from experiments.control.row import Row
-from experiments.settle.responses import judge, motor_step, postures, step_ride
-from experiments.tune.press import model, press, targets
-from experiments.wall.pressing import WALLS
+from experiments.control.steps import judge, motor_step, postures, step_ride
+from experiments.control.walls import WALLS
+from experiments.tune.press import press, targets
 from mobee import Gains
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
@@ -23,7 +24,7 @@ from mobee.simulation import OfflinePlant
 STEPPED = ("torso_yaw", "torso_pitch", "l_shoulder_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup", "neck_yaw")
 POSTURES, TARGETS, COMMANDS = 4, 10, 40
 AGES = (1, 3, 4)  # ticks of 10 ms; the last is one more than must be stable
-SHOVED = ("table, left hand", "table, both hands", "table edge", "chest", "face", "the other hand")
+SHOVED = ("table-left-hand", "table-both-hands", "table-edge", "chest", "face", "other-hand")
 STRONG, PUSHED = 300.0, 3.0  # N/kg before the squash; s
 WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # how many; s each; s a target, in the joint box
 AT_ENDS = 0.5  # of the motors' targets are an end of the range, where the springs of many motors push together
@@ -94,21 +95,21 @@ def evaluate(gains: Gains) -> Judged:
         clause_deg=clause,
         forced_deg=_clauses(gains, forced=True)[0],
         stop_deg_s=stop,
-        longest_ms=1e3 * OfflinePlant(model(), gains=gains, dt=1e-3).controller.max_dt,
+        longest_ms=1e3 * OfflinePlant(icub_at_table(), gains=gains, dt=1e-3).controller.max_dt,
     )
 
 
 def _steps(gains: Gains) -> tuple[float, float]:
-    robot, home = model().robot, model().robot.home
+    robot, home = icub_at_table().robot, icub_at_table().robot.home
     steps = [motor_step(robot.motors.index(motor)) for motor in STEPPED] + [(home, target) for target in _postures()]
-    responses = [judge(step_ride(gains, 10.0, *step, seed=i), *step, gains.law, 10.0, "") for i, step in enumerate(steps)]
+    responses = [judge(step_ride(gains, 10.0, *step, seed=i), *step) for i, step in enumerate(steps)]
     return float(np.median([r.settling for r in responses])), max(r.overshoot for r in responses[: len(STEPPED)])
 
 
 def _wander(gains: Gains, seed: int) -> float:
     """The deepest solid [m] on the way between random postures, with whatever is between them."""
-    robot, rng = model().robot, np.random.default_rng(seed)
-    plant = OfflinePlant(model(), seed, gains, speed_scale=SPEEDS[seed % len(SPEEDS)])
+    robot, rng = icub_at_table().robot, np.random.default_rng(seed)
+    plant = OfflinePlant(icub_at_table(), seed, gains, speed_scale=SPEEDS[seed % len(SPEEDS)])
     moving = np.concatenate([np.arange(len(robot.motors))[robot.parts[part].slice][:FINGERS] for part in WANDERING])
     found = 0.0
     for _ in range(round(WANDER / HOLD)):
@@ -118,14 +119,14 @@ def _wander(gains: Gains, seed: int) -> float:
         low, high = robot.limits[moving].T
         attractor[moving] = low + levels * (high - low)
         plant.controller.attractor = attractor
-        found = max(found, deepest(model(), ride(plant, HOLD).q[::2]).solid)
+        found = max(found, deepest(icub_at_table(), ride(plant, HOLD).q[::2]).solid)
     return found
 
 
 def _pushed(gains: Gains, wall: str) -> float:
-    plant = OfflinePlant(model(), 0, gains)
+    plant = OfflinePlant(icub_at_table(), 0, gains)
     WALLS[wall](plant.controller, STRONG)
-    return deepest(model(), ride(plant, PUSHED).q[::2]).solid
+    return deepest(icub_at_table(), ride(plant, PUSHED).q[::2]).solid
 
 
 def _clauses(gains: Gains, forced: bool) -> tuple[float, float]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from experiments.control.depths import deepest, oscillation
+from experiments.control.models import icub, icub_at_table
 from experiments.control.ride import ride
-from mobee import Gains, Model, load_robot, load_world
+from mobee import Gains
 from mobee.robot.robot import Array
 from mobee.simulation import MotorParameters, OfflinePlant
 
@@ -31,16 +31,10 @@ class Pressed:
     chatter: float  # of the palms
 
 
-@lru_cache(maxsize=1)
-def model() -> Model:
-    """The iCub at the table."""
-    return Model(load_robot("icub"), load_world("table"))
-
-
 def targets(count: int) -> list[Array]:
     """Postures without a table in which a palm is below the top of the table to come."""
-    robot = model().robot
-    rng, free = np.random.default_rng(SEED), Model(robot)
+    robot = icub_at_table().robot
+    rng, free = np.random.default_rng(SEED), icub()
     found: list[Array] = []
     while len(found) < count:
         q = robot.home.copy()
@@ -58,9 +52,9 @@ def targets(count: int) -> list[Array]:
 
 def press(gains: Gains, target: Array, age: int, dt: float = 0.01) -> Pressed:
     """Send all parts to the target at once, with commands that are `age` ticks old, and watch."""
-    late = MotorParameters(delay=MotorParameters().delay + (age - 1) * dt)
-    plant = OfflinePlant(model(), SEED, gains, late, dt)
+    late = MotorParameters(delay=float(MotorParameters().of_motors("delay", 1)[0]) + (age - 1) * dt)
+    plant = OfflinePlant(icub_at_table(), SEED, gains, late, dt)
     plant.controller.attractor = target
     done = ride(plant, SECONDS)
-    depths, rest = deepest(model(), done.q[::2]), done.last(REST)
-    return Pressed(depths.solid, depths.field, max(oscillation(model(), rest, palm) for palm in PALMS))
+    depths, rest = deepest(icub_at_table(), done.q[::2]), done.last(REST)
+    return Pressed(depths.solid, depths.field, max(oscillation(icub_at_table(), rest, palm) for palm in PALMS))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from experiments.control.models import icub
 from experiments.tune.criteria import Judged, evaluate, objective
-from experiments.tune.press import model
 from mobee import Controller, Gains
 
 # Motors with a spring of their own: those of the torso move the hands farthest, those of the shoulders elbows against the chest.
@@ -65,7 +65,7 @@ def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
 
 def numbers_of(gains: Gains) -> dict[str, float]:
     """What is tuned."""
-    motors = model().robot.motors
+    motors = icub().robot.motors
     springs = gains.of_motors("max_spring", motors)
     numbers = {name: float(getattr(gains, name)) for name in TUNED if name not in SPRINGS}
     return numbers | {name: float(springs[[fnmatchcase(m, pattern) for m in motors]][0]) for name, pattern in SPRINGS.items()}
@@ -89,7 +89,7 @@ def _next(tried: list[Tried], seed: int) -> dict[str, float]:
         best = one if is_better else best
     while True:
         numbers = _changed(best.numbers, step, rng)
-        if Controller(model(), gains_with(numbers)).max_dt > LEAST:
+        if Controller(icub(), gains_with(numbers)).max_dt > LEAST:
             return numbers
 
 

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from experiments.control.ride import GAINS
+from experiments.control.walls import WALLS
 from experiments.progress import Progress
 from experiments.records import Records, read_records
 from experiments.wall.drawn import DRAWN, Drawn, draw_hand
 from experiments.wall.figure import draw
-from experiments.wall.pressing import WALLS, Pressed, press
+from experiments.wall.pressing import Pressed, press
 
 NAME = "wall"
 CLAIM = "no force of a client drives the robot into table, body or limits, and a hand drawn through singular poses stays calm"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from experiments.control.depths import oscillation
+from experiments.control.models import icub
 from experiments.control.ride import PERIOD, place, ride
 from experiments.control.row import Row
-from mobee import Gains, Model, load_robot
+from mobee import Gains
 from mobee.control import Reacher
 from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
@@ -65,32 +65,26 @@ HOME = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)
 STRETCHED = (-70.0, 30.0, 0.0, 16.0, 0.0, -40.0, 0.0)
 ALIGNED = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)  # the axes of prosup and wrist yaw: at wrist pitch 0
 DRAWN = {
-    "in reach": Goal(HOME, ((-0.05, 0.0, 0.15),)),
-    "stretched, ahead": Goal(HOME, ((-0.5, 0.0, 0.1),)),
-    "stretched, aside": Goal(HOME, ((0.1, -0.6, 0.1),)),
-    "stretched, above": Goal(HOME, ((0.0, 0.0, 0.8),)),
-    "behind the robot": Goal(HOME, ((0.8, -0.1, 0.2),)),
-    "out of a stretched arm": Goal(STRETCHED, ((-0.02, 0.05, 0.05),)),
-    "stretched and back": Goal(HOME, ((-0.5, 0.0, 0.15), (0.0, 0.0, 0.1))),
-    "wrist axes aligned": Goal(ALIGNED, ((-0.05, 0.1, 0.1), (-0.05, -0.1, 0.1))),
+    "in-reach": Goal(HOME, ((-0.05, 0.0, 0.15),)),
+    "stretched-ahead": Goal(HOME, ((-0.5, 0.0, 0.1),)),
+    "stretched-aside": Goal(HOME, ((0.1, -0.6, 0.1),)),
+    "stretched-above": Goal(HOME, ((0.0, 0.0, 0.8),)),
+    "behind-the-robot": Goal(HOME, ((0.8, -0.1, 0.2),)),
+    "out-of-a-stretched-arm": Goal(STRETCHED, ((-0.02, 0.05, 0.05),)),
+    "stretched-and-back": Goal(HOME, ((-0.5, 0.0, 0.15), (0.0, 0.0, 0.1))),
+    "wrist-axes-aligned": Goal(ALIGNED, ((-0.05, 0.1, 0.1), (-0.05, -0.1, 0.1))),
 }
-
-
-@lru_cache(maxsize=1)
-def model() -> Model:
-    """The iCub alone."""
-    return Model(load_robot("icub"))
 
 
 def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
     """Draw the hand to the targets of a goal, each for its share of the time."""
-    goal, robot = DRAWN[name], model().robot
-    plant = OfflinePlant(model(), seed, Gains.named(gains), dt=PERIOD[gains])
+    goal, robot = DRAWN[name], icub().robot
+    plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
     start = robot.home.copy()
     first = robot.parts[ARM].start
     start[first : first + len(goal.start)] = np.deg2rad(goal.start)
     place(plant, start)
-    home = model().evaluate(robot.home).position(MARKER)
+    home = icub().evaluate(robot.home).position(MARKER)
     targets = [home + np.array(target) for target in goal.targets]
     ticks = round(SECONDS / plant.dt / len(targets))
 
@@ -105,16 +99,16 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Way]:
         reacher.update(q, plant.dt)
 
     done = ride(plant, ticks * plant.dt * len(targets), pull)
-    hand = model().evaluate(done.q).position(MARKER)
+    hand = icub().evaluate(done.q).position(MARKER)
     target = np.repeat(targets, ticks, axis=0)
     dead = max(_dead(hand[i * ticks : (i + 1) * ticks], plant.dt) for i in range(len(targets)))
-    restless = oscillation(model(), done.last(REST), MARKER)
+    restless = oscillation(icub(), done.last(REST), MARKER)
     left = float(np.linalg.norm(hand[-1] - targets[-1]))
     return Drawn(gains, name, 1e3 * restless, dead, 1e3 * left), Way(done.times, hand, target)
 
 
 def _file(folder: Path, gains: str, name: str) -> Path:
-    return folder / f"{gains}-{name.replace(', ', ' ').replace(' ', '-')}.npz"
+    return folder / f"{gains}-{name}.npz"
 
 
 def _dead(hand: Array, dt: float) -> float:

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.control.colors import COLORS
 from experiments.matplotlib_figure import new_figure
 from experiments.wall.drawn import DRAWN, Drawn, Way
 from experiments.wall.pressing import LEVELS, Pressed
 from mobee.errors import InvalidValue
-
-COLORS = {"default": "tab:blue", "published_2014": "tab:orange"}
 
 
 def draw(pressed: Sequence[Pressed], drawn: Sequence[Drawn], path: Path) -> Path:
@@ -63,7 +62,7 @@ def _ways(drawing: object, drawn: Sequence[Drawn], folder: Path) -> None:
                 way = Way.load(folder, gains, name)
                 label = f"{gains}: at rest ±{result.oscillation_mm:.2f} mm, dead {result.dead_s:.1f} s"
                 axes.plot(way.times, np.linalg.norm(way.place - way.target, axis=1), color=color, label=label)
-        axes.set_title(f"drawn: {name}", fontsize=8)
+        axes.set_title(f"drawn: {name.replace('-', ' ')}", fontsize=8)
         axes.set(xlabel="time [s]", ylabel="from the target [m]", ylim=(0.0, None))
         axes.legend(fontsize=6)
         axes.grid(alpha=0.2)

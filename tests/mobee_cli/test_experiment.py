@@ -78,6 +78,13 @@ def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
     assert results["katana"]["objects_reached"] == 3
 
 
+def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):
+    main(["experiment", "run", "flood", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"])
+    folder = json.loads(capsys.readouterr().out)["run"]
+    assert main(["experiment", "run", "flood", "--resume", folder, "--seed", "4"]) == 2
+    assert f"{folder} has seed 3, not 4" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -5,9 +5,9 @@ import importlib
 import numpy as np
 import pytest
 
-from experiments.clauses.command import PHASES, random_command
 from experiments.clauses.search import Search, keep, load, search
-from experiments.clauses.trial import Trial, try_commands
+from experiments.control.arm_command import PHASES, random_command
+from experiments.control.arm_try import Trial, try_commands
 from experiments.control.margins import clause_violations
 from experiments.control.ride import Ride
 from mobee import Gains, load_robot
@@ -47,7 +47,7 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(imagined, tmp_path)
         keep(path, state)
         if state.tries >= 300:
             break
-    again = run(load(path, "default", False, 5), 600)
+    again = run(load(path), 600)
     assert (again.tries, again.worst, again.by_clause, again.inside) == (600, whole.worst, whole.by_clause, whole.inside)
 
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from experiments import shove
+from experiments.control.models import icub_at_table
 from experiments.shove import shoving
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.simulation import OfflinePlant
 
 
 def test_a_shove_speeds_a_joint_up_as_inertia_and_friction_say() -> None:
-    plant = OfflinePlant(shoving.model())
+    plant = OfflinePlant(icub_at_table())
     push = np.array([0.0, 0.0, -1.0])
     torque = plant.model.jacobian(plant.motors.q, shoving.MARKER)[:3].T @ push
     before = plant.motors.q.copy()
@@ -24,7 +25,7 @@ def test_a_shove_speeds_a_joint_up_as_inertia_and_friction_say() -> None:
 
 
 def test_before_its_time_a_shove_moves_nothing() -> None:
-    plant = OfflinePlant(shoving.model())
+    plant = OfflinePlant(icub_at_table())
     before = plant.motors.q.copy()
     shoving.Shove(plant, np.array([0.0, 0.0, -50.0]), 1.0, 2.0)(99)
     assert np.array_equal(plant.motors.q, before)
@@ -39,8 +40,8 @@ def test_with_mobee_the_hand_comes_back_and_without_it_does_not() -> None:
 def test_a_small_run_is_told_and_drawn_and_not_done_twice(tmp_path, monkeypatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(shove, "FORCES", (2.0, 50.0))
-    arguments = argparse.Namespace(laws=["default"], directions=["down, to the table"], seed=0)
+    arguments = argparse.Namespace(laws=["default"], directions=["down-to-table"], seed=0)
     found = shove.run(arguments, tmp_path)
-    assert found["default"]["down, to the table"]["solids_touch_from_N"] == 50.0
+    assert found["default"]["down-to-table"]["solids_touch_from_N"] == 50.0
     assert shove.run(arguments, tmp_path) == found
     assert shove.figure(tmp_path).read_bytes().startswith(b"\x89PNG")

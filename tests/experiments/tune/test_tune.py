@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from experiments import tune
+from experiments.control.models import icub
 from experiments.tune.criteria import Judged, objective
-from experiments.tune.press import model, press, targets
+from experiments.tune.press import press, targets
 from experiments.tune.search import TUNED, gains_with, numbers_of, search
 from mobee import Gains
 
@@ -65,7 +66,7 @@ def test_numbers_become_gains() -> None:
     numbers = {**numbers_of(Gains.default()), "max_spring of the torso": 7.0, "damping": 33.0}
     gains = gains_with(numbers)
     assert gains.damping == 33.0
-    assert gains.of_motors("max_spring", model().robot.motors)[:3].tolist() == [7.0] * 3
+    assert gains.of_motors("max_spring", icub().robot.motors)[:3].tolist() == [7.0] * 3
 
 
 def test_a_press_finds_the_table_with_a_field() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.clauses.command import FAR, LONG, SHORT, as_numbers, from_numbers, random_command, vary
+from experiments.control.arm_command import FAR, LONG, SHORT, as_numbers, from_numbers, random_command, vary
 
 
 def test_random_commands_leave_the_joint_box_and_stay_in_it() -> None:

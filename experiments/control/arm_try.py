@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from experiments.clauses.command import MOTORS, Command
+from experiments.control.arm_command import MOTORS, Command
 from experiments.control.margins import clause_violations, limit_violations
+from experiments.control.models import icub_at_table
 from experiments.control.ride import PERIOD, Ride, place, ride
-from mobee import Controller, Gains, Model, load_robot, load_world
+from mobee import Controller, Gains
 from mobee.robot.robot import Array, Robot
 from mobee.simulation import OfflinePlant
 
@@ -30,16 +30,10 @@ class Trial:
     stop: Array  # (2,) rad/s, the fastest arrival at a hard stop
 
 
-@lru_cache(maxsize=1)
-def model() -> Model:
-    """The iCub at the table."""
-    return Model(load_robot("icub"), load_world("table"))
-
-
 def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: int) -> Trial:
     """Both arms do as they are told, the torso goes to `torso` (3,), half ranges from its middle."""
-    robot = model().robot
-    plant = OfflinePlant(model(), seed, gains, dt=PERIOD[gains.law])
+    robot = icub_at_table().robot
+    plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])
     start = robot.home.copy()
     for part, command in zip(ARMS, commands, strict=True):
         start[_motors(robot, part)] = _angles(robot, part, command.start)
