@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.robots.icub_fields import BESIDE, HEAD, LEFT_ARM, TRUNK, Field
-from experiments.robots.icub_solids import BOXES
-from experiments.robots.xml_writer import box_turn, element, number, vector, write
-from mobee.robot.bodies import to_six
+from experiments.robots.icub_carried import add_fields, add_markers, add_mass, add_shapes
+from experiments.robots.icub_fields import BESIDE
+from experiments.robots.icub_motors import EYES, declare_motors, joint_interval, motor_of
+from experiments.robots.xml_writer import element, number, vector, write
 from mobee.robot.robot import Array
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
@@ -26,9 +26,6 @@ iCub v2.5 upper body, 41 motors. Written by experiments/robots/write_icub.py; do
 Kinematics and solids derive from robotology/icub-models (Istituto Italiano di Tecnologia), licence CC BY-SA 4.0;
 this file is distributed under the same licence. Origin of every number: README.md beside this file.
 """
-HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 60.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
-GAZE = {"neck_pitch": -26.0, "eyes_tilt": -18.0, "eyes_vergence": 11.0}  # on the table in front of the body, clear of the limits' forces
-EYES = {"eyes_version": (-30.0, 30.0), "eyes_vergence": (0.0, 50.0)}  # version +- vergence / 2 just fills the URDF's pan limits
 # A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
 ANCHORS = {
     "torso": (0.0, 0.0, 0.032),
@@ -37,19 +34,6 @@ ANCHORS = {
     "elbow": (-0.0106198, -0.109391, 0.01574),
     "wrist_prosup": (-0.0106198, -0.109391, 0.01574),
     "wrist": (-0.0084698, -0.109398, -0.12656),
-}
-# finger axis -> joints that it drives; spread opens (0) to closed (60), so its joints end at 0
-SPREAD = {"index_0": (-20.0, 0.0), "ring_0": (20.0, 0.0), "little_0": (20.0, 0.0)}
-FINGERS = {
-    "hand_finger": ("index_0", "ring_0", "little_0"),
-    "thumb_oppose": ("thumb_0",),
-    "thumb_proximal": ("thumb_1",),
-    "thumb_distal": ("thumb_2", "thumb_3"),
-    "index_proximal": ("index_1",),
-    "index_distal": ("index_2", "index_3"),
-    "middle_proximal": ("middle_1",),
-    "middle_distal": ("middle_2", "middle_3"),
-    "pinky": ("ring_1", "ring_2", "ring_3", "little_1", "little_2", "little_3"),
 }
 RIGID = {"l_upper_arm": "l_shoulder_3", "r_upper_arm": "r_shoulder_3", "l_hand_middle_0": "l_hand", "r_hand_middle_0": "r_hand"}
 
@@ -118,19 +102,6 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
         add_joints(pan, data, source, here)
 
 
-def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
-    """What moves with a joint, relative to a point.
-
-    Fingers and eyes are left out: 0.01 kg each and 0.001 kg m^2 are placeholders of the source, in whose other model hand and head
-    weigh the same without them; that is the one which is simulated.
-    """
-    if "_hand_" in joint["name"] or "eye" in joint["name"]:
-        return
-    place = vector("px py pz", np.array(joint["body_com_root"]) - point)
-    inertia = " ".join(number(value, 9) for value in to_six(np.array(joint["body_inertia_com_root_axes"])))
-    element(parent, "mass", value=joint["body_mass_kg"], **place, inertia=inertia)
-
-
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:
     """The point on the joint's axis nearest to its cluster's anchor."""
     plain = name.removeprefix("l_").removeprefix("r_")
@@ -141,37 +112,6 @@ def skeleton_point(name: str, point: Array, axis: Array) -> Array:
     return point + axis * float(axis @ (np.array(ANCHORS[key]) * (1.0, side, 1.0) - point))
 
 
-def motor_of(joint: str) -> str:
-    """The motor that drives a joint: the joint's namesake, except in the hands."""
-    side, _, rest = joint.partition("_hand_")
-    finger = next((motor for motor, joints in FINGERS.items() if rest in joints), None)
-    return f"{side}_{finger}" if finger else joint
-
-
-def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, float] | None:
-    """The joint's interval [deg] where it is not the motor's own."""
-    finger = name.partition("_hand_")[2]
-    if finger in SPREAD:
-        return SPREAD[finger]
-    if motor.endswith(("distal", "pinky")):
-        return limits[0], limits[1]
-    return None
-
-
-def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
-    """A part's motors in YARP order; limits are the narrower of URDF and iCub simulator."""
-    parts = data["yarp_parts"]
-    joints = {j["name"]: j for j in data["models"]["icub_v2_5"]["joints"]}
-    simulator = parts["limits_deg"]["icub_simulator"]["arm" if part.endswith("arm") else part]
-    for name, (low, high) in zip(parts["order"][part], simulator, strict=True):
-        if name in EYES:
-            low, high = EYES[name]
-        elif name in joints:
-            low, high = max(low, joints[name]["limits_deg"][0]), min(high, joints[name]["limits_deg"][1])
-        home = HOME.get(name[2:], 0.0) if part.endswith("arm") else GAZE.get(name, 0.0)
-        element(parent, "motor", name=name, minPos=low, maxPos=high, home=home)
-
-
 def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
     """The cable and forearm clauses of an arm, as in MoBeE 2014."""
     for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
@@ -180,73 +120,6 @@ def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
             used = [(a, q) for a, q in zip(row["a"], row["motor_indices"], strict=True) if a]
             factors, motors = " ".join(number(a) for a, _ in used), " ".join(str(q) for _, q in used)
             element(rows, "constraint", a=factors, q=motors, b=row["b"])
-
-
-def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """The solids of a link, relative to a point."""
-    for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
-        width, height, depth = high - low
-        place = vector("px py pz", (low + high) / 2 - point)
-        element(parent, "box", name=f"{link}_{index}", width=width, height=height, depth=depth, **place)
-    for shape in model["primitives"]:
-        if shape["link"] != link or link in BOXES:
-            continue
-        place = vector("px py pz", np.array(shape["center"]) - point)
-        if shape["shape"] == "sphere":
-            element(parent, "sphere", name=shape["name"], radius=shape["radius"], **place)
-        elif shape["shape"] == "cylinder":
-            turn = vector("hx hy hz", np.array(shape["axis"]))
-            element(parent, "cylinder", name=shape["name"], radius=shape["radius"], height=shape["height"], **place, **turn)
-        else:
-            width, height, depth = shape["size"]
-            turn = box_turn(np.array(shape["R"]))
-            element(parent, "box", name=shape["name"], width=width, height=height, depth=depth, **place, **turn)
-
-
-def add_fields(parent: ET.Element, link: str, point: Array) -> None:
-    """The fields of a link, relative to a point."""
-    for name, host, radius, first, second in fields():
-        if host != link:
-            continue
-        ends = np.array([first, second])
-        place = vector("px py pz", ends.mean(axis=0) - point)
-        span = ends[1] - ends[0]
-        if span.any():
-            height = float(np.linalg.norm(span))
-            turn = vector("hx hy hz", span / height)
-            element(parent, "capsule", name=name, radius=radius, height=height, field="true", **place, **turn)
-        else:
-            element(parent, "sphere", name=name, radius=radius, field="true", **place)
-
-
-def fields() -> list[Field]:
-    """All fields, with link names in full."""
-    mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
-    arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
-    return TRUNK + HEAD + arms
-
-
-def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
-    """The markers of a link, relative to a point."""
-    model = data["models"]["icub_v2_5"]
-    palms = model["end_effector_zero_root"]
-    for side, sign in (("left", -1.0), ("right", 1.0)):
-        if link == f"{side[0]}_hand":
-            rotation = np.array(palms[side]["R"])
-            add_marker(parent, f"{side}_palm", np.array(palms[side]["p"]) - point, rotation, sign * rotation[:, 2])
-        if link == f"{side[0]}_elbow_1":
-            add_marker(parent, f"{side}_elbow", np.zeros(3), np.eye(3), np.array([1.0, 0.0, 0.0]))
-        if link == f"{side[0]}_eye":
-            add_marker(parent, f"{side}_eye", np.zeros(3), np.eye(3), np.array([-1.0, 0.0, 0.0]))
-    if link == "head":
-        head = model["head_zero_root"]
-        add_marker(parent, "head", np.array(head["p"]) - point, np.array(head["R"]), np.array([-1.0, 0.0, 0.0]))
-
-
-def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
-    """One marker."""
-    rows = " ".join(number(value) for value in rotation.ravel())
-    element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))
 
 
 if __name__ == "__main__":
