@@ -13,6 +13,14 @@ def positive_whole(text: str) -> int:
     return int(text)
 
 
+def whole_from_two(text: str) -> int:
+    """A whole number of 2 or more."""
+    number = positive_whole(text)
+    if number < 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is less than 2")
+    return number
+
+
 def positive_number(text: str) -> float:
     """A finite number above 0."""
     try:

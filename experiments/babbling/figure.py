@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,17 +37,20 @@ def _by_pair(axes: Any, rows: _Rows) -> None:
         for pair, count in row["pairs"].items():
             total[pair] = total.get(pair, 0) + count
     pairs = sorted(total, key=lambda pair: (-total[pair], pair))[:PAIRS]
-    _bars(axes, rows, [[row["pairs"].get(pair, 0) for pair in pairs] for row in rows.values()])
-    axes.set_xticks(range(len(pairs)), [pair.replace(" ", "\n") for pair in pairs], fontsize=6)
-    axes.set(title="Collisions by pair", ylabel="events")
-    axes.legend(fontsize=8)
+    _bars(axes.barh, rows, [[row["pairs"].get(pair, 0) for pair in pairs] for row in rows.values()])
+    axes.set_yticks(range(len(pairs)), [pair.replace(" ", " - ") for pair in pairs], fontsize=8)
+    axes.invert_yaxis()
+    axes.set(title="Collisions by pair" if pairs else "No collisions", xlabel="events")
+    axes.set_xlim(0.0, max(1.0, axes.get_xlim()[1]))
 
 
 def _by_depth(axes: Any, rows: _Rows) -> None:
     depths = list(next(iter(rows.values()))["depth_histogram_mm"])
-    _bars(axes, rows, [list(row["depth_histogram_mm"].values()) for row in rows.values()])
+    _bars(axes.bar, rows, [list(row["depth_histogram_mm"].values()) for row in rows.values()])
     axes.set_xticks(range(len(depths)), depths)
     axes.set(title=f"Depth of the collisions (allowed with 2.0: {1e3 * DEEPEST:g} mm)", xlabel="mm", ylabel="events")
+    axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
+    axes.legend(fontsize=8)
 
 
 def _outcomes(axes: Any, rows: _Rows) -> None:
@@ -57,8 +60,9 @@ def _outcomes(axes: Any, rows: _Rows) -> None:
         axes.bar(range(len(rows)), heights, bottom=bottom, color=color, label=outcome)
         bottom = [below + height for below, height in zip(bottom, heights, strict=True)]
     axes.set_xticks(range(len(rows)), [f"{TITLES[mode]}\n{row['commands']} commands" for mode, row in rows.items()])
-    axes.set(title="What became of the commands", ylabel="share", ylim=(0.0, 1.0))
-    axes.legend(fontsize=8)
+    axes.set(ylabel="share", ylim=(0.0, 1.0))
+    axes.set_title("What became of the commands", pad=22.0)
+    axes.legend(fontsize=8, ncols=len(OUTCOMES), loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 
 
 def _smoothness(axes: Any, rows: _Rows) -> None:
@@ -67,8 +71,9 @@ def _smoothness(axes: Any, rows: _Rows) -> None:
     axes.set(title="Roughness: jerk over speed, each rms", ylabel="1/s$^2$")
 
 
-def _bars(axes: Any, rows: _Rows, heights: list[list[int]]) -> None:
+def _bars(bars: Callable[..., Any], rows: _Rows, heights: list[list[int]]) -> None:
+    """A bar a mode at every place; `bars`: bar or barh of some axes."""
     width = 0.8 / len(rows)
     for i, (mode, values) in enumerate(zip(rows, heights, strict=True)):
         shift = (i - (len(rows) - 1) / 2.0) * width
-        axes.bar([x + shift for x in range(len(values))], values, width, color=COLORS[mode], label=TITLES[mode])
+        bars([x + shift for x in range(len(values))], values, width, color=COLORS[mode], label=TITLES[mode])

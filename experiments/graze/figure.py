@@ -14,6 +14,7 @@ from mobee.errors import InvalidValue
 
 COLORS = {"off": "0.6", "naive": "tab:red", "mended": "tab:orange", "2.0": "tab:blue"}
 LABELS = {"off": "nobody steps in", "naive": "1.0, naive", "mended": "1.0, filter and dead time", "2.0": "2.0"}
+DEPTHS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # mm, marked
 SWITCHING = ("naive", "mended")
 
 
@@ -29,9 +30,10 @@ def draw(trials: Sequence[Trial], path: Path) -> Path:
     success.set(ylabel="share of trials [%]", ylim=(-3.0, 103.0))
     success.set_title("1.0: the first recovery succeeds (dashed: and is clean); 2.0: settles", fontsize=9)
     _curves(switching, trials, SWITCHING, lambda t: t.switches)
-    switching.set(ylabel="switches of control per second")
+    switching.set(ylabel="switches of control per second", ylim=(0.0, None))
     _curves(depth, trials, tuple(LABELS), lambda t: 1e3 * t.depth)
-    depth.set(ylabel="deepest in the table's field [mm]", xlabel="angle of approach [degrees]", yscale="symlog")
+    depth.set(ylabel="deepest in the table's field [mm]", xlabel="angle of approach [degrees]", yscale="symlog", ylim=(0.0, None))
+    depth.set_yticks(DEPTHS, [f"{each:g}" for each in DEPTHS])
     _curves(progress, trials, tuple(LABELS), lambda t: 1e2 * t.progress)
     progress.set(ylabel="how far along the table [cm]", xlabel="angle of approach [degrees]")
     for axes in (success, switching, depth, progress):

@@ -28,7 +28,7 @@ from experiments.identify.recording import load, postures, record, save
 from experiments.identify.report import csv_table, summary, toml_data
 from experiments.identify.reproduce import reproduce
 from experiments.identify.signals import fitted_signal, held_out_signal
-from experiments.options import positive_whole
+from experiments.options import positive_whole, whole_from_two
 from experiments.progress import Progress
 from experiments.run_folder import write
 from mobee import Model, World, load_robot
@@ -43,7 +43,8 @@ RESPONSES, TABLE, DATA, METHOD = "responses", "motors.csv", "identified.toml", "
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--repetitions", type=positive_whole, default=2, metavar="N", help="of each signal in each posture (default: 2)")
+    text = "of each signal in each posture, 2 or more: they differ by the noise alone (default: 2)"
+    parser.add_argument("--repetitions", type=whole_from_two, default=2, metavar="N", help=text)
     parser.add_argument("--postures", type=positive_whole, default=3, metavar="N", help="home and N - 1 others (default: 3)")
     parser.add_argument("--actions", type=positive_whole, default=20, metavar="N", help="of an arm, to compare the plants (default: 20)")
 

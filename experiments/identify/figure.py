@@ -34,8 +34,8 @@ def draw(robot: Robot, files: Sequence[Path], table: Path, path: Path) -> Path:
     rows = list(csv.DictReader(table.read_text().splitlines()))
     parameters = _parameters(rows)
     by_motor = {file.stem: file for file in files}
-    drawing = new_figure(12.0, 10.0)
-    above, below = drawing.subfigures(2, 1, height_ratios=(1.4, 1.0))
+    drawing = new_figure(12.0, 13.0)
+    above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.0))
     axes = above.subplots(2, len(SHOWN), sharex=True)
     for column, motor in enumerate(SHOWN):
         _draw_response(axes[:, column], robot, motor, by_motor[motor], parameters)
@@ -69,7 +69,7 @@ def _draw_numbers(axis: Any, rows: Sequence[dict[str, str]], name: str, factor: 
     axis.errorbar(values, places, xerr=2.0 * np.array(deviation), fmt=".", markersize=4, linewidth=0.8)
     axis.axvline(factor * published, color="0.6", linestyle=":")
     axis.set(xlabel=f"{label}, ± 2 deviations", yticks=places, yticklabels=[row["motor"] for row in rows], ylim=(len(rows) - 0.5, -0.5))
-    axis.tick_params(axis="y", labelsize=4)
+    axis.tick_params(axis="y", labelsize=7)
 
 
 def _from_mean(q: Array) -> Array:
