@@ -14,6 +14,7 @@ from typing import Any
 
 from mobee.errors import MobeeError
 
+STORE = "transitions.sqlite"  # of a run, in its folder
 SCHEMA = 1
 APPLICATION_ID = 0x4D6F4265  # "MoBe": marks the file as ours
 BUSY_TIMEOUT = 10.0  # s; another agent's commit takes milliseconds
@@ -92,10 +93,10 @@ class TransitionStore:
                     "A run goes on only with the settings it began with: use those, or another file."
                 )
 
-    def settings(self) -> dict[str, Any]:
-        """The agent's settings on record; empty if there are none."""
+    def settings(self, agent: str | None = None) -> dict[str, Any]:
+        """The settings on record of this agent, or of another one in the file; empty if there are none."""
         with self._explained():
-            rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)).fetchall()
+            rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (agent or self.agent,)).fetchall()
         return {key: json.loads(value) for key, value in rows}
 
     def append(self, transition: Transition) -> None:
@@ -132,6 +133,12 @@ class TransitionStore:
             Transition(n, s, a, s_next, reward, bool(settled), duration, tuple(json.loads(q)), tuple(json.loads(touched)))
             for n, s, a, s_next, reward, settled, duration, q, touched in rows
         ]
+
+    def times(self, agent: str | None = None) -> list[float]:
+        """When each transition of this agent, or of another one in the file, was committed: s since 1970, in order."""
+        with self._explained():
+            rows = self._db.execute("SELECT t FROM transitions WHERE agent = ? ORDER BY n", (agent or self.agent,)).fetchall()
+        return [t for (t,) in rows]
 
     def agents(self) -> tuple[str, ...]:
         """Names of the agents that have transitions in the file."""

@@ -22,6 +22,8 @@ VERBS = {
     "router": "only the router, when each service runs by itself",
     "robots": "robots and worlds that come with mobee",
     "convert": "a robot from zero-position XML to URDF, or back",
+    "plan": "a way to anywhere, by what an agent has learned",
+    "export": "the transitions of a run as one table",
     "experiment": "claims of the papers, measured: list, run, figure",
     "bench": "how fast mobee is on this machine, beside its peers",
     "check": "what is wrong with a robot or world of your own",

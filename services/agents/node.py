@@ -10,7 +10,7 @@ from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import ActionInterrupted, CuriousAgent, Lattice
 from mobee.robot.robot import Robot
-from mobee.store import TransitionStore
+from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
 from services.common.bus_plant import BusPlant
 from services.common.delivery import EVENTS
@@ -33,7 +33,7 @@ class AgentNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config = service, config
-        self._store = TransitionStore(Path(config.run_dir) / "transitions.sqlite", config.part) if config.run_dir else None
+        self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
         self._plant = BusPlant(service, robot, (config.part,))
         self._agent = CuriousAgent(
             published_space(robot, config),

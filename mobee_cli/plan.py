@@ -1,0 +1,91 @@
+"""`mobee plan`: a way from anywhere to anywhere, by what an agent of a run has learned."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from mobee.errors import MobeeError
+from mobee.learning.exploit import target_states
+from mobee.learning.learned import Learned, load_learned
+from mobee.learning.planner import DISCOUNT, Plan, Planner
+from mobee.robot.load import load_robot
+from mobee.store import STORE
+from mobee_cli.errors import BAD_INPUT, UserError
+
+_NOTES = """A place is the number of a state, or the angles in rad of the joints that the agent knows (or of all motors of its part): the
+state that holds this pose. Plans trust what was observed, over a weak belief that untried actions work (docs/learning.md)."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Run, agent, places."""
+    parser.epilog = _NOTES
+    parser.add_argument("--run", type=Path, required=True, metavar="RUN", help=f"folder of the run, or its file {STORE}")
+    parser.add_argument("--agent", metavar="PART", help="whose plan it is, where the run had several agents")
+    parser.add_argument("--to", nargs="+", required=True, metavar="PLACE", help="where to: a state, or angles in rad")
+    parser.add_argument("--from", nargs="+", dest="start", metavar="PLACE", help="where from (default: where the agent was last)")
+    text = f"0 to 1, a factor a step: the smaller, the more a short way is preferred over a reliable one (default: {DISCOUNT})"
+    parser.add_argument("--discount", type=float, default=DISCOUNT, metavar="X", help=text)
+    parser.add_argument("--robot", metavar="FILE", help="the robot of the run, where it is none that comes with mobee")
+    parser.add_argument("--json", action="store_true", help="print as JSON, with the pose of every state")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Rebuild, plan, print."""
+    file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
+    try:
+        robot = load_robot(arguments.robot) if arguments.robot else None
+        learned = load_learned(file, arguments.agent, robot)
+        goal = _state(learned, arguments.to)
+        start = learned.state if arguments.start is None else _state(learned, arguments.start)
+        plan = Planner(learned.space, learned.model.debiased(), goal, arguments.discount).plan(start)
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join(_lines(learned, plan)))
+    return 0
+
+
+def _state(learned: Learned, place: list[str]) -> int:
+    try:
+        numbers = [float(word) for word in place]
+    except ValueError:
+        raise UserError(f"{' '.join(place)!r} is no place: give the number of a state, or angles in rad", BAD_INPUT) from None
+    if len(place) == 1 and place[0].lstrip("+-").isdigit():
+        return int(target_states(learned.space, int(place[0]))[0])
+    return learned.space.state_of(numbers)
+
+
+def _lines(learned: Learned, plan: Plan) -> list[str]:
+    known = f"{learned.part}, by {learned.transitions} transitions"
+    if not plan.actions:
+        return [f"{known}: state {plan.path[0]} is the goal already."]
+    steps = "1 action" if len(plan.actions) == 1 else f"{len(plan.actions)} actions"
+    lines = [f"{known}: from state {plan.path[0]} to {plan.path[-1]} by {steps}, all as expected with probability {plan.success:.2f}."]
+    for state, action, following, chance in zip(plan.path, plan.actions, plan.path[1:], plan.probabilities, strict=False):
+        goal, tries = learned.space.goal(state, action), learned.model.tries[state, action]
+        aimed = "" if goal == following else f" by aiming at {goal}"
+        lines.append(f"  {state:>4} -> {following:<4} probability {chance:.2f}, tried {tries} times{aimed}")
+    lines.append(f"Planning anew after each action, {plan.steps:.1f} actions on average.")
+    if plan.avoided:
+        avoided = ", ".join(f"{state} ({chance:.2f})" for state, chance in plan.avoided.items())
+        lines.append(f"If every action worked, {plan.shortest} would do; avoided (probability of getting through): {avoided}.")
+    return lines
+
+
+def _as_json(learned: Learned, plan: Plan) -> dict[str, Any]:
+    space = learned.space
+    return {
+        "agent": learned.part,
+        "transitions": learned.transitions,
+        "joints": list(space.joints),
+        "path": list(plan.path),
+        "goals": [space.goal(state, action) for state, action in zip(plan.path, plan.actions, strict=False)],
+        "poses": space.samples[list(plan.path)].tolist(),
+        "probabilities": list(plan.probabilities),
+        "success": plan.success,
+        "mean_actions": plan.steps,
+        "shortest": plan.shortest,
+        "avoided": {str(state): chance for state, chance in plan.avoided.items()},
+    }

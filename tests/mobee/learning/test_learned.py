@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+
+from mobee.errors import MobeeError, UnknownName
+from mobee.learning.agent import CuriousAgent
+from mobee.learning.learned import load_learned
+from mobee.store import Transition, TransitionStore
+from tests.mobee.learning.toys import FickleDice, arm, torso, toy_robot
+
+OPTIONS = {"initial": "60-40", "divergence": "kl", "forgetting": 0.9}
+
+
+@pytest.fixture
+def run(tmp_path):
+    """The file of two agents, and the agents."""
+    path = tmp_path / "transitions.sqlite"
+    agents = [
+        CuriousAgent(space, FickleDice(toy_robot(), seed=2), store=TransitionStore(path, space.part), **options)
+        for space, options in ((torso(), {}), (arm(), OPTIONS))
+    ]
+    for agent in agents:
+        agent.run(40)
+    return path, agents
+
+
+def test_the_model_is_the_agent_s(run):
+    path, agents = run
+    for agent in agents:
+        learned = load_learned(path, agent.part, toy_robot())
+        assert np.array_equal(learned.model.probabilities, agent.model.probabilities)
+        assert np.array_equal(learned.model.reward, agent.model.reward)
+        assert (learned.part, learned.transitions, learned.state) == (agent.part, 40, agent.state)
+        assert learned.space.settings == agent.space.settings
+
+
+def test_a_record_of_before_there_were_other_settings_is_read(run):
+    path, agents = run
+    with sqlite3.connect(path) as database:
+        database.execute("DELETE FROM meta WHERE key NOT IN ('space', 'explorer', 'seed', 'discount', 'initial')")
+    learned = load_learned(path, "torso", toy_robot())
+    assert np.array_equal(learned.model.reward, agents[0].model.reward)
+
+
+def test_what_cannot_be_rebuilt_is_named(run, tmp_path):
+    path, _ = run
+    with pytest.raises(MobeeError, match="several agents: name one of left_arm, torso"):
+        load_learned(path, robot=toy_robot())
+    with pytest.raises(UnknownName, match="Did you mean 'torso'"):
+        load_learned(path, "tors", toy_robot())
+    with pytest.raises(MobeeError, match="'toy'"):
+        load_learned(path, "torso")
+    with pytest.raises(MobeeError, match="there is no such file"):
+        load_learned(tmp_path / "other.sqlite")
+    assert not (tmp_path / "other.sqlite").exists()
+
+
+def test_a_store_without_a_space_on_record_is_told(tmp_path):
+    with TransitionStore(tmp_path / "own.sqlite", "torso") as store:
+        store.bind({"mine": json.dumps(1)})
+        store.append(Transition(1, 0, 0, 1, 0.1, True, 1.0, (0.0,)))
+    with pytest.raises(MobeeError, match="torso has no space on record"):
+        load_learned(tmp_path / "own.sqlite")

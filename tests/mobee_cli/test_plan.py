@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mobee import CuriousAgent, Lattice, load_robot
+from mobee.learning.tabular import TabularPlant
+from mobee.store import STORE, TransitionStore
+from mobee_cli.__main__ import main
+
+ROBOT = load_robot("icub")
+TORSO = Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours="equidistant")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A torso that knows its space, where nothing ever gets into state 1."""
+    folder = tmp_path_factory.mktemp("run")
+    stays = np.arange(27)[:, None].repeat(TORSO.goals.shape[1], axis=1)
+    outcomes = np.where(TORSO.goals == 1, stays, TORSO.goals)[:, :, None]
+    probabilities = (TORSO.goals >= 0)[:, :, None].astype(float)
+    with TransitionStore(folder / STORE, "torso") as store:
+        CuriousAgent(TORSO, TabularPlant(TORSO, np.maximum(outcomes, 0), probabilities, start=13), store=store).run(600)
+    return folder
+
+
+def planned(run: Path, *words: str, capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
+    assert main(["plan", "--run", str(run), "--json", *words]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def test_the_path_goes_round_what_never_worked_and_says_so(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--run", str(run), "--from", "0", "--to", "2"]) == 0
+    first, *steps, mean, avoided = capsys.readouterr().out.splitlines()
+    assert first.startswith("torso, by 600 transitions: from state 0 to 2 by 4 actions, all as expected with probability 0.9")
+    assert len(steps) == 4 and all("->" in line and "tried" in line for line in steps)
+    assert mean.startswith("Planning anew after each action, 4.")
+    assert avoided.startswith("If every action worked, 2 would do; avoided (probability of getting through): 1 (0.0")
+
+
+def test_as_json_with_poses(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = planned(run, "--from", "0", "--to", "2", capsys=capsys)
+    path = plan["path"]
+    assert isinstance(path, list) and (path[0], path[-1], len(path)) == (0, 2, 5) and 1 not in path
+    assert plan["goals"] == path[1:]
+    np.testing.assert_allclose(plan["poses"], TORSO.samples[path])
+    assert plan["success"] == pytest.approx(np.prod(plan["probabilities"]))
+    assert (plan["agent"], plan["transitions"], plan["shortest"], list(plan["avoided"])) == ("torso", 600, 2, ["1"])
+
+
+def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    angles = [f"{angle:.2f}" for angle in TORSO.samples[26] + 0.05]
+    plan = planned(run, "--to", *angles, "--agent", "torso", capsys=capsys)
+    with TransitionStore(run / STORE, "torso") as store:
+        assert plan["path"][0] == store.load()[-1].s_next
+    assert plan["path"][-1] == 26
+    here = str(plan["path"][0])
+    assert main(["plan", "--run", str(run / STORE), "--to", here]) == 0
+    assert capsys.readouterr().out == f"torso, by 600 transitions: state {here} is the goal already.\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--to", "27"], "torso has no such state. Valid are 0 to 26"),
+        (["--to", "0.1", "0.2"], "give the 3 joints (torso_yaw, torso_roll, torso_pitch)"),
+        (["--to", "there"], "'there' is no place"),
+        (["--to", "nan", "0", "0"], "not finite"),
+        (["--to", "3", "--agent", "tors"], "Did you mean 'torso'?"),
+        (["--to", "3", "--robot", "icub_2014"], "of robot 'icub', given 'icub_2014'"),
+        (["--to", "3", "--discount", "1"], "discount=1.0"),
+    ],
+)
+def test_what_cannot_be_planned_is_said_in_a_line(run: Path, words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["plan", "--run", str(run), *words])
+    error = capsys.readouterr().err
+    assert code == 2
+    assert says in error and error.count("\n") == 1
+
+
+def test_a_run_without_transitions_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--run", str(tmp_path), "--to", "0"]) == 2
+    assert f"{tmp_path / STORE}: there is no such file" in capsys.readouterr().err
+    TransitionStore(tmp_path / STORE, "torso").close()
+    assert main(["plan", "--run", str(tmp_path), "--to", "0"]) == 2
+    assert "holds no transitions yet" in capsys.readouterr().err
