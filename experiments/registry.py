@@ -11,6 +11,7 @@ from mobee.errors import UnknownName
 
 EXPERIMENTS = {
     "babbling": "experiments.babbling",
+    "chapter7": "experiments.chapter7",
     "clauses": "experiments.clauses",
     "coverage": "experiments.coverage",
     "flood": "experiments.flood",
@@ -24,12 +25,30 @@ EXPERIMENTS = {
     "wall": "experiments.wall",
 }
 
+CHAPTER7 = (  # what `mobee experiment run chapter7` runs, in this order, of what there is
+    "hypercube",
+    "coverage",
+    "lattice",
+    "decay",
+    "uniformity",
+    "kail",
+    "rank4",
+    "connectivity",
+    "change",
+    "table",
+    "planner",
+    "prm-vs-mdp",
+    "sensitivity",
+)
+
 
 class Experiment(Protocol):
     """What the module of an experiment holds.
 
     `run` works in the folder of a run and may be interrupted at any time: it appends what is finished to files there, and goes
     on behind them when it is called again.  A result `passed` of False fails the command.
+
+    Optional: CLAIMS, the rows of the table of claims that it answers; their numbers are then in the results under "claims".
     """
 
     NAME: str

@@ -99,6 +99,14 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
     path.write_text(json.dumps(content, indent=2, default=str) + "\n")
 
 
+def read(path: Path) -> dict[str, Any]:
+    """Read what `write` wrote; raises InvalidValue."""
+    try:
+        return dict(json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError):
+        raise InvalidValue(f"{path} cannot be read: it is missing or damaged.") from None
+
+
 def _versions() -> dict[str, Any]:
     packages = {}
     for package in PACKAGES:

@@ -10,21 +10,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.claims import Claim
+from experiments.claims_table import claims_text, found_in, newest_runs, recorded, rows, write_page
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
 from experiments.run_folder import RESULTS, discard_unused, given_run, held, new_run, newest_run, options_of, write
+from experiments.sweep import CellsFailed
 from mobee.errors import InvalidValue, MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
 from mobee_cli.results_text import results_text
 
 RUNS = Path("runs")
+_NEWEST = Path()  # --resume without the name of a run
 _NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it goes on
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """One parser an action."""
     parser.set_defaults(make_parser=type(parser))
-    actions = parser.add_subparsers(dest="action", required=True, metavar="list|run|figure")
+    actions = parser.add_subparsers(dest="action", required=True, metavar="list|run|figure|claims")
     listing = actions.add_parser("list", help="what there is", description="What there is: names, claims and their sources.")
     listing.add_argument("--json", action="store_true", help="print as JSON")
     text = "Run an experiment; `mobee experiment run NAME --help` tells its options."
@@ -36,6 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run (default: the newest)")
     drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest is looked for (default: runs)")
     drawing.add_argument("--json", action="store_true", help="print as JSON")
+    text = "The table of claims: what was published, what was found here. Without RUN and --write: as experiments/README.md has it."
+    telling = actions.add_parser("claims", help="what holds", description=text)
+    telling.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, whose numbers are put in")
+    telling.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the newest runs")
+    telling.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest are looked for (default: runs)")
+    telling.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -43,6 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         if arguments.action == "list":
             return _list(arguments)
+        if arguments.action == "claims":
+            return _claims(arguments)
         experiment = load_experiment(arguments.name)
         if arguments.action == "figure":
             return _figure(experiment, arguments)
@@ -74,17 +86,18 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     experiment.add_arguments(parser)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
     parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the run's folder is made (default: runs)")
-    parser.add_argument("--resume", type=Path, metavar="RUN", help="go on with a run that was interrupted")
+    parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="go on with a run, or with the newest")
     parser.add_argument("--json", action="store_true", help="print the results as JSON")
     options = parser.parse_args(given)
     if options.resume is None:
         return options
-    begun = options_of(options.resume, experiment.NAME)
+    run = newest_run(options.runs, experiment.NAME) if options.resume == _NEWEST else options.resume
+    begun = options_of(run, experiment.NAME)
     parser.set_defaults(**begun)
     options = parser.parse_args(given)
-    seed = begun.get("seed")
+    options.resume, seed = run, begun.get("seed")
     if options.seed != seed:
-        raise InvalidValue(f"{options.resume} has seed {seed}, not {options.seed}, and keeps it. Begin a new run without --resume.")
+        raise InvalidValue(f"{run} has seed {seed}, not {options.seed}, and keeps it. Begin a new run without --resume.")
     return options
 
 
@@ -103,13 +116,18 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
             write(folder / RESULTS, results)
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
+    except CellsFailed as error:
+        raise UserError(f"{error}\nTry them again with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:
         raise UserError(f"interrupted; go on with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
     if options.json:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:
         print(f"run: {folder}")
+        claims = [(experiment.NAME, Claim(**claim)) for claim in results.pop("claims", [])]
         print(results_text(results, shutil.get_terminal_size().columns))  # 80 in a pipe
+        if claims:
+            print(claims_text(claims, shutil.get_terminal_size().columns))
     return FAILED if results.get("passed") is False else 0
 
 
@@ -120,6 +138,19 @@ def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) 
         if options.resume is None:
             discard_unused(folder)
         raise
+
+
+def _claims(arguments: argparse.Namespace) -> int:
+    folders = arguments.folders or (newest_runs(arguments.runs) if arguments.write else [])
+    record = {**recorded(), **found_in(folders)}
+    if arguments.write:
+        write_page(record)
+    table = rows(record)
+    if arguments.json:
+        print(json.dumps([{"experiment": name, **claim.record()} for name, claim in table], indent=2))
+    else:
+        print(claims_text(table, shutil.get_terminal_size().columns))
+    return 0
 
 
 def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:

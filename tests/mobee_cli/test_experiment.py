@@ -149,3 +149,31 @@ def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
     assert f"--resume {folder}" in err
     assert len(err.splitlines()) == 1
     assert "Traceback" not in out + err
+
+
+def test_resume_without_a_name_goes_on_with_the_newest_run(tmp_path, capsys):
+    for _ in range(2):
+        main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+        newest = json.loads(capsys.readouterr().out)["run"]
+    assert main(["experiment", "run", "flood", "--runs", str(tmp_path), "--resume", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["run"] == newest
+
+
+def test_claims_are_told_as_the_page_has_them(capsys):
+    assert main(["experiment", "claims", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {"experiment", "source", "text", "published", "ours", "verdict"} == set(told[0])
+    assert main(["experiment", "claims"]) == 0
+    said = capsys.readouterr().out
+    assert all(len(line) <= 80 for line in said.splitlines())
+    assert told[0]["text"] in " ".join(said.split())
+
+
+def test_cells_that_fail_fail_the_command_and_are_named(tmp_path, capsys, monkeypatch):
+    def broken(cell):
+        raise ValueError("broken")
+
+    monkeypatch.setattr("experiments.hypercube.work", broken)
+    assert main(["experiment", "run", "hypercube", "--seeds", "1", "--jobs", "1", "--runs", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert "g0.9-s0: ValueError: broken" in said and "--resume" in said

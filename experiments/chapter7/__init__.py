@@ -1,0 +1,111 @@
+"""Chapter 7: all its experiments one after the other, with their figures.
+
+Claim: the thesis' experiments in model learning can be repeated, figures and all, by one command.  Source: thesis chapter 7, paper
+section 3.  Published number: the robot took over two days for the longest of them (7.4).
+Run time: 30 minutes on 2 cores.
+
+Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
+that fails does not stop the others.  Then `mobee experiment claims` reads what was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from experiments.matplotlib_figure import MatplotlibMissing
+from experiments.options import positive_whole
+from experiments.registry import CHAPTER7, EXPERIMENTS, load_experiment
+from experiments.run_folder import CONFIG, RESULTS, read, write
+from experiments.sweep.arguments import ENGINES
+from mobee.errors import MobeeError, UnknownName
+
+NAME = "chapter7"
+CLAIM = "all experiments in model learning can be repeated by one command"
+SOURCE = "thesis chapter 7, paper section 3"
+
+_COMMON = ("seeds", "jobs", "engine", "quick")  # options that are handed on
+_TIMES = "seconds.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options, of a sweep, for all experiments."""
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join(_there_are())}")
+    parser.add_argument("--seeds", type=positive_whole, metavar="N", help="repetitions (default: each experiment's own)")
+    parser.add_argument("--jobs", type=positive_whole, metavar="N", help="how many run at once (default: one a core)")
+    parser.add_argument("--engine", choices=ENGINES, help="processes of this machine, or a Ray cluster (default: processes)")
+    parser.add_argument("--quick", action="store_true", help="short versions that show whether all works")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Run what has no results yet, and draw it."""
+    names = arguments.only or _there_are()
+    for name in names:
+        if name not in _there_are():
+            raise UnknownName("experiment of chapter 7", name, _there_are())
+    parts: dict[str, Any] = {}
+    for number, name in enumerate(names, 1):
+        if sys.stderr.isatty():
+            print(f"{name} ({number} of {len(names)})", file=sys.stderr)
+        parts[name] = _part(name, arguments, folder)
+    seconds = sum(part["minutes"] for part in parts.values())
+    passed = not any("failed" in part for part in parts.values())
+    return {"parts": {name: {"minutes": 0.0, "figure": "-", **part} for name, part in parts.items()}, "minutes": seconds, "passed": passed}
+
+
+def figure(folder: Path) -> Path:
+    """Draw every part anew; returns the folder, in which each part has its own."""
+    for results in sorted(folder.glob(f"*/{RESULTS}")):
+        load_experiment(read(results.parent / CONFIG)["experiment"]).figure(results.parent)
+    return folder
+
+
+def _there_are() -> list[str]:
+    return [name for name in CHAPTER7 if name in EXPERIMENTS]
+
+
+def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """One experiment in its own folder: how long it took in all, its figure, or why it failed."""
+    place, start = folder / name, time.monotonic()
+    place.mkdir(exist_ok=True)
+    try:
+        if not (place / RESULTS).exists():
+            experiment, options = load_experiment(name), _options(name, arguments)
+            write(place / CONFIG, {"experiment": name, "options": vars(options)})
+            write(place / RESULTS, json.loads(json.dumps(experiment.run(options, place))))
+        drawn = _drawn(name, place)
+    except MobeeError as error:
+        return {"minutes": _spent(place, start), "failed": str(error)}
+    finally:
+        spent = _spent(place, start)
+        write(place / _TIMES, {"seconds": 60.0 * spent})
+    return {"minutes": spent, "figure": drawn}
+
+
+def _drawn(name: str, place: Path) -> str:
+    try:
+        return str(load_experiment(name).figure(place).relative_to(place.parent))
+    except MatplotlibMissing:
+        return "-"
+
+
+def _spent(place: Path, start: float) -> float:
+    """Minutes, those of interrupted runs too."""
+    before = read(place / _TIMES)["seconds"] if (place / _TIMES).exists() else 0.0
+    return float(before + time.monotonic() - start) / 60.0
+
+
+def _options(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
+    """The experiment's own defaults, changed by what was given for all."""
+    parser = argparse.ArgumentParser()
+    load_experiment(name).add_arguments(parser)
+    options = parser.parse_args([])
+    options.seed = arguments.seed
+    for common in _COMMON:
+        if getattr(arguments, common) and hasattr(options, common):
+            setattr(options, common, getattr(arguments, common))
+    return options

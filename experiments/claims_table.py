@@ -1,0 +1,113 @@
+"""The table of claims: what experiments state, filled in with what their runs found (experiments/README.md)."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.claims import Claim
+from experiments.registry import EXPERIMENTS, load_experiment
+from experiments.run_folder import CONFIG, RESULTS, VERSIONS, newest_run, read
+from mobee.errors import InvalidValue
+
+HERE = Path(__file__).parent
+RECORD, PAGE = HERE / "claims.json", HERE / "README.md"
+Rows = list[tuple[str, Claim]]  # the name of the experiment, and one of its claims
+Recorded = dict[str, dict[str, Any]]  # by experiment: its claims as dicts, "commit", "seeds"
+
+_INDENT = 11  # of what stands below a verdict
+
+_HEAD = """\
+# Experiments
+
+What was published, what this project measured, and whether it holds. `mobee experiment claims --write` writes this page from
+the newest runs; do not edit it.
+
+An experiment is one package or module here: its docstring states claim, source, published number and run time.
+`mobee experiment list` names them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
+`mobee experiment run chapter7` does all that the table below needs. Numbers are interquartile means with 95 % bootstrap
+intervals, unless they say otherwise; how many runs they rest on is in the last column.
+**confirmed**: our number is what was published. **refuted**: it is not. **open**: it was not measured, or does not decide.
+"""
+
+
+def stated() -> Rows:
+    """The claims that the experiments list, without our numbers."""
+    return [(name, claim) for name in EXPERIMENTS for claim in getattr(load_experiment(name), "CLAIMS", ())]
+
+
+def recorded() -> Recorded:
+    """What the page was last written from."""
+    return read(RECORD) if RECORD.exists() else {}
+
+
+def rows(record: Mapping[str, Mapping[str, Any]]) -> Rows:
+    """Every claim stated, with our number where there is one."""
+    measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in record.items() for c in entry["claims"]}
+    return [(name, measured.get((name, claim.source, claim.text), claim)) for name, claim in stated()]
+
+
+def found_in(folders: Sequence[Path]) -> Recorded:
+    """The claims of finished runs, of a chapter's parts too; the last counts.  Raises InvalidValue for a folder without results."""
+    found: Recorded = {}
+    for folder in folders:
+        entries = [path.parent for path in (folder / RESULTS, *sorted(folder.glob(f"*/{RESULTS}"))) if path.exists()]
+        if not entries:
+            raise InvalidValue(f"{folder} has no results: finish it with `mobee experiment run NAME --resume {folder}`.")
+        for entry in entries:
+            config, claims = read(entry / CONFIG), read(entry / RESULTS).get("claims")
+            if claims:
+                seeds, commit = config["options"].get("seeds"), read(folder / VERSIONS).get("commit")
+                found[config["experiment"]] = {"seeds": seeds, "commit": commit, "claims": claims}
+    return found
+
+
+def newest_runs(runs: Path) -> list[Path]:
+    """The newest run of every experiment, the oldest first, if it is finished, at least in part, and no --quick one."""
+    newest = []
+    for name in EXPERIMENTS:
+        try:
+            newest.append(newest_run(runs, name))
+        except InvalidValue:  # never run
+            continue
+    return sorted((run for run in newest if _counts(run)), key=lambda run: run.name)
+
+
+def _counts(run: Path) -> bool:
+    is_finished = (run / RESULTS).exists() or any(run.glob(f"*/{RESULTS}"))
+    return is_finished and not read(run / CONFIG)["options"].get("quick")
+
+
+def write_page(record: Recorded) -> None:
+    """Keep the numbers, and write the page from them."""
+    kept = {name: record[name] for name in sorted(record) if name in EXPERIMENTS}
+    RECORD.write_text(json.dumps(kept, indent=1) + "\n")
+    PAGE.write_text(page(kept))
+
+
+def page(record: Recorded) -> str:
+    """The page as Markdown."""
+    table = rows(record)
+    counts = Counter(claim.verdict for _, claim in table)
+    lines = [_HEAD, f"{len(table)} claims: {counts['confirmed']} confirmed, {counts['refuted']} refuted, {counts['open']} open.", ""]
+    lines += ["| source | claim | published | ours | verdict | experiment |", "| --- | --- | --- | --- | --- | --- |"]
+    for name, claim in table:
+        seeds = record.get(name, {}).get("seeds")
+        runs = f"{name}, {seeds} seeds" if seeds and claim.ours else name
+        cells = (claim.source, claim.text, claim.published, claim.ours or "not measured", f"**{claim.verdict}**", runs)
+        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def claims_text(table: Sequence[tuple[str, Claim]], width: int) -> str:
+    """For a terminal: each claim with its verdict, and below it the numbers."""
+    lines = []
+    for _, claim in table:
+        parts = (f"{claim.text} ({claim.source})", f"published: {claim.published}", f"ours: {claim.ours or 'not measured'}")
+        filled = [textwrap.fill(text, width - _INDENT, break_long_words=False, break_on_hyphens=False) for text in parts]
+        lines.append(f"{claim.verdict:<{_INDENT}}" + "\n".join(filled).replace("\n", "\n" + " " * _INDENT))
+    return "\n".join(lines)

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from experiments import chapter7
+from experiments.registry import EXPERIMENTS
+from experiments.run_folder import new_run
+from experiments.sweep import sweep_arguments
+from mobee.errors import MobeeError, UnknownName
+
+
+def options(*given: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    chapter7.add_arguments(parser)
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args(given)
+
+
+@pytest.fixture
+def toys(monkeypatch):
+    """Two experiments that note how they were called, in place of hypercube and coverage."""
+    calls = []
+
+    def run(name):
+        def toy(arguments, folder):
+            calls.append((name, arguments.seeds, arguments.seed, arguments.quick))
+            if name in broken:
+                raise MobeeError(f"{name} is broken")
+            return {"answer": 42}
+
+        return toy
+
+    def figure(folder):
+        (folder / "toy.png").touch()
+        return folder / "toy.png"
+
+    broken: set[str] = set()
+    monkeypatch.setattr(chapter7, "_there_are", lambda: ["hypercube", "coverage"])
+    for name in ("hypercube", "coverage"):
+        toy = SimpleNamespace(NAME=name, add_arguments=sweep_arguments, run=run(name), figure=figure)
+        monkeypatch.setitem(EXPERIMENTS, name, f"toy_{name}")
+        monkeypatch.setitem(sys.modules, f"toy_{name}", toy)
+    return SimpleNamespace(calls=calls, broken=broken)
+
+
+def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys):
+    folder = new_run(tmp_path, "chapter7", {})
+    results = chapter7.run(options("--seed", "3"), folder)
+    assert toys.calls == [("hypercube", 10, 3, False), ("coverage", 10, 3, False)]
+    assert results["passed"] and results["parts"]["coverage"]["figure"] == "coverage/toy.png"
+    assert json.loads((folder / "hypercube" / "results.json").read_text()) == {"answer": 42}
+    assert json.loads((folder / "hypercube" / "config.json").read_text())["experiment"] == "hypercube"
+
+
+def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
+    chapter7.run(options("--seeds", "2", "--quick", "--only", "coverage"), new_run(tmp_path, "chapter7", {}))
+    assert toys.calls == [("coverage", 2, 0, True)]
+
+
+def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys):
+    folder = new_run(tmp_path, "chapter7", {})
+    toys.broken.add("hypercube")
+    results = chapter7.run(options(), folder)
+    assert not results["passed"] and results["parts"]["hypercube"]["failed"] == "hypercube is broken"
+    toys.broken.clear()
+    assert chapter7.run(options(), folder)["passed"]
+    assert [name for name, *_ in toys.calls] == ["hypercube", "coverage", "hypercube"]
+
+
+def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkeypatch):
+    clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
+    monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
+    folder = new_run(tmp_path, "chapter7", {})
+    toys.broken.add("hypercube")
+    chapter7.run(options("--only", "hypercube"), folder)
+    toys.broken.clear()
+    assert chapter7.run(options("--only", "hypercube"), folder)["minutes"] == pytest.approx(3.0)
+
+
+def test_an_unknown_part_is_refused(tmp_path):
+    with pytest.raises(UnknownName, match="experiment of chapter 7 'tabel'"):
+        chapter7.run(options("--only", "tabel"), tmp_path)

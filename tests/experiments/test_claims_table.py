@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import pytest
+
+from experiments import claims_table
+from experiments.claims import Claim
+from experiments.claims_table import claims_text, found_in, newest_runs, page, recorded, rows, stated
+from experiments.registry import CHAPTER7, EXPERIMENTS, load_experiment
+from experiments.run_folder import new_run, write
+from mobee.errors import InvalidValue
+
+REGENERATE = "run `mobee experiment claims --write` and check experiments/README.md and claims.json in"
+
+
+def test_the_page_names_every_claim_that_an_experiment_states():
+    said = claims_table.PAGE.read_text()
+    missing = [claim.text for _, claim in stated() if claim.text.replace("|", "\\|") not in said]
+    assert not missing, REGENERATE
+
+
+def test_the_page_is_what_the_recorded_numbers_give():
+    assert claims_table.PAGE.read_text() == page(recorded()), REGENERATE
+
+
+@pytest.mark.parametrize("name", [name for name in CHAPTER7 if name in EXPERIMENTS])
+def test_an_experiment_of_chapter_7_states_claims_without_numbers(name):
+    claims = load_experiment(name).CLAIMS
+    assert claims and len({claim.text for claim in claims}) == len(claims)
+    assert all(claim.text and claim.source and claim.published and not claim.ours for claim in claims)
+
+
+def finished(runs, name, claims, **options):
+    folder = new_run(runs, name, {"seeds": 10, **options})
+    write(folder / "results.json", {"claims": [claim.record() for claim in claims]})
+    return folder
+
+
+@pytest.fixture
+def claim() -> Claim:
+    return load_experiment("coverage").CLAIMS[0]
+
+
+def test_a_finished_run_fills_its_rows_and_no_others(tmp_path, claim):
+    run = finished(tmp_path, "coverage", [claim.measured("0.4 [0.3, 0.5] | 7", True)])
+    table = dict((c.text, c) for _, c in rows(found_in([run])))
+    assert table[claim.text].ours == "0.4 [0.3, 0.5] | 7" and table[claim.text].verdict == "confirmed"
+    assert all(c.verdict == "open" for c in table.values() if c.text != claim.text)
+    assert r"| 0.4 [0.3, 0.5] \| 7 | **confirmed** | coverage, 10 seeds |" in page(found_in([run]))
+
+
+def test_the_parts_of_a_chapter_count_and_a_later_run_more(tmp_path, claim):
+    chapter = new_run(tmp_path, "chapter7", {})
+    part = chapter / "coverage"
+    part.mkdir()
+    write(part / "config.json", {"experiment": "coverage", "options": {"seeds": 6}})
+    write(part / "results.json", {"claims": [claim.measured("old", False).record()]})
+    assert found_in([chapter])["coverage"]["seeds"] == 6
+    run = finished(tmp_path, "coverage", [claim.measured("new", True)])
+    assert found_in([chapter, run])["coverage"]["claims"][0]["ours"] == "new"
+    assert set(newest_runs(tmp_path)) == {chapter, run}
+
+
+def test_short_and_unfinished_runs_are_not_taken_by_themselves(tmp_path, claim):
+    finished(tmp_path, "coverage", [claim], quick=True)
+    new_run(tmp_path, "hypercube", {})
+    assert newest_runs(tmp_path) == []
+
+
+def test_a_run_without_results_is_refused(tmp_path):
+    with pytest.raises(InvalidValue, match="has no results: finish it"):
+        found_in([new_run(tmp_path, "coverage", {})])
+
+
+def test_the_text_fits_the_terminal(claim):
+    said = claims_text([("coverage", claim.measured("0.26 [0.22, 0.32]", False))], 60)
+    assert said.startswith("refuted ") and "ours: 0.26 [0.22, 0.32]" in said
+    assert all(len(line) <= 60 for line in said.splitlines())
+
+
+def test_the_page_keeps_what_was_recorded_of_experiments_that_did_not_run(tmp_path, monkeypatch, claim):
+    monkeypatch.setattr(claims_table, "RECORD", tmp_path / "claims.json")
+    monkeypatch.setattr(claims_table, "PAGE", tmp_path / "README.md")
+    record = found_in([finished(tmp_path, "coverage", [claim.measured("0.3", True)])])
+    claims_table.write_page(record)
+    assert recorded() == record
+    assert "0.3" in (tmp_path / "README.md").read_text()
