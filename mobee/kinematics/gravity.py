@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.errors import InvalidValue
 from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.tables import tables
+from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Robot
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2, root frame
@@ -28,9 +28,6 @@ class _Masses:
     frames: Array  # (C, 4, 2) axis and point of the joints, each with its fourth coordinate
     slides: NDArray[np.bool_]  # (C,)
     drives: Array  # (C, n) joint per motor
-
-
-_CACHE: WeakKeyDictionary[Robot, _Masses] = WeakKeyDictionary()
 
 
 def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
@@ -79,14 +76,8 @@ def _crossed(v: Array) -> Array:
     return np.array([[0.0, v[2], -v[1]], [-v[2], 0.0, v[0]], [v[1], -v[0], 0.0]])
 
 
+@per_robot
 def _masses(robot: Robot) -> _Masses:
-    found = _CACHE.get(robot)
-    if found is None:
-        found = _CACHE[robot] = _build(robot)
-    return found
-
-
-def _build(robot: Robot) -> _Masses:
     t = tables(robot)
     carried = np.zeros((len(robot.joints), len(robot.bodies)))
     for column, body in enumerate(robot.bodies):

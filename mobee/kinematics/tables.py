@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Joint, Robot
 
 
@@ -26,18 +26,9 @@ class Tables:
     ancestry: tuple[Ints, ...]  # for each link, the joints between it and the base
 
 
-_CACHE: WeakKeyDictionary[Robot, Tables] = WeakKeyDictionary()
-
-
+@per_robot
 def tables(robot: Robot) -> Tables:
-    """The tables of this robot object, from the cache after the first call."""
-    found = _CACHE.get(robot)
-    if found is None:
-        found = _CACHE[robot] = _build(robot)
-    return found
-
-
-def _build(robot: Robot) -> Tables:
+    """The tables of this robot object."""
     count = len(robot.joints)
     sine, cosine, slide = (np.zeros((count, 4, 4)) for _ in range(3))
     for j, joint in enumerate(robot.joints):
