@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +28,8 @@ def draw(pressed: Sequence[Pressed], drawn: Sequence[Drawn], path: Path) -> Path
     return path
 
 
-def _pressing(drawing: object, pressed: Sequence[Pressed]) -> None:
-    panels = drawing.subplots(1, 4)  # type: ignore[attr-defined]  # Matplotlib is optional and not typed
+def _pressing(drawing: Any, pressed: Sequence[Pressed]) -> None:
+    panels = drawing.subplots(1, 4)
     shown = (
         ("field_mm", "deepest field [mm]", "table"),
         ("solid_mm", "deepest solid [mm]", ""),
@@ -52,10 +53,10 @@ def _pressing(drawing: object, pressed: Sequence[Pressed]) -> None:
     panels[0].legend(fontsize=7)
 
 
-def _ways(drawing: object, drawn: Sequence[Drawn], folder: Path) -> None:
+def _ways(drawing: Any, drawn: Sequence[Drawn], folder: Path) -> None:
     names = [name for name in DRAWN if any(d.target == name for d in drawn)]
     columns = (len(names) + 1) // 2
-    panels = np.ravel(drawing.subplots(2, columns, squeeze=False))  # type: ignore[attr-defined]  # as above
+    panels = np.ravel(drawing.subplots(2, columns, squeeze=False))
     for axes, name in zip(panels, names, strict=False):
         for gains, color in COLORS.items():
             for result in (d for d in drawn if d.target == name and d.gains == gains):

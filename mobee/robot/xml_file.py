@@ -38,7 +38,7 @@ class LineHandler(xml.sax.handler.ContentHandler):
         """The line of the element that is being read."""
         return (self._locator.getLineNumber() or 1) if self._locator else 1
 
-    def setDocumentLocator(self, locator: xml.sax.xmlreader.Locator) -> None:  # noqa: N802, the name is sax's
+    def setDocumentLocator(self, locator: xml.sax.xmlreader.Locator) -> None:
         """Called by sax before anything else."""
         self._locator = locator
 

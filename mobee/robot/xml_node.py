@@ -172,7 +172,7 @@ class _Builder(LineHandler):
         self.elements = 0
         self.length = 0  # of attributes: a DTD can give a long default value to every element
 
-    def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:  # noqa: N802
+    def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:
         node = Node(self.path, self.line, name.lower(), dict(attrs.items()))
         self.elements += 1
         self.length += sum(map(len, node.attributes.values()))
@@ -186,5 +186,5 @@ class _Builder(LineHandler):
             self.root = node
         self.open.append(node)
 
-    def endElement(self, name: str) -> None:  # noqa: N802
+    def endElement(self, name: str) -> None:
         self.open.pop()

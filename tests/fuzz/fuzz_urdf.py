@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 with atheris.instrument_imports(include=["mobee.robot"]):
     from tests.fuzz.readers import feed_urdf, urdf_seeds, words
 
-from tests.fuzz.harness import fuzz  # noqa: E402, after the instrumented imports
+from tests.fuzz.harness import fuzz
 
 if __name__ == "__main__":
     fuzz(feed_urdf, urdf_seeds(), words(urdf_seeds()))

@@ -16,7 +16,7 @@ from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.urdf_files import arm_with
 
 pytest.importorskip("rerun")
-from services.monitor.page import program  # noqa: E402
+from services.monitor.page import program
 
 BALL = '<World><sphere name="ball" radius="0.03" px="-0.37" pz="0.1"/></World>'
 

@@ -52,7 +52,7 @@ class _Builder(LineHandler):
         self.count = 0
         self.words: list[str] = []
 
-    def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:  # noqa: N802, the name is sax's
+    def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:
         element = _Element(name.lower(), self.line, dict(attrs.items()))
         self.count += 1
         if len(self.open) > DEEPEST or self.count > MOST_ELEMENTS:
@@ -65,7 +65,7 @@ class _Builder(LineHandler):
         if self.open[-1].tag in TEXTS:
             self.words.append(content)
 
-    def endElement(self, name: str) -> None:  # noqa: N802
+    def endElement(self, name: str) -> None:
         self.open.pop().text = "".join(self.words)
         self.words = []
 

@@ -212,7 +212,7 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(InvalidValue, match="speed_scale"):
         arm_controller(speed_scale=0.0)
     with pytest.raises(InvalidValue, match="it must be a Model"):
-        Controller(two_part_arm())  # type: ignore[arg-type]
+        Controller(two_part_arm())
     with pytest.raises(InvalidValue, match=r"gains is 'default'; .*Gains.named"):
         arm_controller(gains="default")
     with pytest.raises(UnknownName, match="tip"):

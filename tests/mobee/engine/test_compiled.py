@@ -35,10 +35,10 @@ def product_and_sum(a: float, b: float, c: float) -> float:
 
 
 def test_an_entry_is_compiled_when_its_module_is_imported_for_its_types_only() -> None:
-    assert [str(types) for types in root.signatures] == ["(float64,)"]  # type: ignore[attr-defined]
+    assert [str(types) for types in root.signatures] == ["(float64,)"]
     assert root(2.0) == math.sqrt(2.0)
     with pytest.raises(TypeError, match="No matching definition"):
-        root("two")  # type: ignore[arg-type]
+        root("two")
 
 
 def test_an_entry_takes_no_array_of_another_type_or_order() -> None:

@@ -61,4 +61,4 @@ def test_threads_leave_at_most_a_room_each(rng: np.random.Generator) -> None:
     with ThreadPoolExecutor(THREADS) as pool:
         for _ in range(5):
             list(pool.map(lambda one: len(model.evaluate(one).table), q))
-    assert len(model._engine._rooms) <= THREADS  # type: ignore[attr-defined]
+    assert len(model._engine._rooms) <= THREADS

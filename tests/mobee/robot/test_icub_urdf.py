@@ -40,7 +40,7 @@ def test_its_links_are_called_as_the_icubs(urdf: ET.Element) -> None:
 def test_every_mesh_is_an_existing_file_and_every_link_has_a_mass(urdf: ET.Element) -> None:
     meshes = [Path(mesh.attrib["filename"]) for mesh in urdf.iter("mesh")]
     assert meshes and all(mesh.is_absolute() and mesh.is_file() for mesh in meshes)
-    masses = {link.attrib["name"]: float(link.find("inertial/mass").attrib["value"]) for link in urdf.iter("link")}  # type: ignore[union-attr]
+    masses = {link.attrib["name"]: float(link.find("inertial/mass").attrib["value"]) for link in urdf.iter("link")}
     assert all(mass > 0 for mass in masses.values())
     assert masses["l_hand_dh_frame"] < 1e-3
 

@@ -56,7 +56,7 @@ def test_options_of_a_urdf_are_refused_for_other_files(option: dict[str, Any]) -
 def test_unknown_values_of_options_are_refused(tmp_path: Path) -> None:
     path = arm_with(tmp_path, '<box size="0.1 0.1 0.1"/>')
     with pytest.raises(InvalidValue, match='meshes=.exact. is unknown. Valid: "hull", "bounding"'):
-        load_robot(path, meshes="exact")  # type: ignore[arg-type]
+        load_robot(path, meshes="exact")
     with pytest.raises(RobotFileError, match="nowhere.srdf: cannot be read"):
         load_robot(path, srdf=tmp_path / "nowhere.srdf")
 
@@ -77,6 +77,6 @@ def test_the_katana_of_appendix_b_rests_without_touching_itself() -> None:
 
 def test_what_is_neither_name_nor_path_is_refused() -> None:
     with pytest.raises(InvalidValue, match="robot is 3; it must be a path, or a name: icub,"):
-        load_robot(3)  # type: ignore[arg-type]
+        load_robot(3)
     with pytest.raises(InvalidValue, match="world is None; .* table,"):
-        load_world(None)  # type: ignore[arg-type]
+        load_world(None)

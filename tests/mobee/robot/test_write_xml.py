@@ -43,7 +43,7 @@ def test_a_shipped_robot_is_read_back_as_it_was(tmp_path: Path, name: str) -> No
 @pytest.mark.parametrize("meshes", ["hull", "bounding"])
 @pytest.mark.parametrize("name", FOREIGN)
 def test_a_urdf_becomes_xml_of_the_same_robot(tmp_path: Path, name: str, meshes: str) -> None:
-    robot = load_robot(foreign(name), field=0.03, meshes=meshes)  # type: ignore[arg-type]
+    robot = load_robot(foreign(name), field=0.03, meshes=meshes)
     assert_same_robot(robot, read_back(robot, tmp_path))
 
 
@@ -98,7 +98,7 @@ def random_robot(seed: int, tilt: float) -> Robot:
             role = "field" if rng.random() < 0.4 else "solid"
             part = str(rng.choice(list(parts)))
             name = f"s{k}_{kind}"
-            shapes.append(Shape(name, k, kind, size, rng.normal(size=3), rotation, role, part, vertices))  # type: ignore[arg-type]
+            shapes.append(Shape(name, k, kind, size, rng.normal(size=3), rotation, role, part, vertices))
     pairs = {}
     for role in ("solid", "field"):
         chosen = [k for k, shape in enumerate(shapes) if shape.role == role]

@@ -31,7 +31,7 @@ def pressing(plant: OfflinePlant | Controller) -> None:
 def in_python(ticks: int, age: int, gains: Gains, modality: str, propagate: str, seed: int, dt: float) -> tuple[Array, Array]:
     """Encoders and joint sides at every tick, each (ticks, n)."""
     model = Model(ICUB, load_world("table"))
-    controller = Controller(model, gains, modality, propagate)  # type: ignore[arg-type]
+    controller = Controller(model, gains, modality, propagate)
     motors = Motors(ICUB, MotorParameters(), seed, ICUB.home)
     track, commands = model.track(), []
     pressing(controller)
@@ -39,7 +39,7 @@ def in_python(ticks: int, age: int, gains: Gains, modality: str, propagate: str,
     substeps = motors.parameters.substeps(dt)
     for k in range(1, ticks + 1):
         if k > age:
-            motors.command(slice(None), modality, getattr(commands[k - age - 1], modality))  # type: ignore[arg-type]
+            motors.command(slice(None), modality, getattr(commands[k - age - 1], modality))
         q = motors.encoders(k, dt)
         commands.append(controller.step(q, dt, controller.forces(track.evaluate(q))))
         for _ in range(substeps):

@@ -48,12 +48,12 @@ def named(robot: Robot, check: str) -> list[Finding]:
 
 
 def with_joint(robot: Robot, name: str, **changes: object) -> Robot:
-    joints = tuple(replace(joint, **changes) if joint.name == name else joint for joint in robot.joints)  # type: ignore[arg-type]
+    joints = tuple(replace(joint, **changes) if joint.name == name else joint for joint in robot.joints)
     assert all(isinstance(joint, Joint) for joint in joints)
     return replace(robot, joints=joints)
 
 
 def with_motor(robot: Robot, name: str, **changes: object) -> Robot:
-    motors = tuple(replace(motor, **changes) if motor.name == name else motor for motor in robot.motor_table)  # type: ignore[arg-type]
+    motors = tuple(replace(motor, **changes) if motor.name == name else motor for motor in robot.motor_table)
     assert all(isinstance(motor, Motor) for motor in motors)
     return replace(robot, motor_table=motors)
