@@ -31,7 +31,10 @@ class Record:
 
 
 def records(folder: Path) -> Iterator[Record]:
-    """Every agent's transitions in a run's folder, one after the other; raises InvalidValue if there are none, MobeeError for a damaged file."""
+    """Every agent's transitions in a run's folder.
+
+    Raises InvalidValue if there are none, or an array that holds none, MobeeError for a damaged file.
+    """
     found = False
     for record in (*_of_stores(folder), *_of_cells(folder)):
         found = True
