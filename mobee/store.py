@@ -86,7 +86,12 @@ class TransitionStore:
             if not known:
                 self._db.executemany("INSERT INTO meta VALUES (?, ?, ?)", [(self.agent, key, value) for key, value in given.items()])
                 return
-        for key in sorted(known.keys() | given.keys()):
+        if missing := sorted(given.keys() - known.keys()):
+            raise MobeeError(
+                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, whose agents "
+                "chose otherwise. `mobee plan` and `mobee export` read it; to learn on, use another file."
+            )
+        for key in sorted(known):
             if known.get(key) != given.get(key):
                 raise MobeeError(
                     f"{self.path}: {self.agent} has {key} = {known.get(key)} on record, now {given.get(key)}. "

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 
@@ -39,6 +40,18 @@ def load() -> None:
             _import(FOLDER)
         else:
             _compile(FOLDER, writable)
+
+
+def load_only(module: str) -> ModuleType:
+    """Import one compiled module and what it needs, which takes less time and memory; whoever finds it not compiled compiles all."""
+    if module not in sys.modules:
+        from mobee.engine.compiled import FOLDER
+
+        if is_ready(FOLDER):
+            mark_used(FOLDER)
+        else:
+            load()
+    return importlib.import_module(module)
 
 
 def _import(folder: Path) -> None:

@@ -65,7 +65,7 @@ def value_iteration(
         raise InvalidValue(f"start has shape {values.shape} or is not finite: give one value for each of the {len(outcomes)} states.")
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
-    sweeps, action_values = _sweeps(), np.empty(reward.shape)
+    sweeps, action_values = load_planning(), np.empty(reward.shape)
     done = sweeps.solve(probabilities, outcomes, reward, values, action_values, discount, tolerance, relative, method == "modified")
     if done == sweeps.BAD_REWARD:
         raise InvalidValue(BAD_REWARD)
@@ -91,11 +91,8 @@ def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, 
 
 
 @cache
-def _sweeps() -> ModuleType:
-    """The compiled sweeps, imported when they are first needed, after the whole engine: a process compiles all at once, or nothing."""
-    from mobee.engine.load import load
+def load_planning() -> ModuleType:
+    """The compiled sweeps, imported when they are first needed."""
+    from mobee.engine.load import load_only
 
-    load()
-    from mobee.learning import sweeps
-
-    return sweeps
+    return load_only("mobee.learning.sweeps")

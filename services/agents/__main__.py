@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mobee import load_robot
-from mobee.engine.load import load as load_engine
+from mobee.learning.value_iteration import load_planning
 from services.agents.config import Config
 from services.agents.node import AgentNode
 from services.common.config import load_config
@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     with explained("services.agents"):
         robot = load_robot(config.robot)
         robot.part(config.part)
-        load_engine()  # before the bus hears of it: planning is compiled, and who loads it in the first plan seems frozen
+        load_planning()  # before the bus hears of it: planning is compiled, and who loads it in the first plan seems frozen
         with Service(f"agent_{config.part}", config, robot) as service:
             AgentNode(service, config, robot).run()
 

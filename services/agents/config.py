@@ -28,6 +28,20 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Of future rewards."""
     initial: Literal["50-50", "60-40"] = "50-50"
     """What it believes of an action before it has tried it."""
+    divergence: Literal["kail", "kl"] = "kail"
+    """What an outcome is worth: 'Kail' divergence, or plain KL over all states."""
+    forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    """Factor of what it counted of an action before each new try of it; below 1 it keeps up with a world that changes."""
+    beliefs: Literal["counts", "debiased"] = "counts"
+    """What its plans trust: the counts with what it imagined, as published, or without."""
+    tolerance: Annotated[float, Meta(gt=0)] = 0.01
+    """At which a plan is good enough."""
+    relative: bool = True
+    """The tolerance is in units of the largest reward, and plans start from the one before; false: as published, with 0.001."""
+    goal: tuple[Annotated[int, Meta(ge=0)], ...] = ()
+    """States to go to, instead of where curiosity draws it; empty: curiosity alone."""
+    goal_weight: float = 0.0
+    """Reward of an action in such a state that is added to curiosity's, in nats; 0: the goal replaces curiosity."""
     run_dir: str = ""
     """Folder of the run, where its transitions are kept and found again; empty: they are not kept."""
     transitions: Annotated[int, Meta(ge=0)] = 0

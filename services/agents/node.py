@@ -43,6 +43,13 @@ class AgentNode:
             discount=config.discount,
             initial=config.initial,
             store=self._store,
+            divergence=config.divergence,
+            forgetting=config.forgetting,
+            tolerance=config.tolerance,
+            relative=config.relative,
+            beliefs=config.beliefs,
+            goal=config.goal or None,
+            goal_weight=config.goal_weight or None,
         )
         self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
         self._mark()

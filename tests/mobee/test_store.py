@@ -107,12 +107,31 @@ def test_settings_are_kept_and_only_the_same_are_taken(tmp_path):
     with TransitionStore(path, "torso") as store:
         store.bind(settings)
         assert store.settings() == settings
-        for other in ({**settings, "seed": 4}, {"seed": 3}, {**settings, "discount": 0.9}):
+        for other in ({**settings, "seed": 4}, {"seed": 3}):
             with pytest.raises(MobeeError, match="torso has .* on record.*or another file"):
                 store.bind(other)
         assert store.settings() == settings
     with TransitionStore(path, "left_arm") as store:
         store.bind({"seed": 4})
+
+
+def test_a_record_with_fewer_settings_is_not_gone_on_with_and_says_what_it_is_good_for(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        store.bind({"seed": 1})
+        with pytest.raises(
+            MobeeError, match=r"run\.sqlite: torso has no beliefs, goal on record.*earlier version.*mobee export.*another file"
+        ):
+            store.bind({"seed": 1, "goal": None, "beliefs": "counts"})
+        assert store.settings() == {"seed": 1}
+
+
+def test_when_each_was_committed_is_on_record(tmp_path):
+    begin = time.time()
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        for n in (1, 2, 3):
+            store.append(transition(n))
+        times = store.times()
+    assert len(times) == 3 and begin <= times[0] <= times[1] <= times[2] <= time.time()
 
 
 def test_a_number_out_of_order_is_refused(tmp_path):

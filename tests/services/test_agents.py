@@ -17,6 +17,7 @@ from bus_schema import encoding_of, keys
 from bus_schema.messages import Clock, Event, Motion, Transition
 from bus_schema.rpc import Done, Empty, Goal
 from mobee import Lattice, load_robot
+from mobee.store import STORE, TransitionStore
 from tests.services.harness import FakeController, Program, Rig, rig, wait_for
 
 ROBOT = load_robot("icub")
@@ -195,6 +196,16 @@ def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_pa
     for end in ("7", "14"):
         assert stage.agent("--transitions", end, "--seed", "3").wait(30.0) == 0
     assert [(t.s, t.a, t.s_next, t.reward, t.value) for t in stage.made(14)] == whole
+
+
+def test_an_agent_with_a_goal_goes_there_and_keeps_what_it_was_told_on_record(stage: Stage) -> None:
+    given = ("--goal", "26", "--beliefs", "debiased", "--divergence", "kl", "--forgetting", "0.9", "--tolerance", "0.001")
+    assert stage.agent(*given, "--transitions", "8").wait(30.0) == 0
+    assert any(t.s == 26 for t in stage.made(8))
+    with TransitionStore(stage.folder / STORE, "torso") as store:
+        settings = store.settings()
+    assert settings["goal"]["weight"] is None
+    assert [settings[name] for name in ("beliefs", "divergence", "forgetting", "tolerance")] == ["debiased", "kl", 0.9, 0.001]
 
 
 def test_an_arm_has_four_joints_sixteen_neighbours_and_its_other_motors_at_rest(tmp_path: Path) -> None:

@@ -182,3 +182,33 @@ def test_a_warm_start_compiles_nothing() -> None:
     print(time_to_first_pose)
     assert compiled == "0"
     assert done.stderr == ""
+
+
+ONE = """
+import sys
+from mobee.engine.load import load_only
+print(load_only("mobee.learning.sweeps").__name__, "mobee.engine.evaluate" in sys.modules)
+"""
+
+ONE_OF_TWO = """
+import sys
+sys.path.insert(0, {folder!r})
+import mobee.engine.load
+mobee.engine.load.MODULES = ("stand_in", "another")
+print(mobee.engine.load.load_only("stand_in").twice(21.0), "another" in sys.modules)
+"""
+
+
+def test_who_needs_one_module_loads_no_other() -> None:
+    load()
+    done = subprocess.run([sys.executable, "-c", ONE], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("mobee.learning.sweeps False\n", "")
+
+
+def test_who_needs_one_module_and_finds_nothing_compiled_compiles_all(tmp_path: Path) -> None:
+    for name in ("stand_in", "another"):
+        (tmp_path / f"{name}.py").write_text(STAND_IN)
+    command = [sys.executable, "-c", ONE_OF_TWO.format(folder=str(tmp_path))]
+    for printed in ("42.0 True\n", "42.0 False\n"):
+        environment = {**os.environ, "MOBEE_CACHE": str(tmp_path / "cache")}
+        assert subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True).stdout == printed
