@@ -1,0 +1,130 @@
+"""What rewards on paper and runs of the robot say about the two divergences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.claims import Claim
+from experiments.kail.on_paper import told_apart
+from experiments.kail.spaces import space_of
+from experiments.learning.constraint_actions import constraint_actions, relative_tries
+from experiments.learning.counted import exists_in, failures_of, tries_of
+from experiments.statistics import interquartile_mean, interval
+from experiments.sweep import CellResult
+from mobee.robot.robot import Array, Ints
+
+DIVERGENCES = ("kail", "kl")
+PARTS = ("left_arm", "torso")
+EARLY = 100  # transitions, whose mean pay is compared between the parts
+
+FIRST = Claim("thesis 6.4.2, 6.4.3", "tries until a failing action is told from a sound one: 'Kail' against plain KL", "many with KL")
+SECOND = Claim("thesis 6.4.2", "tries until an uncertain action is told from a sound one: 'Kail' against plain KL", "many with KL")
+SPIKES = Claim(
+    "thesis 6.4.3", "with 'Kail' the agent tries failing actions more than sound ones, more so than with plain KL", "qualitative"
+)
+SIZE = Claim(
+    "thesis 6.4.2",
+    "plain KL pays a 27-state learner more than an 81-state one: ratio of what the first tries pay",
+    "eqs. 6.6-6.9: falls with size",
+)
+COMPARABLE = Claim("thesis 6.4.3", "with 'Kail' rewards of learners of different size are comparable: the same ratio", "1")
+CLAIMS = (FIRST, SECOND, SPIKES, SIZE, COMPARABLE)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Tries and failures (E,) of the E state-actions, what each transition paid (T,)."""
+
+    tries: Ints
+    failures: Ints
+    paid: Array
+    first_reward: float
+
+
+Groups = dict[tuple[str, str], list[Run]]  # part and divergence
+
+
+def groups(found: Mapping[str, CellResult]) -> Groups:
+    """The runs of each part and divergence, by seed."""
+    grouped: Groups = {}
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        settings, values = result.cell.settings, result.values
+        space = space_of(settings["part"])
+        exists = exists_in(space)
+        one = Run(
+            tries_of(space, values["seen"])[exists], failures_of(space, values["seen"])[exists], values["paid"], values["first_reward"]
+        )
+        grouped.setdefault((settings["part"], settings["divergence"]), []).append(one)
+    return grouped
+
+
+def at_constraints(grouped: Groups) -> Array:
+    """Which of the arm's state-actions fail, by all tries with both divergences."""
+    return constraint_actions([run for divergence in DIVERGENCES for run in grouped.get(("left_arm", divergence), [])])
+
+
+def spikes(grouped: Groups, divergence: str) -> list[float]:
+    """Mean tries of failing actions over those of the others, of each run of the arm."""
+    chosen = at_constraints(grouped)
+    return [relative_tries(run.tries, chosen) for run in grouped["left_arm", divergence]]
+
+
+def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:
+    """A row a part and divergence, and the claims."""
+    grouped = groups(found)
+    rows = {f"{part}, {divergence}": _row(runs) for (part, divergence), runs in grouped.items()}
+    complete = all((part, divergence) in grouped for part in PARTS for divergence in DIVERGENCES)
+    claims = _claims(grouped) if complete else list(CLAIMS)
+    return {"runs": rows, "claims": [claim.record() for claim in claims]}
+
+
+def _row(runs: list[Run]) -> dict[str, Any]:
+    untried = [float((run.tries == 0).sum()) for run in runs]
+    return {
+        "seeds": len(runs),
+        "promised_first": round(runs[0].first_reward, 5),
+        "paid_first_100": round(interquartile_mean([float(run.paid[:EARLY].mean()) for run in runs]), 5),
+        "paid_last_100": round(interquartile_mean([float(run.paid[-EARLY:].mean()) for run in runs]), 5),
+        "untried": interquartile_mean(untried),
+    }
+
+
+def _claims(grouped: Groups) -> list[Claim]:
+    dearer = {divergence: spikes(grouped, divergence) for divergence in DIVERGENCES}
+    ratios = {divergence: _sizes(grouped, divergence) for divergence in DIVERGENCES}
+    kail_low, kl_high = interval(dearer["kail"])[0], interval(dearer["kl"])[1]
+    kl_ratio, kail_ratio = interval(ratios["kl"]), interval(ratios["kail"])
+    return [
+        _apart(FIRST, "failing"),
+        _apart(SECOND, "uncertain"),
+        SPIKES.measured(
+            f"tries over those of the others: {_said(dearer['kail'])}, plain KL {_said(dearer['kl'])}", kail_low > max(kl_high, 1.0)
+        ),
+        SIZE.measured(_said(ratios["kl"]), kl_ratio[0] > 1.5),
+        COMPARABLE.measured(_said(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
+    ]
+
+
+def _apart(claim: Claim, kind: str) -> Claim:
+    """Tries on paper, in the arm's space."""
+    kail, plain = told_apart("left_arm", "kail", kind), told_apart("left_arm", "kl", kind)
+    return claim.measured(f"{_tries(kail)} against {_tries(plain)}", kail < plain)
+
+
+def _tries(count: float) -> str:
+    return f"{count:.1f}" if np.isfinite(count) else "never"
+
+
+def _sizes(grouped: Groups, divergence: str) -> list[float]:
+    """What the torso's first tries pay over what the arm's do, of each seed."""
+    torso, arm = (grouped[part, divergence] for part in ("torso", "left_arm"))
+    return [float(one.paid[:EARLY].mean() / other.paid[:EARLY].mean()) for one, other in zip(torso, arm, strict=False)]
+
+
+def _said(values: list[float]) -> str:
+    low, high = interval(values)
+    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"

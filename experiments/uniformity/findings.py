@@ -1,0 +1,125 @@
+"""What the runs say about uniformity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from experiments.claims import Claim
+from experiments.learning.constraint_actions import constraint_actions, relative_tries
+from experiments.learning.counted import exists_in, failures_of, tries_of, visits_of
+from experiments.learning.published import ARM_NEIGHBOURS, arm_space
+from experiments.learning.spread import gini, relative_spread
+from experiments.statistics import interquartile_mean, interval, ratio, ratio_interval
+from experiments.sweep import CellResult
+from mobee import Lattice
+from mobee.robot.robot import Array, Ints
+
+EXPLORERS = ("curious", "least_tried", "random")
+GRAPHS = ("nearest", "equidistant")
+
+VISITS = Claim("paper 3.1, fig. 5", "visits over states are more uniform than with least-tried and random exploration", "qualitative")
+TRIES = Claim("paper 3.1, fig. 5", "tries over state-actions are more uniform than with least-tried and random exploration", "qualitative")
+SPIKES = Claim(
+    "paper 3.1, fig. 5", "the curious agent tries actions at constraints more often than the others: ratio of mean tries", "spikes"
+)
+NONE = Claim("paper 3.1, fig. 5", "least-tried and random exploration have no such spikes", "none visible")
+SAME = Claim(
+    "notes of this project", "with equidistant neighbours least-tried tries as evenly as curiosity: fig. 5 depends on its graph", "-"
+)
+CLAIMS = (VISITS, TRIES, SPIKES, NONE, SAME)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What one explorer did: tries and failures (E,) of the E state-actions, visits (S,)."""
+
+    tries: Ints
+    failures: Ints
+    visits: Ints
+
+
+Groups = dict[tuple[str, str], list[Run]]  # graph and explorer
+
+
+@cache
+def space_of(graph: str) -> Lattice:
+    """The lattice of a graph."""
+    return arm_space(neighbours=ARM_NEIGHBOURS if graph == "nearest" else "equidistant")
+
+
+def groups(found: Mapping[str, CellResult]) -> Groups:
+    """The runs of each graph and explorer, by seed."""
+    grouped: Groups = {}
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        settings, seen = result.cell.settings, result.values["seen"]
+        space = space_of(settings["graph"])
+        exists = exists_in(space)
+        one = Run(tries_of(space, seen)[exists], failures_of(space, seen)[exists], visits_of(space, seen))
+        grouped.setdefault((settings["graph"], settings["explorer"]), []).append(one)
+    return grouped
+
+
+def at_constraints(grouped: Groups, graph: str) -> Array:
+    """Which state-actions (E,) fail, by all explorers' tries on a graph."""
+    return constraint_actions([run for explorer in EXPLORERS for run in grouped.get((graph, explorer), [])])
+
+
+def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:
+    """A row a graph and explorer, and the claims."""
+    grouped = groups(found)
+    rows = {f"{graph}, {explorer}": _row(grouped, graph, explorer) for graph, explorer in grouped}
+    complete = all((graph, explorer) in grouped for graph in GRAPHS for explorer in EXPLORERS)
+    claims = _claims(grouped) if complete else list(CLAIMS)
+    return {"runs": rows, "claims": [claim.record() for claim in claims]}
+
+
+def _row(grouped: Groups, graph: str, explorer: str) -> dict[str, Any]:
+    runs = grouped[graph, explorer]
+    return {
+        "seeds": len(runs),
+        "tries_spread": interquartile_mean([relative_spread(run.tries) for run in runs]),
+        "tries_gini": interquartile_mean([gini(run.tries) for run in runs]),
+        "fewest": min(int(run.tries.min()) for run in runs),
+        "most": max(int(run.tries.max()) for run in runs),
+        "visits_spread": interquartile_mean([relative_spread(run.visits) for run in runs]),
+        "at_constraints": interquartile_mean(_spikes(grouped, graph, explorer)),
+        "constraint_actions": int(at_constraints(grouped, graph).sum()),
+    }
+
+
+def _spikes(grouped: Groups, graph: str, explorer: str) -> list[float]:
+    """Mean tries of actions at constraints over those of the others, of each run."""
+    chosen = at_constraints(grouped, graph)
+    return [relative_tries(run.tries, chosen) for run in grouped[graph, explorer]]
+
+
+def _claims(grouped: Groups) -> list[Claim]:
+    visits = {e: [relative_spread(run.visits) for run in grouped["nearest", e]] for e in EXPLORERS}
+    tries = {e: [gini(run.tries) for run in grouped["nearest", e]] for e in EXPLORERS}
+    even = {e: [gini(run.tries) for run in grouped["equidistant", e]] for e in EXPLORERS}
+    spikes = {e: _spikes(grouped, "nearest", e) for e in EXPLORERS}
+    others = "; ".join(f"{e} {_said(spikes[e])}" for e in EXPLORERS[1:])
+    return [
+        VISITS.measured(f"standard deviation over mean: {_each(visits)}", _lowest(visits)),
+        TRIES.measured(f"Gini coefficient: {_each(tries)}", _lowest(tries)),
+        SPIKES.measured(_said(spikes["curious"]), interval(spikes["curious"])[0] > 1.5),
+        NONE.measured(others, all(interval(spikes[e])[1] < 1.5 for e in EXPLORERS[1:])),
+        SAME.measured(f"Gini coefficient: {_each(even)}", interval(even["least_tried"])[0] <= interval(even["curious"])[1]),
+    ]
+
+
+def _lowest(values: Mapping[str, list[float]]) -> bool:
+    """Whether the curious agent's is below both others', the interval of the ratio included."""
+    return all(ratio_interval(values["curious"], values[e])[1] < 1.0 and ratio(values["curious"], values[e]) < 1.0 for e in EXPLORERS[1:])
+
+
+def _each(values: Mapping[str, list[float]]) -> str:
+    return ", ".join(f"{explorer} {_said(values[explorer])}" for explorer in EXPLORERS)
+
+
+def _said(values: list[float]) -> str:
+    low, high = interval(values)
+    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"

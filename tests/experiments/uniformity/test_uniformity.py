@@ -1,0 +1,17 @@
+from __future__ import annotations
+
+from experiments import uniformity
+from experiments.uniformity.findings import CLAIMS, EXPLORERS, GRAPHS, findings
+from tests.experiments.learning.cells import Cell, finished
+
+
+def test_a_short_exploration_by_everybody_gives_all_claims_a_number():
+    cells = [
+        Cell(f"{graph}-{explorer}", 0, {"graph": graph, "explorer": explorer, "transitions": 60})
+        for graph in GRAPHS
+        for explorer in EXPLORERS
+    ]
+    results = findings(finished(uniformity.work, cells))
+    assert [claim["text"] for claim in results["claims"]] == [claim.text for claim in CLAIMS]
+    assert all(claim["ours"] for claim in results["claims"])
+    assert results["runs"]["nearest, curious"]["most"] <= results["runs"]["nearest, random"]["most"]
