@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.claims import Claim
-from experiments.registry import EXPERIMENTS, load_experiment
+from experiments.registry import CHAPTER7, EXPERIMENTS, load_experiment
 from experiments.run_folder import CONFIG, RESULTS, VERSIONS, newest_run, read
 from mobee.errors import InvalidValue
 
@@ -36,8 +36,9 @@ intervals, unless they say otherwise; how many runs they rest on is in the last 
 
 
 def stated() -> Rows:
-    """The claims that the experiments list, without our numbers."""
-    return [(name, claim) for name in EXPERIMENTS for claim in getattr(load_experiment(name), "CLAIMS", ())]
+    """The claims that the experiments list, without our numbers; those of chapter 7 first, in its order."""
+    names = dict.fromkeys([name for name in (*CHAPTER7, *EXPERIMENTS) if name in EXPERIMENTS])
+    return [(name, claim) for name in names for claim in getattr(load_experiment(name), "CLAIMS", ())]
 
 
 def recorded() -> Recorded:
