@@ -77,6 +77,7 @@ def work(cell: Cell) -> dict[str, Any]:
         "new_actions": _firsts(pairs) + 1,
         "new_states": _firsts(np.concatenate([[start], seen[:, 2]])),
         "transitions": len(seen),
+        "seen": seen,
         "failed": float((seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]).mean()),
     }
 

@@ -61,6 +61,7 @@ def work(cell: Cell) -> dict[str, Any]:
         "tries": agent.model.tries.copy(),
         "values": _values(agent),
         "rewards": agent.model.reward.copy(),
+        "seen": seen,
         "transitions": len(seen),
         "all_once": int(new[-1]) if len(new) == space.state_actions else None,
         "failed": int((seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]).sum()),

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mobee import CuriousAgent, Lattice, OfflinePlant
+from mobee import CuriousAgent, OfflinePlant, Space
 from mobee.robot.robot import Ints
 
 
-def begin_anywhere(space: Lattice, plant: OfflinePlant, seed: int) -> None:
+def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
     """Bring the part into a random state, as the published runs began; what it does on the way is not observed."""
     plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
 
