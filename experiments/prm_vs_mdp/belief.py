@@ -1,0 +1,49 @@
+"""What a planner believes of robot and world, and which poses and motions it therefore holds for sound."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.learning.arm_poses import arm_clauses, columns, silent
+from experiments.learning.published import robot
+from experiments.prm_vs_mdp.scene import Scene, world_of
+from mobee import Gains, Model
+from mobee.robot.robot import Array
+
+BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
+STEP = 0.02  # of a joint's range, between two poses of a motion that are looked at
+
+
+class Belief:
+    """Sound is a pose of the arm in which, as far as is believed, the reactive layer would exert no force.
+
+    Args:
+        scene: what is true.
+        kind: "true", or what is hidden: "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and
+            joints 3 degrees off), "both", "gross" (both, three times as much off).
+    """
+
+    def __init__(self, scene: Scene, kind: str) -> None:
+        times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
+        self._model = Model(robot(), world_of(scene.balls + times * scene.shifts))
+        self._turns = times * scene.turns
+        self._clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+        limits = robot().limits[columns()]
+        self.limits: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
+        """(4, 2) rad between which the joint limits exert no force."""
+        self.span: Array = np.ptp(limits, axis=1)
+        """(4,) rad, the joints' ranges."""
+        self.looks = 0
+        """How many poses were looked at."""
+
+    def sound(self, q: Array) -> NDArray[np.bool_]:
+        """Which of the poses (P, 4) rad are."""
+        self.looks += len(q)
+        return silent(self._model, q + self._turns, self._clauses)
+
+    def is_sound_motion(self, start: Array, end: Array) -> bool:
+        """Whether all of the straight way between two poses (4,) rad is; where it starts does not count, for there the robot is."""
+        count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
+        shares = np.arange(1, count + 1)[:, None] / count
+        return bool(self.sound(start + shares * (end - start)).all())
