@@ -22,6 +22,7 @@ EXPERIMENTS = {
     "identify": "experiments.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
+    "planner": "experiments.planner",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "settle": "experiments.settle",

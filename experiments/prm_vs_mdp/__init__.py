@@ -24,7 +24,7 @@ from experiments.prm_vs_mdp.belief import BELIEFS, Belief
 from experiments.prm_vs_mdp.figure import draw
 from experiments.prm_vs_mdp.graphs import KINDS, NEIGHBOURS, make_roadmap, with_goals
 from experiments.prm_vs_mdp.queries import answer
-from experiments.prm_vs_mdp.rivals import PlannedOnce, Planner, Repaired, Rival, Straight
+from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Rival, Straight
 from experiments.prm_vs_mdp.scene import Scene, make_scene, space, world_of
 from experiments.prm_vs_mdp.summary import Summary, summarise
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
@@ -77,7 +77,7 @@ def _rivals(cell: Cell, scene: Scene, lattice: Lattice) -> Iterator[tuple[str, R
         plant = arm_plant(cell.seed + 500, world=world_of(scene.balls))
         agent = CuriousAgent(lattice, plant, seed=cell.seed)
         agent.run(settings["learned"])
-        yield f"MDP, {settings['learned']} learned", Planner(lattice, agent.model), plant.time / 3600.0
+        yield f"MDP, {settings['learned']} learned", Learned(lattice, agent.model), plant.time / 3600.0
     elif "belief" in settings:
         belief = Belief(scene, settings["belief"])
         for kind in KINDS:

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from experiments.prm_vs_mdp.roadmap import Edge, Roadmap, edge
-from mobee import Lattice, TransitionModel, value_iteration
+from mobee import Lattice, TransitionModel
+from mobee.learning.planner import Planner
 from mobee.robot.robot import Array
 
 ARRIVED = 0.125  # of every joint's range: half the distance of two samples of the lattice
@@ -136,11 +137,11 @@ class Repaired:
         return edge(self._at, vertex) if self._at is not None else (-1 - self._roadmap.nearest(q, 1)[0], vertex)
 
 
-class Planner:
-    """Follows the policy of a transition model, planned by value iteration, and goes on learning from what it sees."""
+class Learned:
+    """Follows the plan of a learned transition model, made anew after every action, and goes on learning from what it sees."""
 
-    def __init__(self, space: Lattice, model: TransitionModel, discount: float = 0.9) -> None:
-        self._space, self._model, self._discount = space, model, discount
+    def __init__(self, space: Lattice, model: TransitionModel) -> None:
+        self._space, self._model = space, model
         self._goal = self._action = 0
         self.repairs = 0
 
@@ -151,11 +152,7 @@ class Planner:
     def aim(self, q: Array) -> Array | None:
         """See Rival."""
         state = self._space.state_of(q)
-        beliefs = self._model.debiased()
-        reward = (beliefs.probabilities * (beliefs.outcomes == self._goal)).sum(axis=-1)
-        reward[self._goal] = -np.inf  # the query is over there
-        _, values = value_iteration(beliefs, reward, self._discount, 1e-6)
-        self._action = int(np.argmax(values[state]))
+        self._action = int(Planner(self._space, self._model.debiased(), [self._goal]).policy[state])
         sample: Array = self._space.samples[self._space.goal(state, self._action)]
         return sample
 

@@ -1,0 +1,97 @@
+"""The learned MDP as a planner: what it looks like, and how it plans around a table that comes, or comes and goes.
+
+Claim: most learned state-actions reliably take the arm where they aim, a few lead elsewhere, always or sometimes (fig. 7); no static
+workspace is needed; and a planner trained with dynamic obstacles plans around the regions where they tend to be.
+Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.
+Run time on 2 cores: about five minutes.
+
+The left arm of the published robot, 81 states with 16 neighbours, 4000 curious transitions: without the table, or with one that
+is set up or down at random after every ten actions; or 2000 without it, then it enters.  Plans are made from debiased counts, anew
+after each action, and learn nothing from the 60 queries; in the straight way between start and goal, and there only, is the raised table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
+from experiments.planner.figure import draw
+from experiments.planner.findings import CLAIMS, ENTERS, claims, fates, summary
+from experiments.planner.following import follow, queries, zone
+from experiments.planner.table import DOWN, UP, TablePlant
+from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from mobee import CuriousAgent
+
+NAME = "planner"
+CLAIM = "the learned planner needs no static workspace, and trained with a moving obstacle it plans around where that tends to be"
+SOURCE = "paper 3.1, 3.2.1, fig. 7; thesis 7.4.1"
+__all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
+
+LEARNED, BEFORE = 4000, 2000  # transitions, in all and before the table enters
+AFTER = (0, 250, 500, 1000, 2000, 4000)  # transitions with the table that has entered
+QUERIES = 60
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the experiment."""
+    sweep_arguments(parser)
+
+
+def cells(arguments: argparse.Namespace) -> list[Cell]:
+    """Of each seed: learned without the table, with one that moves, and one that enters, with and without forgetting."""
+    settings: dict[str, Any] = {"queries": 10, "share": 0.25} if arguments.quick else {"queries": QUERIES, "share": 1.0}
+    found = []
+    for seed in range(arguments.seed, arguments.seed + arguments.seeds):
+        found += [Cell(f"{way}-s{seed}", seed, settings | {"way": way}) for way in ("still", "moving")]
+        found += [Cell(f"enters-{f:g}-s{seed}", seed, settings | {"way": "enters", "forgetting": f}, 2.0) for f in ENTERS]
+    return found
+
+
+def work(cell: Cell) -> dict[str, Any]:
+    """Learn, and follow plans; the means over the queries by name."""
+    settings, space = cell.settings, arm_space(RANK3, ARM_NEIGHBOURS)
+    plant = TablePlant(cell.seed, moves=settings["way"] == "moving")
+    blocked = zone(plant, space, UP) & ~zone(plant, space, DOWN)
+    wanted = queries(plant, space, settings["queries"], cell.seed)
+    agent = CuriousAgent(space, plant, seed=cell.seed, forgetting=settings.get("forgetting", 1.0))
+
+    def followed(tops: list[float]) -> dict[str, float]:
+        return asdict(follow(space, agent.model.debiased(), wanted, tops, blocked, cell.seed))
+
+    up, down = [UP] * len(wanted), [DOWN] * len(wanted)
+    if settings["way"] == "enters":
+        agent.run(round(BEFORE * settings["share"]))
+        plant.set_top(UP)
+        after = [round(n * settings["share"]) for n in AFTER]
+        rows = []
+        for target in after:
+            agent.run(round(BEFORE * settings["share"]) + target - agent.transitions)
+            rows.append(followed(up))
+        return {"after": after, "rows": rows}
+    agent.run(round(LEARNED * settings["share"]))
+    mixed = np.random.default_rng([cell.seed, 743]).choice((UP, DOWN), len(wanted)).tolist()
+    tests = {"up": followed(up), "down": followed(down), "moving": followed(mixed)}
+    beliefs = agent.model.debiased()
+    return {
+        "tests": tests,
+        "fates": fates(agent.model),
+        "outcomes": np.array(beliefs.outcomes),
+        "probabilities": np.array(beliefs.probabilities),
+    }
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Work off all cells; returns the claims and the table."""
+    run_cells(work, cells(arguments), folder, arguments)
+    done = load_cells(folder)
+    return {"claims": [claim.record() for claim in claims(done)], **summary(done)}
+
+
+def figure(folder: Path) -> Path:
+    """The learned model as in fig. 7, the plans with a moving table, and how they recover when it has entered."""
+    return draw(load_cells(folder), folder / "planner.png")

@@ -1,0 +1,66 @@
+"""The learned model as in fig. 7, the plans with a moving table, and how they recover when it has entered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
+from experiments.matplotlib_figure import new_figure
+from experiments.planner.arrows import draw_arrows
+from experiments.planner.findings import ENTERS, entering, tested
+from experiments.statistics import interquartile_mean, interval
+from experiments.sweep import CellResult
+from mobee.errors import InvalidValue
+
+COLORS = {"still": "tab:gray", "moving": "tab:red"}
+
+
+def draw(done: Mapping[str, CellResult], path: Path) -> Path:
+    """Two pictures of the model, one of each way of learning, and two panels; raises InvalidValue if cells are missing."""
+    ways = {way: sorted(name for name, r in done.items() if r.cell.settings["way"] == way) for way in ("still", "moving", "enters")}
+    if not all(ways.values()):
+        raise InvalidValue(f"{path.parent} lacks finished cells: go on with --resume.")
+    drawing = new_figure(17.0, 13.0)
+    above, below = drawing.subfigures(2, 1, height_ratios=(2.0, 1.0))
+    space = arm_space(RANK3, ARM_NEIGHBOURS)
+    titles = {"still": "learned without the table", "moving": "learned while the table goes up and down"}
+    for axes, (way, title) in zip(above.subplots(1, 2), titles.items(), strict=True):
+        values = done[ways[way][0]].values
+        draw_arrows(axes, space, values["outcomes"], values["probabilities"])
+        axes.set_title(title, fontsize=10)
+    bars, recovering, plans = below.subplots(1, 3)
+    _moving(bars, done)
+    _entering(recovering, done, "success", "share of queries that succeed")
+    _entering(plans, done, "actions", "actions a query")
+    drawing.savefig(path, dpi=110)
+    return path
+
+
+def _moving(axes: Any, done: Mapping[str, CellResult]) -> None:
+    tests = ("down", "moving", "up")
+    for shift, (way, color) in zip((-0.1, 0.1), COLORS.items(), strict=True):
+        values = [tested(done, way, test, "touched") for test in tests]
+        means = np.array([interquartile_mean(v) for v in values])
+        bounds = np.array([interval(v) for v in values])
+        spread = np.maximum(np.stack([means - bounds[:, 0], bounds[:, 1] - means]), 0.0)
+        axes.errorbar(np.arange(3) + shift, means, spread, fmt="o", color=color, capsize=3, label=f"trained: table {way}")
+    axes.set_xticks(range(3), [f"table {test}" for test in tests])
+    axes.set(ylabel="share of actions that end at the table", ylim=(-0.02, None), xlabel="while plans are carried out")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.2)
+
+
+def _entering(axes: Any, done: Mapping[str, CellResult], measure: str, label: str) -> None:
+    for forgetting, color in zip(ENTERS, ("tab:blue", "tab:orange"), strict=True):
+        after, rows = entering(done, forgetting)
+        means = [interquartile_mean(column) for column in rows[measure].T]
+        bounds = np.array([interval(column) for column in rows[measure].T])
+        axes.plot(after, means, "o-", color=color, label="all is remembered" if forgetting == 1.0 else f"counts fade by {forgetting:g}")
+        axes.fill_between(after, bounds[:, 0], bounds[:, 1], color=color, alpha=0.15, linewidth=0.0)
+    axes.set(xlabel="transitions since the table entered", ylabel=label)
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.2)

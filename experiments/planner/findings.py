@@ -1,0 +1,109 @@
+"""What came of the cells, in numbers with intervals, and what that says of the claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from experiments.claims import Claim
+from experiments.statistics import interquartile_mean, interval
+from experiments.sweep import CellResult
+from mobee import TransitionModel
+from mobee.robot.robot import Array
+
+ENTERS = (1.0, 0.9)  # forgetting of the model while a table enters
+MEASURES = ("success", "actions", "promised", "kept", "touched", "through")
+TRIES, SURE = 2, 0.8  # a state-action tried as often, and an outcome as likely as that, are looked at and held for certain
+CLAIMS = (
+    Claim(
+        "paper 3.1, fig. 7",
+        "most state-actions take the arm where they aim; of the few that do not, some lead elsewhere always and some sometimes",
+        "7 lead elsewhere: 4 always, 3 sometimes",
+    ),
+    Claim("paper 2, 3.2", "no static workspace is required: the learned planner adapts to a table that enters", "no number"),
+    Claim("paper 3.2.1, thesis 7.4.1", "trained with dynamic obstacles, the planner plans around where they tend to be", "no number"),
+)
+
+
+def fates(model: TransitionModel) -> dict[str, int]:
+    """How many state-actions reach their goal, or something else, always or sometimes, among those tried TRIES times."""
+    beliefs, space = model.debiased(), model.space
+    tried = model.tries >= TRIES
+    probabilities = np.array(beliefs.probabilities)
+    at_goal = (probabilities * (beliefs.outcomes == space.goals[..., None])).sum(axis=-1)
+    likeliest = probabilities.max(axis=-1)
+    always = tried & (at_goal >= SURE)
+    elsewhere = tried & ~always & (likeliest >= SURE)
+    counted = {"tried": tried, "goal": always, "elsewhere": elsewhere, "sometimes": tried & ~always & ~elsewhere}
+    return {name: int(which.sum()) for name, which in counted.items()}
+
+
+def claims(done: Mapping[str, CellResult]) -> list[Claim]:
+    """The claims with our numbers."""
+    return [_fates_claim(done), _enters_claim(done), _moving_claim(done)]
+
+
+def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
+    """The tables of the results, as text."""
+    trained = [
+        {"trained with": way, "tested with": test, **{m: spread(tested(done, way, test, m)) for m in MEASURES}}
+        for way in ("still", "moving")
+        for test in ("up", "down", "moving")
+    ]
+    entered = []
+    for forgetting in ENTERS:
+        after, rows = entering(done, forgetting)
+        entered += [
+            {"forgetting": forgetting, "transitions since": n, **{m: spread(rows[m][:, i]) for m in MEASURES}} for i, n in enumerate(after)
+        ]
+    return {"moving table": trained, "table entered": entered}
+
+
+def tested(done: Mapping[str, CellResult], way: str, test: str, measure: str) -> Array:
+    """One value a seed, in the order of the seeds."""
+    found = sorted((r for r in done.values() if r.cell.settings["way"] == way), key=lambda r: r.cell.seed)
+    return np.array([result.values["tests"][test][measure] for result in found])
+
+
+def entering(done: Mapping[str, CellResult], forgetting: float) -> tuple[list[int], dict[str, Array]]:
+    """Transitions since the table entered, and each measure (seeds, points)."""
+    found = [r for r in done.values() if r.cell.settings.get("forgetting") == forgetting]
+    rows = {m: np.array([[point[m] for point in result.values["rows"]] for result in found]) for m in MEASURES}
+    return list(found[0].values["after"]), rows
+
+
+def spread(values: Array) -> str:
+    """The interquartile mean with its interval."""
+    low, high = interval(values)
+    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _fates_claim(done: Mapping[str, CellResult]) -> Claim:
+    counts = [r.values["fates"] for r in done.values() if r.cell.settings["way"] == "still"]
+    share = np.array([c["goal"] / c["tried"] for c in counts])
+    elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
+    text = (
+        f"{spread(share)} of those tried {TRIES} times reach their goal, {spread(elsewhere)} lead elsewhere, {spread(sometimes)} sometimes"
+    )
+    return CLAIMS[0].measured(text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0)
+
+
+def _enters_claim(done: Mapping[str, CellResult]) -> Claim:
+    after, rows = entering(done, ENTERS[0])
+    gain = rows["success"][:, -1] - rows["success"][:, 0]
+    fewer = rows["actions"][:, 0] - rows["actions"][:, -1]
+    text = (
+        f"success {spread(rows['success'][:, 0])} when it enters, {spread(rows['success'][:, -1])} {after[-1]} transitions later;"
+        f" actions a query {spread(rows['actions'][:, 0])} and {spread(rows['actions'][:, -1])}"
+    )
+    return CLAIMS[1].measured(text, interval(gain)[0] > 0.0 and interval(fewer)[0] > 0.0)
+
+
+def _moving_claim(done: Mapping[str, CellResult]) -> Claim:
+    moving, still = (tested(done, way, "moving", "touched") for way in ("moving", "still"))
+    less = still - moving
+    low, high = interval(less)
+    text = f"actions that end at the moving table: {spread(moving)}, trained without it {spread(still)}; less by {spread(less)}"
+    return CLAIMS[2].measured(text, True if low > 0.0 else False if high < 0.0 else None)
