@@ -53,9 +53,9 @@ def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array)
                 axes.add_patch(arrow)
     axes.plot(*places.T, "o", color="0.2", markersize=2.2, zorder=2)
     _label(axes, places)
-    axes.set_aspect("equal")
+    axes.set(aspect="equal", xlim=(-1.3, 2.0 * GAP + 3.0), ylim=(-1.6, 2.0 * GAP + 2.6))
     axes.set_axis_off()
-    axes.text(0.5, -0.02, f"{len(coloured)} coloured of {len(states)} state-actions", transform=axes.transAxes, ha="center", fontsize=8)
+    axes.text(GAP + 1.0, -1.55, f"{len(coloured)} coloured of {len(states)} state-actions", ha="center", fontsize=8)
 
 
 def _unforeseen(space: Lattice, outcomes: Ints, probabilities: Array) -> Iterator[tuple[int, int]]:

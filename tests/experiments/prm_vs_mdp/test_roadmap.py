@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from experiments.prm_vs_mdp.roadmap import Roadmap, edge
+
+
+class Plane:
+    """A belief about four joints in which a motion is sound unless it goes through a wall at 0.5 of the first joint."""
+
+    span = np.ones(4)
+
+    def is_sound_motion(self, start, end):
+        return (start[0] - 0.5) * (end[0] - 0.5) > 0.0
+
+
+def pose(x, y=0.0):
+    return np.array([x, y, 0.0, 0.0])
+
+
+@pytest.fixture
+def square():
+    """0 - 1 - 3 is long, 0 - 2 - 3 short."""
+    vertices = np.array([pose(0.0), pose(0.0, 3.0), pose(0.1, 0.5), pose(0.2, 1.0)])
+    return Roadmap(vertices, [(0, 1), (1, 3), (0, 2), (2, 3)], Plane())
+
+
+def test_the_way_is_the_cheapest_and_detours_around_what_was_taken_out(square):
+    assert square.way({0: 0.0}, 3, set()) == [0, 2, 3]
+    assert square.way({0: 0.0}, 3, {edge(3, 2)}) == [0, 1, 3]
+    assert square.way({0: 0.0}, 3, {edge(2, 3), edge(1, 0)}) is None
+
+
+def test_where_to_begin_is_part_of_the_cost(square):
+    assert square.way({0: 0.0, 2: 0.5}, 3, set()) == [2, 3]
+    assert square.way({0: 0.0, 2: 9.0}, 3, set()) == [0, 2, 3]
+
+
+def test_ways_cost_what_trying_all_of_them_finds():
+    rng = np.random.default_rng(0)
+    vertices = rng.uniform(size=(6, 4))
+    edges = [pair for pair in itertools.combinations(range(6), 2) if rng.uniform() < 0.6]
+    roadmap = Roadmap(vertices, edges, Plane())
+
+    def cost(way):
+        return sum(roadmap.cost(vertices[v], w) for v, w in itertools.pairwise(way))
+
+    for goal in range(1, 6):
+        inner = [v for v in range(1, 6) if v != goal]
+        ways = [(0, *middle, goal) for n in range(5) for middle in itertools.permutations(inner, n)]
+        possible = [way for way in ways if all(edge(v, w) in edges for v, w in itertools.pairwise(way))]
+        found = roadmap.way({0: 0.0}, goal, ())
+        assert (found is None) == (not possible)
+        if found is not None:
+            assert cost(found) == pytest.approx(min(cost(way) for way in possible))
+
+
+def test_a_vertex_is_joined_by_sound_motions_only_and_by_all_if_there_are_none(square):
+    here = square.add(pose(0.3, 1.0), 4)
+    assert square.way({here: 0.0}, 3, ()) == [here, 3]
+    beyond = square.add(pose(0.9, 1.0), 2)
+    assert square.way({beyond: 0.0}, 3, {edge(beyond, 3)}) == [beyond, here, 3]
