@@ -59,8 +59,8 @@ def measure(settings: Settings) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> str:
     """The measurements as text."""
     lines = [
-        f"Ticks of {1e3 * result['tick']:g} ms, motor substeps of 5 ms; processor time "
-        f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, medians of {result['rounds']} rounds.",
+        f"Ticks of {1e3 * result['tick']:g} ms, motor substeps of 5 ms; processor time",
+        f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, rounds: {result['rounds']} (the median counts).",
         f"{'':<32}{'x real time':>12}{'ended/s':>10}{'us/tick':>9}{'s/action':>10}",
     ]
     for name, title in (("one_arm", "one arm, 256 states"), ("three_agents", "three agents at the table")):
@@ -74,7 +74,7 @@ def report(result: dict[str, Any]) -> str:
         "rigid-body dynamics and contact, which our motors do not have; it has no model,\nlaw or encoders."
     )
     lines += [
-        f"  {one['name']:<44}{one['found']:9.0f}, required {one['least']:g}, aim {one['aim']:g}  {'pass' if one['passed'] else 'SHORT'}"
+        f"  {one['name']:<39}{one['found']:9.0f}, required {one['least']:g}, aim {one['aim']:g}  {'pass' if one['passed'] else 'SHORT'}"
         for one in result["requirements"]
     ]
     return "\n".join([*lines, f"  same seed, same trajectory hash: {'yes' if result['same_hash'] else 'NO'}"])

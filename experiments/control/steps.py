@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.control.margins import clause_violations
 from experiments.control.models import icub
+from experiments.control.postures import random_posture
 from experiments.control.ride import Ride, place, ride
 from mobee import Gains
 from mobee.robot.robot import Array
@@ -50,11 +51,7 @@ def postures(count: int, seed: int) -> list[Array]:
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]
     while len(found) <= count:
-        q = robot.home.copy()
-        for part, motors in LATTICE.items():
-            where = slice(robot.parts[part].start, robot.parts[part].start + motors)
-            low, high = robot.limits[where].T
-            q[where] = low + rng.uniform(*MIDDLE, motors) * (high - low)
+        q = random_posture(robot, rng, LATTICE, MIDDLE)
         # Motors get there at different times, so the way is not the line: the torso first, then the arms, and the other way round.
         ways = np.linspace(0.0, 1.0, 11)[:, None, None]
         torso = np.arange(len(q)) < robot.parts["torso"].slice.stop

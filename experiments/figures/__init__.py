@@ -1,1 +1,1 @@
-"""Figures of the documentation, each made by one program."""
+"""The figures of the documentation that neither `mobee experiment figure` nor `mobee bench --figure` draws."""

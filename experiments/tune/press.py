@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.control.depths import deepest, oscillation
 from experiments.control.models import icub, icub_at_table
+from experiments.control.postures import random_posture
 from experiments.control.ride import ride
 from mobee import Gains
 from mobee.robot.robot import Array
@@ -16,6 +17,7 @@ from mobee.simulation import MotorParameters, OfflinePlant
 SEED = 7
 SECONDS, REST = 6.0, 2.0  # s, a press; its end, in which chatter is measured
 LATTICE_MOTORS = {"torso": 3, "left_arm": 4, "right_arm": 4}
+WITHIN = (0.1, 0.9)  # of their ranges
 BELOW_TOP = (-0.25, -0.05)  # m
 ABOVE_BLOCK = (-0.6, -0.2)  # m, along x
 TOP = -0.1  # m
@@ -37,11 +39,7 @@ def targets(count: int) -> list[Array]:
     rng, free = np.random.default_rng(SEED), icub()
     found: list[Array] = []
     while len(found) < count:
-        q = robot.home.copy()
-        for part, motors in LATTICE_MOTORS.items():
-            where = slice(robot.parts[part].start, robot.parts[part].start + motors)
-            low, high = robot.limits[where].T
-            q[where] = low + rng.uniform(0.1, 0.9, motors) * (high - low)
+        q = random_posture(robot, rng, LATTICE_MOTORS, WITHIN)
         pose = free.evaluate(q)
         palms = [pose.position(marker) for marker in PALMS]
         low_enough = any(BELOW_TOP[0] < z - TOP < BELOW_TOP[1] and ABOVE_BLOCK[0] < x < ABOVE_BLOCK[1] for x, _, z in palms)
