@@ -36,7 +36,7 @@ def summary_of(
     It ends after `duration` seconds, or in lockstep after so many `ticks`.  `runs`: where its folder stays; None: nowhere.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--json", "--endpoint", _free_endpoint()]
+        argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
         argv += ["--runs", str(runs or scratch)]
         argv += [] if duration is None else ["--duration", str(duration)]
         argv += [] if ticks is None else ["--ticks", str(ticks)]
@@ -51,24 +51,26 @@ def summary_of(
         except subprocess.TimeoutExpired:
             raise LaunchFailed(f"{scenario}: no end in sight") from None
         finally:
-            _stop(process)
+            stop(process)
     if process.returncode != 0:
         raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(news.strip().splitlines() or ['it said nothing'])[-1]}")
     return dict(json.loads(said))
 
 
-def _stop(process: subprocess.Popen[str]) -> None:
-    if process.poll() is not None:
-        return
-    process.send_signal(signal.SIGINT)
-    try:
-        process.communicate(timeout=_ENDS)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+def stop(process: subprocess.Popen[Any]) -> int:
+    """End a system that leads a group of its own, in order if it can; returns its exit code."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.communicate(timeout=_ENDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    return int(process.returncode)
 
 
-def _free_endpoint() -> str:
+def free_endpoint() -> str:
+    """An address on which nobody listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,13 +12,13 @@ from pathlib import Path
 from experiments.babbling.command_log import COMMANDS
 from experiments.babbling.measured import POSITIONS, SUMMARY
 from experiments.babbling.modes import scenario
+from experiments.launched import free_endpoint, stop
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 
 LOOK = 0.05  # s between looks at how far it is
 BEGINS = 60.0  # s within which the first tick must come
 STANDS = 30.0  # s without a tick after which a trial is given up
-ENDS = 30.0  # s
 
 
 class TrialFailed(MobeeError):
@@ -54,32 +51,16 @@ def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show
 def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """`mobee launch` at an endpoint of its own; what it sums up must be without fault, and it is stopped when anything is raised."""
     argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--headless", "--json"]
-    argv += ["--endpoint", _free_endpoint(), "--runs", str(folder / "launch")]
+    argv += ["--endpoint", free_endpoint(), "--runs", str(folder / "launch")]
     with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
         # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
         process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=summary, stderr=news, process_group=0)
     try:
         yield process
     finally:
-        code = _stop(process)
+        code = stop(process)
     if code != 0:
         raise TrialFailed(f"{file.stem}: the system ended with code {code}: {_last_line(folder / 'news')}")
-
-
-def _stop(process: subprocess.Popen[bytes]) -> int:
-    if process.poll() is None:
-        process.send_signal(signal.SIGINT)
-    try:
-        return process.wait(ENDS)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        return process.wait()
-
-
-def _free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def _last_line(path: Path) -> str:
