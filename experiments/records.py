@@ -17,11 +17,11 @@ class Records:
         self._file = path.open("a+", newline="")
         self._file.truncate(_whole(self._file))
         self._writer = csv.DictWriter(self._file, columns)
-        if self._file.tell() == 0:
-            self._writer.writeheader()
 
     def append(self, record: Mapping[str, object]) -> None:
-        """Write one record, with all columns."""
+        """Write one record, with all columns; the first brings the head line."""
+        if self._file.tell() == 0:
+            self._writer.writeheader()
         self._writer.writerow(record)
         self._file.flush()
 

@@ -38,8 +38,8 @@ def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
 
 
 def discard_unused(folder: Path) -> None:
-    """Remove the folder of a run that was refused: it holds what `new_run` has made and nothing else; otherwise it stays."""
-    if {path.name for path in folder.iterdir()} <= {CONFIG, VERSIONS}:
+    """Remove the folder of a run that was refused before it had anything to keep; otherwise it stays."""
+    if all(path.name in (CONFIG, VERSIONS) or (path.is_file() and path.stat().st_size == 0) for path in folder.iterdir()):
         shutil.rmtree(folder)
 
 

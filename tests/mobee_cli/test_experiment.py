@@ -117,9 +117,10 @@ def test_a_failed_verdict_fails_the_command(tmp_path, monkeypatch, capsys):
     assert "torn:\n  rows: 3\n" in capsys.readouterr().out
 
 
-def test_a_refused_run_leaves_no_folder(tmp_path, capsys):
-    assert main(["experiment", "run", "settle", "--motors", "l_elbo", "--runs", str(tmp_path)]) == 2
-    assert "Did you mean 'l_elbow'" in capsys.readouterr().err
+@pytest.mark.parametrize(("option", "says"), [("--motors=l_elbo", "Did you mean 'l_elbow'"), ("--periods=40", "tick of 0.04 s")])
+def test_a_refused_run_leaves_no_folder(option, says, tmp_path, capsys):
+    assert main(["experiment", "run", "settle", option, "--postures", "1", "--runs", str(tmp_path)]) == 2
+    assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
