@@ -7,9 +7,9 @@ that their forces may grow without bound, "but this never happens in practice". 
 and 2000 with forces of a client, a few minutes.
 
 A try is one arm's command: a start, three attractors, how long each is in force, and, in the part called "forced", a force in
-configuration space with each.  Both arms try at once, the torso is sent somewhere, a table stands in front, the motors are
-those of the published findings.  The first part of the tries is random; the rest varies and crosses the worst so far of every clause.
-The forced tries are no part of the claim: there the client pushes with all that it may.
+configuration space and one at the palm with each.  Both arms try at once, the torso is sent somewhere, a table stands in front,
+the motors are those of the published findings.  The first part of the tries is random; the rest varies and crosses the worst so
+far of every clause.  The forced tries are no part of the claim: there the client pushes with all that it may.
 """
 
 from __future__ import annotations

@@ -15,8 +15,9 @@ from mobee import Controller, Gains
 from mobee.robot.robot import Array, Robot
 from mobee.simulation import OfflinePlant
 
-ARMS = ("left_arm", "right_arm")
-STRONG = 1e3  # rad/s^2: the squash lets through nearly all that it can
+PALMS = {"left_arm": "left_palm", "right_arm": "right_palm"}
+ARMS = tuple(PALMS)
+STRONG = 1e3  # rad/s^2 at a motor, N/kg at a palm: the squash lets through nearly all that it can
 MARGIN = np.deg2rad(15.0)  # of a start, along the normal; the constraints are felt nearer than 12
 AT_STOP = np.deg2rad(0.01)
 
@@ -67,9 +68,10 @@ def _tell(controller: Controller, part: str, command: Command, phase: int, force
     attractor = controller.attractor
     attractor[where] = _angles(robot, part, command.attractors[phase])
     controller.attractor = attractor
-    if command.forces.any():
+    if command.is_forced:
         force[where] = STRONG * command.forces[phase]
         controller.force(force)
+        controller.push(PALMS[part], STRONG * command.pushes[phase])
 
 
 def _legal(robot: Robot, q: Array) -> Array:

@@ -34,6 +34,16 @@ def _motors(part: str, sign: float) -> Push:
     return push
 
 
+def _together(*pushes: Push) -> Push:
+    """At markers and at motors at once."""
+
+    def push(controller: Controller, force: float) -> None:
+        for each in pushes:
+            each(controller, force)
+
+    return push
+
+
 # Root frame: x backwards, y right, z up.
 WALLS: dict[str, Push] = {
     "table-left-hand": _marker("left_palm", (0.0, 0.0, -1.0)),
@@ -47,4 +57,6 @@ WALLS: dict[str, Push] = {
     "limits-arm-": _motors("left_arm", -1.0),
     "limits-torso+": _motors("torso", 1.0),
     "limits-torso-": _motors("torso", -1.0),
+    "table-hand-and-torso": _together(_marker("left_palm", (0.0, 0.0, -1.0)), _motors("torso", 1.0)),
+    "limits-hand-and-arm": _together(_marker("left_palm", (0.0, 0.0, 1.0)), _motors("left_arm", 1.0)),
 }

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,3 +58,11 @@ def test_a_try_is_judged_by_where_the_arms_have_been() -> None:
     trial = try_commands(Gains.default(), [random_command(rng, False), random_command(rng, False)], np.zeros(3), 0)
     assert trial.violations.ravel() == pytest.approx(clause_violations(robot, trial.ride.q).max(axis=0))
     assert np.ptp(trial.ride.q, axis=0)[robot.parts["left_arm"].slice][:5].max() > 0.1
+
+
+def test_a_client_pushes_at_motors_and_at_the_palm() -> None:
+    rng = np.random.default_rng(4)
+    still = [replace(random_command(rng, forced=False), attractors=np.zeros((PHASES, 7)), start=np.zeros(7)) for _ in range(2)]
+    pushed = [replace(command, pushes=np.tile([0.0, 0.0, 1.0], (PHASES, 1))) for command in still]
+    rides = [try_commands(Gains.default(), commands, np.zeros(3), 0).ride for commands in (still, pushed)]
+    assert np.abs(rides[0].q[-1] - rides[1].q[-1]).max() > 0.1
