@@ -66,10 +66,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                     _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text))
                 done += 1
     rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
-    claims = verdict(rows)
+    judged = verdict(rows)
     if not arguments.json:
         print(as_table(rows))
-    return {"passed": all(claims.values()), "claims": claims, **({"modes": rows} if arguments.json else {})}
+    return {"passed": all(judged.values()), "judged": judged, **({"modes": rows} if arguments.json else {})}
 
 
 def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:

@@ -14,6 +14,7 @@ from experiments.babbling.results import summarise, verdict
 from experiments.babbling.table import as_table
 from experiments.babbling.trial import TrialFailed
 from mobee.errors import InvalidValue
+from mobee_cli.__main__ import main
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
 
@@ -84,6 +85,17 @@ def test_the_table_has_80_columns_and_a_line_a_pair() -> None:
     lines = as_table(rows(off=many)).splitlines()
     assert max(len(line) for line in lines) <= 80
     assert any("l_forearm - table" in line and "1234" in line for line in lines)
+
+
+def test_a_finished_run_is_told_as_a_table_with_what_is_judged_below(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(babbling, "compile_engine", lambda: None)
+    monkeypatch.setattr(babbling, "_run_until_repeatable", lambda *settings: None)
+    monkeypatch.setattr(babbling, "read_trials", lambda folder, mode: [GOOD[mode]])
+    assert main(["experiment", "run", "babbling", "--minutes", "1", "--runs", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "collisions (solid contacts)" in said and "passed: yes" in said
+    assert "2.0 moves more smoothly than 1.0: yes" in said
+    assert all(len(line) <= 80 for line in said.splitlines() if not line.startswith("run: "))
 
 
 def test_minutes_are_cut_into_trials() -> None:
