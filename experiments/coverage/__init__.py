@@ -23,7 +23,7 @@ import numpy as np
 from experiments.coverage.figure import draw
 from experiments.coverage.findings import CLAIMS, findings
 from experiments.coverage.postman import postman_floor
-from experiments.learning.published import ARM_NEIGHBOURS, arm_plant, arm_space
+from experiments.learning.published import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
 from experiments.learning.trial import LeastTries, begin_anywhere, explore
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
@@ -35,7 +35,7 @@ SOURCE = "paper 3.1 and fig. 4, thesis 7.2.1 and fig. 7.5"
 __all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
 
 EXPLORED_BY = tuple(name for name in ("curious", "least_tried", "random", "nearest_untried", "depleting") if name in EXPLORERS)
-GRAPHS = {"nearest": ARM_NEIGHBOURS, "equidistant": "equidistant"}
+GRAPHS: dict[str, Neighbours] = {"nearest": ARM_NEIGHBOURS, "equidistant": "equidistant"}
 WORLDS = ("constrained", "free")
 MOST = 60_000  # transitions, should an action be beyond reach
 COST = {"random": 10.0, "least_tried": 3.0}

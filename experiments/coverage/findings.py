@@ -39,8 +39,9 @@ def groups(found: Mapping[str, CellResult]) -> Groups:
     """The values of the cells that differ in nothing but the seed."""
     grouped: Groups = {}
     for result in found.values():
-        key = tuple(result.cell.settings[name] for name in ("graph", "world", "explorer"))
-        grouped.setdefault(key, []).append(result.values)  # type: ignore[arg-type]  # three names give three
+        settings = result.cell.settings
+        key = settings["graph"], settings["world"], settings["explorer"]
+        grouped.setdefault(key, []).append(result.values)
     return grouped
 
 

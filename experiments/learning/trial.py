@@ -23,7 +23,7 @@ def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], boo
         last = agent.last
         assert last is not None
         seen.append((last.s, last.a, last.s_next))
-    return np.array(seen, dtype=np.int32).reshape(-1, 3)
+    return np.array(seen, dtype=np.int64).reshape(-1, 3)
 
 
 class LeastTries:

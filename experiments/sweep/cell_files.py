@@ -30,7 +30,7 @@ def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".unfinished")
     with unfinished.open("wb") as file:
-        np.savez_compressed(file, **{_RECORD: _bytes(cell, record)}, **{_ARRAY + key: array for key, array in arrays.items()})
+        np.savez_compressed(file, allow_pickle=False, **{_RECORD: _bytes(cell, record), **{_ARRAY + k: a for k, a in arrays.items()}})
         file.flush()
         os.fsync(file.fileno())
     unfinished.replace(path)

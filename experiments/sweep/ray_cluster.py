@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections import deque
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from experiments.sweep.cell import Cell, Work
 from experiments.sweep.done import Done, do
@@ -24,12 +26,13 @@ def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done
     except ImportError:
         raise RayMissing("--engine ray needs Ray, which is not installed: pip install '.[cluster]' in MoBeE's folder") from None
     try:
-        ray.init(address="auto", log_to_driver=False, logging_level="error")
+        ray.init(address="auto", log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError:
-        ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False, logging_level="error")
+        ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
     try:
         remote = ray.remote(max_retries=0)(do)
-        waiting, running = deque(cells), {}
+        waiting = deque(cells)
+        running: dict[Any, Cell] = {}
         room = jobs or max(1, int(ray.cluster_resources().get("CPU", 1)))
         while waiting or running:
             while waiting and len(running) < room:
