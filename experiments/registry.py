@@ -10,6 +10,7 @@ from typing import Any, Protocol, cast
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
+    "accuracy": "experiments.accuracy",
     "babbling": "experiments.babbling",
     "chapter7": "experiments.chapter7",
     "clauses": "experiments.clauses",
@@ -39,6 +40,7 @@ CHAPTER7 = (  # what `mobee experiment run chapter7` runs, in this order, of wha
     "decay",
     "uniformity",
     "kail",
+    "accuracy",
     "rank4",
     "connectivity",
     "change",

@@ -6,13 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mobee import CuriousAgent, OfflinePlant, Space
+from mobee import CuriousAgent, OfflinePlant, Plant, Space
 from mobee.robot.robot import Ints
 
 
 def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
     """Bring the part into a random state, as the published runs began; what it does on the way is not observed."""
     plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
+
+
+def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
+    """Go to a random neighbour of the state the part is in, unobserved: that action begins at no sample; returns the state."""
+    state = space.state_of(plant.measure(space.part)[space.columns])
+    goal = int(np.random.default_rng(seed).choice(space.actions(state)))
+    return space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
 
 
 def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], bool] = lambda agent: False) -> Ints:

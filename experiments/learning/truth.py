@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.learning.trial import begin_nearby
 from mobee import Plant, TransitionModel, run_batch, value_iteration
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import choose
@@ -95,9 +96,7 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
     """What a walk saw until it had tried every action that often, shape (T, 3): state, action, state reached."""
     plant, rng = plant_of(seed), np.random.default_rng(seed)
     model, values = TransitionModel(space), np.zeros(len(space))
-    state = space.state_of(plant.measure(space.part)[space.columns])
-    approach = plant.act(space.part, space.target(int(rng.choice(space.actions(state)))))  # from no sample: not observed
-    state = space.state_of(approach.q[space.columns])
+    state = begin_nearby(space, plant, seed)
     lacking = np.where(space.goals == NO_ACTION, 0.0, 1.0)
     seen: list[tuple[int, int, int]] = []
     while lacking.any() and len(seen) < most:
