@@ -6,6 +6,7 @@ from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileE
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.lattice import Lattice
 from mobee.learning.parallel import run
+from mobee.learning.planner import Plan, Planner
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
@@ -33,6 +34,8 @@ __all__ = [
     "MotorParameters",
     "OfflinePlant",
     "Outcome",
+    "Plan",
+    "Planner",
     "Plant",
     "Pose",
     "ReachPath",

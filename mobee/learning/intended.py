@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
@@ -39,13 +39,18 @@ def passing(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> d
     return {int(state): float(entry[state] * leaving[state]) for state in inside}
 
 
-def _graph(space: Space) -> csr_array:
+def _graph(space: Space) -> Any:
+    """A sparse matrix (S, S) with an entry where an action leads from a state to another one."""
+    from scipy.sparse import csr_array
+
     states, actions = np.nonzero(space.goals != NO_ACTION)
     shape = (len(space), len(space))
     return csr_array((np.ones(len(states)), (states, space.goals[states, actions])), shape=shape)
 
 
-def _steps(graph: csr_array, sources: Ints) -> Array:
+def _steps(graph: Any, sources: Ints) -> Array:
     """Edges from the nearest of the sources to each state, shape (S,), infinite where there is no way."""
+    from scipy.sparse.csgraph import dijkstra
+
     found: Array = dijkstra(graph, indices=sources, unweighted=True, min_only=True)
     return found

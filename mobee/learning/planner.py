@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, identity
-from scipy.sparse.csgraph import breadth_first_order
-from scipy.sparse.linalg import spsolve
 
 from mobee.errors import MobeeError
 from mobee.learning.exploit import target_states
@@ -100,6 +97,10 @@ class Planner:
 
     def _mean_steps(self, start: int) -> float:
         """Actions until a target on average, from the states to which the policy can come (a linear system)."""
+        from scipy.sparse import csr_array, identity  # 0.4 s, which only who plans has to wait for
+        from scipy.sparse.csgraph import breadth_first_order
+        from scipy.sparse.linalg import spsolve
+
         states = np.arange(len(self.space))
         probabilities = self.beliefs.probabilities[states, self.policy]
         probabilities[self.targets] = 0.0
