@@ -69,9 +69,12 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
         aimed = "" if goal == following else f" by aiming at {goal}"
         lines.append(f"  {state:>4} -> {following:<4} probability {chance:.2f}, tried {tries} times{aimed}")
     lines.append(f"Planning anew after each action, {plan.steps:.1f} actions on average.")
+    if plan.distrusted or plan.avoided:
+        lines.append(f"If every action worked, {plan.shortest} would do. Expected to fail (probability of success):")
+        lines += [f"  {state:>4} -> {goal:<4} {chance:.2f}" for (state, goal), chance in plan.distrusted.items()]
     if plan.avoided:
         avoided = ", ".join(f"{state} ({chance:.2f})" for state, chance in plan.avoided.items())
-        lines.append(f"If every action worked, {plan.shortest} would do; avoided (probability of getting through): {avoided}.")
+        lines.append(f"Avoided (probability of getting through): {avoided}.")
     return lines
 
 
@@ -88,5 +91,6 @@ def _as_json(learned: Learned, plan: Plan) -> dict[str, Any]:
         "success": plan.success,
         "mean_actions": plan.steps,
         "shortest": plan.shortest,
-        "avoided": {str(state): chance for state, chance in plan.avoided.items()},
+        "avoided": [{"state": state, "probability": chance} for state, chance in plan.avoided.items()],
+        "distrusted": [{"state": s, "goal": goal, "probability": chance} for (s, goal), chance in plan.distrusted.items()],
     }

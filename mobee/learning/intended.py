@@ -18,25 +18,27 @@ def steps_between(space: Space, start: int, targets: Ints) -> int:
     return int(fewest) if np.isfinite(fewest) else -1
 
 
-def passing(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[int, float]:
-    """The states inside the shortest intended paths, with the believed probability of getting into each and out of it on one.
-
-    The best of the entries and the best of the exits on such paths count.
-    """
+def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[tuple[int, int], float]:
+    """The actions on the shortest intended paths, as (state, goal), with the believed probability that each ends at its goal."""
     graph = _graph(space)
     there, on = _steps(graph, np.array([start])), _steps(graph.T.tocsr(), targets)
-    total = on[start]
-    if not np.isfinite(total):
+    if not np.isfinite(on[start]):
         return {}
-    states, actions = np.nonzero((space.goals != NO_ACTION) & (there[:, None] + 1.0 + on[space.goals] == total))
+    states, actions = np.nonzero((space.goals != NO_ACTION) & (there[:, None] + 1.0 + on[space.goals] == on[start]))
     goals = space.goals[states, actions]
     ends_there = beliefs.outcomes[states, actions] == goals[:, None]
     chances = np.where(ends_there, beliefs.probabilities[states, actions], 0.0).sum(axis=1)
-    entry, leaving = np.zeros(len(space)), np.zeros(len(space))
-    np.maximum.at(entry, goals, chances)
-    np.maximum.at(leaving, states, chances)
-    inside = np.setdiff1d(np.intersect1d(states, goals), [start, *targets])
-    return {int(state): float(entry[state] * leaving[state]) for state in inside}
+    return dict(zip(zip(states.tolist(), goals.tolist(), strict=True), chances.tolist(), strict=True))
+
+
+def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
+    """The states between such actions, with the probability of the best way in and out of each."""
+    entry: dict[int, float] = {}
+    leaving: dict[int, float] = {}
+    for (state, goal), chance in actions.items():
+        entry[goal] = max(entry.get(goal, 0.0), chance)
+        leaving[state] = max(leaving.get(state, 0.0), chance)
+    return {state: entry[state] * leaving[state] for state in sorted(entry.keys() & leaving.keys())}
 
 
 def _graph(space: Space) -> Any:

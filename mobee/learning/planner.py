@@ -9,14 +9,14 @@ import numpy as np
 
 from mobee.errors import MobeeError
 from mobee.learning.exploit import target_states
-from mobee.learning.intended import passing, steps_between
+from mobee.learning.intended import passing, shortest_actions, steps_between
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
 from mobee.robot.robot import Array, Ints
 
 DISCOUNT = 0.99  # near 1, the largest value has who needs the fewest actions on average
 TOLERANCE = 1e-12  # of values in [0, 1]
-RELIABLE = 0.5  # a state through which an action passes less often than this is held for unreliable
+RELIABLE = 0.5  # what works less often than this is held for unreliable
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,8 @@ class Plan:
     `path`: states from start to target.  `actions`: what to do in each but the last.  `probabilities`: that each action
     ends where the path says.  `success`: that all of them do.  `steps`: actions until a target on average, when the planner
     is asked again wherever one ends.  `shortest`: actions of a shortest path if every action reached its goal.
-    `avoided`: the states on such shortest paths, not on this one, that are held for unreliable, with the probability of
-    getting through each.
+    `avoided`: the states on such shortest paths, not on this one, with the probability of getting through each;
+    `distrusted`: the actions on them, as (state, goal), with that of ending at the goal: both where it is below one half.
     """
 
     path: tuple[int, ...]
@@ -37,6 +37,7 @@ class Plan:
     steps: float
     shortest: int
     avoided: dict[int, float]
+    distrusted: dict[tuple[int, int], float]
 
 
 class Planner:
@@ -71,7 +72,7 @@ class Planner:
             following, probability = self._next(path[-1])
             path.append(following)
             probabilities.append(probability)
-        passed = passing(self.space, self.beliefs, path[0], self.targets)
+        intended = shortest_actions(self.space, self.beliefs, path[0], self.targets)
         return Plan(
             path=tuple(path),
             actions=tuple(int(self.policy[state]) for state in path[:-1]),
@@ -79,7 +80,8 @@ class Planner:
             success=float(np.prod(probabilities)),
             steps=self._mean_steps(path[0]),
             shortest=steps_between(self.space, path[0], self.targets),
-            avoided={state: chance for state, chance in passed.items() if chance < RELIABLE and state not in path},
+            avoided={state: chance for state, chance in passing(intended).items() if chance < RELIABLE and state not in path},
+            distrusted={action: chance for action, chance in intended.items() if chance < RELIABLE},
         )
 
     def _next(self, state: int) -> tuple[int, float]:

@@ -33,7 +33,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 
 def test_each_example_has_its_own_number_and_fits_a_hundred_lines() -> None:
-    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 10)]
+    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 11)]
     assert {path.name: len(path.read_text().splitlines()) for path in EXAMPLES.values() if len(path.read_text().splitlines()) > 100} == {}
 
 
@@ -119,3 +119,17 @@ def test_09_reaches_what_is_in_reach_and_rests_before_what_is_not(tmp_path: Path
     assert numbers(r"in front: reached after \S+" + outcome, text)[0] <= 0.5
     assert numbers(r"out of reach: stuck after \S+" + outcome, text)[0] > 10
     assert numbers(r"under the table's top: stuck after \S+" + outcome, text)[0] > 5
+
+
+def test_10_plans_round_what_fails(tmp_path: Path) -> None:
+    text = printed("10", tmp_path)
+    assert re.search(r"each of 432 state-actions was tried at least [1-9] times", text)
+    naive, learned = (np.mean([int(n) for n in taken.split(",")]) for taken in re.findall(r"it took (.*) actions", text))
+    assert learned < naive
+    successes = [float(chance) for chance in re.findall(r"as expected with probability (\S+)", text)]
+    assert successes[1] > 0.7 > successes[0]
+    paths = [[int(state) for state in path.split(" -> ")] for path in re.findall(r"^  (\d+ -> [\d >-]+):", text, re.MULTILINE)]
+    assert [(path[0], path[-1]) for path in paths] == [(start, 24) for start in (0, 40, 60, 80)]
+    assert all(
+        (before, after) not in ((15, 24), (42, 51), (69, 78)) for path in paths for before, after in zip(path, path[1:], strict=False)
+    )

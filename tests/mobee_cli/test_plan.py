@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,18 +28,20 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def planned(run: Path, *words: str, capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
+def planned(run: Path, *words: str, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     assert main(["plan", "--run", str(run), "--json", *words]) == 0
     return dict(json.loads(capsys.readouterr().out))
 
 
 def test_the_path_goes_round_what_never_worked_and_says_so(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "--run", str(run), "--from", "0", "--to", "2"]) == 0
-    first, *steps, mean, avoided = capsys.readouterr().out.splitlines()
+    first, *steps, mean, shortest, failing, avoided = capsys.readouterr().out.splitlines()
     assert first.startswith("torso, by 600 transitions: from state 0 to 2 by 4 actions, all as expected with probability 0.9")
     assert len(steps) == 4 and all("->" in line and "tried" in line for line in steps)
     assert mean.startswith("Planning anew after each action, 4.")
-    assert avoided.startswith("If every action worked, 2 would do; avoided (probability of getting through): 1 (0.0")
+    assert shortest.startswith("If every action worked, 2 would do. Expected to fail")
+    assert failing.split()[:3] == ["0", "->", "1"] and float(failing.split()[3]) < 0.1
+    assert avoided.startswith("Avoided (probability of getting through): 1 (0.0")
 
 
 def test_as_json_with_poses(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -48,7 +51,8 @@ def test_as_json_with_poses(run: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert plan["goals"] == path[1:]
     np.testing.assert_allclose(plan["poses"], TORSO.samples[path])
     assert plan["success"] == pytest.approx(np.prod(plan["probabilities"]))
-    assert (plan["agent"], plan["transitions"], plan["shortest"], list(plan["avoided"])) == ("torso", 600, 2, ["1"])
+    assert (plan["agent"], plan["transitions"], plan["shortest"], plan["avoided"][0]["state"]) == ("torso", 600, 2, 1)
+    assert [(one["state"], one["goal"]) for one in plan["distrusted"]] == [(0, 1)]
 
 
 def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,6 +42,15 @@ def test_a_plan_goes_round_what_fails_and_names_it():
     assert 13 not in plan.path
     assert (len(plan.actions), plan.shortest, plan.success) == (4, 2, 1.0)
     assert plan.avoided == {13: pytest.approx(0.1)}
+    assert plan.distrusted == {(12, 13): pytest.approx(0.1)}
+
+
+def test_an_action_is_distrusted_where_the_state_before_it_is_passed_another_way():
+    plan = Planner(SPACE, Table(SPACE, {(13, 14): 0.9}), [14]).plan(12)
+    assert (len(plan.actions), plan.shortest) == (4, 2)
+    plan = Planner(SPACE, Table(SPACE, {(13, 14): 0.9, **{(12, int(g)): 0.95 for g in SPACE.actions(12) if g != 13}}), [14]).plan(12)
+    assert 13 in plan.path and plan.avoided == {}
+    assert plan.distrusted == {(13, 14): pytest.approx(0.1)}
 
 
 def test_a_plan_takes_a_doubtful_action_where_going_round_takes_longer():

@@ -1,0 +1,54 @@
+"""What was learned by curiosity is a planner: from anywhere to anywhere, around what does not work (thesis 6.5, 7.4.1).
+
+The cables of the shoulder keep the arm from some poses, which no model told the agent: it has tried. A plan over what actions aim at
+runs into them; a plan over where they were seen to end goes round.
+"""
+
+from __future__ import annotations
+
+import mobee
+
+ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]
+START, TARGET = 63, 24  # 24 is where the cables pull hardest: pitch low, roll and yaw high
+TRIES, PATIENCE = 5, 25  # walks, and actions until one is given up
+
+robot = mobee.load_robot("icub_2014")
+model = mobee.Model(robot)
+plant = mobee.OfflinePlant(model, 0, mobee.Gains.published_2014(), dt=0.02, active=ARM)
+space = mobee.Lattice(robot, joints=ARM, neighbours="equidistant")
+agent = mobee.CuriousAgent(space, plant)
+agent.run(1300)
+least = agent.model.tries[space.goals >= 0].min()
+print(f"{agent.transitions} transitions: each of {space.state_actions} state-actions was tried at least {least} times")
+
+
+def walk(planner: mobee.Planner) -> int:
+    """Do what the planner says, asked anew wherever an action ends, until a target is reached; how many actions it took."""
+    state = space.state_of(plant.measure(space.part)[space.columns])
+    for taken in range(PATIENCE):
+        if state in planner.targets:
+            return taken
+        goal = space.goal(state, int(planner.policy[state]))
+        state = space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
+    return PATIENCE
+
+
+learned = agent.model.debiased()  # without the failures that curiosity imagines
+naive = mobee.TransitionModel(space).debiased()  # of who has tried nothing
+for name, beliefs in (("naive", naive), ("learned", learned)):
+    planner = mobee.Planner(space, beliefs, [TARGET])
+    plan = planner.plan(START)
+    print(f"\n{name}: {' -> '.join(map(str, plan.path))}, as expected with probability {plan.success:.2f}")
+    for (state, goal), chance in plan.distrusted.items():
+        print(f"  not {state} -> {goal}, which works with probability {chance:.2f}")
+    taken = []
+    for _ in range(TRIES):
+        walk(mobee.Planner(space, learned, [START]))
+        taken.append(walk(planner))
+    print(f"  on the robot it took {', '.join(map(str, taken))} actions")
+
+print("\nfrom anywhere:")
+planner = mobee.Planner(space, learned, [TARGET])
+for start in (0, 40, 60, 80):
+    plan = planner.plan(start)
+    print(f"  {' -> '.join(map(str, plan.path))}: {plan.success:.2f}; avoided: {', '.join(map(str, plan.avoided)) or 'nothing'}")
