@@ -20,6 +20,7 @@ MODULES = (
     "mobee.simulation.drive",
     "mobee.simulation.loop",
     "mobee.learning.sweeps",
+    "mobee.learning.gains",
     "mobee.engine.evaluate",
 )
 PATIENCE = 300.0  # s that a process waits for another that compiles

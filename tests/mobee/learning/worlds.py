@@ -9,7 +9,8 @@ from mobee.learning.tabular import TabularPlant
 from tests.mobee.learning.toys import toy_robot
 
 
-def _space(goals) -> Space:
+def space_of(goals) -> Space:
+    """A space whose actions aim at these states, (S, A), -1 for no action."""
     low, high = np.deg2rad(15.5), np.deg2rad(106)
     return Space(toy_robot(), ["l_elbow"], np.linspace(low, high, len(goals))[:, None], goals)
 
@@ -25,7 +26,7 @@ def river_swim(length: int, seed: int = 0) -> TabularPlant:
     probabilities = np.tile([[1.0, 0.0, 0.0], [0.05, 0.6, 0.35]], (length, 1, 1))
     probabilities[0, 1] = 0.0, 0.4, 0.6
     probabilities[-1, 1] = 0.4, 0.0, 0.6
-    return TabularPlant(_space(np.stack([left, right], axis=1)), outcomes, probabilities, seed)
+    return TabularPlant(space_of(np.stack([left, right], axis=1)), outcomes, probabilities, seed)
 
 
 def deep_sea(depth: int, seed: int = 0) -> TabularPlant:
@@ -38,4 +39,4 @@ def deep_sea(depth: int, seed: int = 0) -> TabularPlant:
         below = (row + 1) * (row + 2) // 2
         goals += [[0, 0] if row == depth - 1 else [below + max(column - 1, 0), below + column + 1] for column in range(row + 1)]
     outcomes = np.array(goals)[:, :, None]
-    return TabularPlant(_space(goals), outcomes, np.ones(outcomes.shape), seed)
+    return TabularPlant(space_of(goals), outcomes, np.ones(outcomes.shape), seed)
