@@ -2,12 +2,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.coverage.findings import _claims, covered, first_repeat, states_seen
+from experiments.coverage.findings import _claims, _row, first_repeat, states_seen
 
 
 def values(end: float, floor: int = 100, repeats_at: int = 50):
     new = np.concatenate([np.arange(1, repeats_at), [end]]).astype(int)
-    return {"new_actions": new, "new_states": np.arange(81) * 2, "state_actions": len(new), "floor": floor, "failed": 0.0}
+    return {
+        "new_actions": new,
+        "new_states": np.arange(81) * 2,
+        "state_actions": len(new),
+        "floor": floor,
+        "failed": 0.0,
+        "transitions": end,
+    }
 
 
 def published(curious: int, least: int):
@@ -28,9 +35,10 @@ def test_the_first_repeat_and_the_states_seen_are_read_from_what_was_new():
     assert first_repeat(one) == 50 and states_seen(one, 20) == 11
 
 
-def test_what_was_never_covered_took_for_ever():
+def test_what_was_never_covered_is_counted():
     one = values(99.0)
-    assert covered([one, one | {"state_actions": 51}]).tolist() == [99.0, np.inf]
+    row = _row([one, one | {"transitions": 5000, "state_actions": 51}])
+    assert row["unfinished"] == 1 and row["high"] == 5000
 
 
 def test_half_the_time_close_to_the_floor_confirms_the_claims():
