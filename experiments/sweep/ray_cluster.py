@@ -36,7 +36,8 @@ def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done
         room = jobs or max(1, int(ray.cluster_resources().get("CPU", 1)))
         while waiting or running:
             while waiting and len(running) < room:
-                running[remote.remote(work, waiting[0])] = waiting.popleft()
+                cell = waiting.popleft()
+                running[remote.remote(work, cell)] = cell
             (ready, *_), _ = ray.wait(list(running))
             cell = running.pop(ready)
             try:
