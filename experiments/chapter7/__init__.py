@@ -11,7 +11,6 @@ that fails does not stop the others.  Then `mobee experiment claims` reads what 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from pathlib import Path
@@ -74,9 +73,10 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
     place.mkdir(exist_ok=True)
     try:
         if not (place / RESULTS).exists():
-            experiment, options = load_experiment(name), _options(name, arguments)
+            options = options_of_part(name, arguments)
             write(place / CONFIG, {"experiment": name, "options": vars(options)})
-            write(place / RESULTS, json.loads(json.dumps(experiment.run(options, place))))
+            vars(options).update(runs=folder, resume=place, json=False)  # as the command has them
+            write(place / RESULTS, load_experiment(name).run(options, place))
         drawn = _drawn(name, place)
     except MobeeError as error:
         return {"minutes": _spent(place, start), "failed": str(error)}
@@ -99,7 +99,7 @@ def _spent(place: Path, start: float) -> float:
     return float(before + time.monotonic() - start) / 60.0
 
 
-def _options(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
+def options_of_part(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
     """The experiment's own defaults, changed by what was given for all."""
     parser = argparse.ArgumentParser()
     load_experiment(name).add_arguments(parser)

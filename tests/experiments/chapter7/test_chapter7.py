@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from experiments import chapter7
-from experiments.registry import EXPERIMENTS
+from experiments.registry import CHAPTER7, EXPERIMENTS
 from experiments.run_folder import new_run
 from experiments.sweep import sweep_arguments
 from mobee.errors import MobeeError, UnknownName
@@ -48,13 +48,20 @@ def toys(monkeypatch):
     return SimpleNamespace(calls=calls, broken=broken)
 
 
+@pytest.mark.parametrize("name", [name for name in CHAPTER7 if name in EXPERIMENTS])
+def test_a_part_needs_no_option(name):
+    given = chapter7.options_of_part(name, options("--seed", "3", "--jobs", "1"))
+    assert given.seed == 3
+
+
 def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys):
     folder = new_run(tmp_path, "chapter7", {})
     results = chapter7.run(options("--seed", "3"), folder)
     assert toys.calls == [("hypercube", 10, 3, False), ("coverage", 10, 3, False)]
     assert results["passed"] and results["parts"]["coverage"]["figure"] == "coverage/toy.png"
     assert json.loads((folder / "hypercube" / "results.json").read_text()) == {"answer": 42}
-    assert json.loads((folder / "hypercube" / "config.json").read_text())["experiment"] == "hypercube"
+    config = json.loads((folder / "hypercube" / "config.json").read_text())
+    assert config == {"experiment": "hypercube", "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3}}
 
 
 def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
