@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.sweep.cell_files import load_cells
+from experiments.sweep.cell_files import FOLDER, load_cells
 from mobee.errors import InvalidValue
 from mobee.store import TransitionStore
 
@@ -54,13 +54,15 @@ def _of_stores(folder: Path) -> Iterator[Record]:
 
 
 def _of_cells(folder: Path) -> Iterator[Record]:
-    for name, result in load_cells(folder).items():
-        settings = {**result.cell.settings, "seed": result.cell.seed}
-        for key, array in result.values.items():
-            if key == SEEN or key.startswith(f"{SEEN}_"):
-                made = _checked(array, f"{folder}: {key} of cell {name}")
-                columns = dict(zip(("s", "a", "s_next"), made.T.tolist(), strict=True))
-                yield Record(f"cells/{name}.npz", key[len(SEEN) + 1 :], settings, {"n": list(range(1, len(made) + 1)), **columns})
+    for cells in sorted(folder.rglob(FOLDER)):  # a run of several experiments has one folder of cells each
+        for result in load_cells(cells.parent).values():
+            source = str(result.path.relative_to(folder))
+            settings = {**result.cell.settings, "seed": result.cell.seed}
+            for key, array in result.values.items():
+                if key == SEEN or key.startswith(f"{SEEN}_"):
+                    made = _checked(array, f"{folder}: {key} of {source}")
+                    columns = dict(zip(("s", "a", "s_next"), made.T.tolist(), strict=True))
+                    yield Record(source, key[len(SEEN) + 1 :], settings, {"n": list(range(1, len(made) + 1)), **columns})
 
 
 def _checked(array: Any, where: str) -> Any:

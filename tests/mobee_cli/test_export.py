@@ -50,6 +50,15 @@ def test_csv_has_every_transition_of_every_agent(run: Path, capsys: pytest.Captu
     ]
 
 
+def test_a_run_of_several_experiments_is_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("coverage", "lattice"):
+        write_cell(tmp_path / name, Cell("curious", 4), {"seen": SEEN}, 1.0)
+    assert main(["export", str(tmp_path)]) == 0
+    with (tmp_path / "transitions.csv").open(newline="") as file:
+        sources = [row["source"] for row in csv.DictReader(file)]
+    assert sources == ["coverage/cells/curious.npz"] * 2 + ["lattice/cells/curious.npz"] * 2
+
+
 def test_parquet_has_the_same_with_types_and_settings(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     file = tmp_path / "all.parquet"
@@ -84,7 +93,7 @@ def test_a_failure_leaves_no_file_and_the_old_one_as_it_was(run: Path, capsys: p
     before = (run / "transitions.csv").read_bytes()
     write_cell(run, Cell("wrong", 0), {"seen": np.zeros(5)}, 1.0)
     assert main(["export", str(run)]) == 2
-    assert "seen of cell wrong is no array of transitions" in capsys.readouterr().err
+    assert "seen of cells/wrong.npz is no array of transitions" in capsys.readouterr().err
     assert (run / "transitions.csv").read_bytes() == before
     assert not list(run.glob("*.unfinished"))
 
