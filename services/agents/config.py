@@ -8,6 +8,8 @@ from msgspec import Meta
 
 from services.common.config import ServiceConfig
 
+Explorer = Literal["curious", "random", "least_tried", "nearest_untried", "count_bonus", "posterior_sampling", "depleting"]
+
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
     """An agent's settings; the joints default to the published ones of its part (thesis 7.4)."""
@@ -22,7 +24,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """How many nearest states it can go to; 0: the published 8 of the torso, 16 of an arm."""
     tie_seed: int = 0
     """Seed of the draw among equally near neighbours."""
-    explorer: Literal["curious", "random", "least_tried"] = "curious"
+    explorer: Explorer = "curious"
     """How it chooses."""
     discount: Annotated[float, Meta(ge=0, lt=1)] = 0.9
     """Of future rewards."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -17,7 +17,9 @@ from bus_schema import encoding_of, keys
 from bus_schema.messages import Clock, Event, Motion, Transition
 from bus_schema.rpc import Done, Empty, Goal
 from mobee import Lattice, load_robot
+from mobee.learning.explorers import EXPLORERS
 from mobee.store import STORE, TransitionStore
+from services.agents.config import Explorer
 from tests.services.harness import FakeController, Program, Rig, rig, wait_for
 
 ROBOT = load_robot("icub")
@@ -206,6 +208,10 @@ def test_an_agent_with_a_goal_goes_there_and_keeps_what_it_was_told_on_record(st
         settings = store.settings()
     assert settings["goal"]["weight"] is None
     assert [settings[name] for name in ("beliefs", "divergence", "forgetting", "tolerance")] == ["debiased", "kl", 0.9, 0.001]
+
+
+def test_every_explorer_of_the_library_can_be_had() -> None:
+    assert get_args(Explorer) == tuple(EXPLORERS)
 
 
 def test_an_arm_has_four_joints_sixteen_neighbours_and_its_other_motors_at_rest(tmp_path: Path) -> None:
