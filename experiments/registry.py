@@ -28,6 +28,7 @@ EXPERIMENTS = {
     "rank4": "experiments.rank4",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
+    "transfer": "experiments.transfer",
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
     "wall": "experiments.wall",

@@ -1,0 +1,146 @@
+"""Does what is learned on the offline plant hold on a robot with physics?
+
+Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of
+PyBullet's robot.  Source: issue of this project; the paper (4.1) gives the robot's time as what limits it, and no simulated rival.
+Published: no number.  Run time: about ten minutes on 2 cores for the arms; the table as much again.
+
+Rank 3, eight neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at once; with --table those of torso and
+arms at the table.  Live: all services in lockstep, with PyBullet, and with the motor model alone as control.  Offline: the same
+agents with five seeds; how far each of them is from the four others is the noise that even a perfect twin would show.
+PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.claims import Claim
+from experiments.options import positive_whole
+from experiments.progress import Progress
+from experiments.run_folder import read, write
+from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from experiments.transfer.comparing import Distance
+from experiments.transfer.figure import draw
+from experiments.transfer.live import ROBOTS, learn
+from experiments.transfer.records import Compared, compared
+from experiments.transfer.settings import TASKS, agents, offline_plant
+
+NAME = "transfer"
+CLAIM = "what is learned on the offline plant, with identified motors, is what PyBullet's robot does"
+SOURCE = "aim of this reproduction; paper 4.1"
+CLAIMS = (
+    Claim(
+        "aim of this reproduction",
+        "the transition model learned offline with identified motors is that of PyBullet's robot in lockstep",
+        "within the spread of offline seeds",
+    ),
+)
+LEAST_FILE = "least.json"
+TRANSITIONS, LEAST = 600, 3  # a part; tries of a state-action that is compared
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the experiment."""
+    sweep_arguments(parser, seeds=5)
+    parser.add_argument(
+        "--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"of each part (default: {TRANSITIONS})"
+    )
+    parser.add_argument("--least", type=positive_whole, default=LEAST, metavar="N", help=f"tries, to be compared (default: {LEAST})")
+    parser.add_argument("--table", action="store_true", help="torso and arms at the table too")
+
+
+def cells(arguments: argparse.Namespace) -> list[Cell]:
+    """The offline seeds of each task."""
+    number = _transitions(arguments)
+    seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
+    return [Cell(f"{task}-s{seed}", seed, {"task": task, "transitions": number}) for task in _tasks(arguments) for seed in seeds]
+
+
+def work(cell: Cell) -> dict[str, Any]:
+    """Learn offline; what each part has seen, (T, 3)."""
+    task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
+    plant = offline_plant(task, cell.seed)
+    by_part = {agent.part: agent for agent in agents(task, plant, cell.seed)}
+    seen: dict[str, list[tuple[int, int, int]]] = {part: [] for part in by_part}
+    waiting = list(by_part)
+    while waiting or min(len(rows) for rows in seen.values()) < number:
+        for part in waiting:
+            agent = by_part[part]
+            plant.begin(part, agent.target(agent.decide(agent.state)))
+        waiting = []
+        for part, outcome in plant.advance():
+            agent = by_part[part]
+            agent.observe(outcome)
+            last = agent.last
+            assert last is not None
+            seen[part].append((last.s, last.a, last.s_next))
+            waiting += [part] if len(seen[part]) < number else []
+    return {f"seen_{part}": np.array(rows, dtype=np.int32) for part, rows in seen.items()}
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Learn offline and live, and compare."""
+    run_cells(work, cells(arguments), folder, arguments)
+    number = _transitions(arguments)
+    with Progress() as progress:
+        for task in _tasks(arguments):
+            for robot in ROBOTS:
+                where = f"{task} on {robot}"
+                learn(task, robot, arguments.seed, number, folder / task / robot, lambda n, w=where: progress.show(n / number, f"{w}: {n}"))
+    tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
+    write(folder / LEAST_FILE, {"least": arguments.least})
+    table = [row for task, found in tasks.items() for row in _rows(task, found)]
+    return {"claims": [_claim(tasks).record()], "distances": table}
+
+
+def figure(folder: Path) -> Path:
+    """Distances to the offline seeds together, and how often actions reach their goals."""
+    least = int(read(folder / LEAST_FILE)["least"])
+    names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
+    return draw({task: compared(folder, task, least) for task in names}, least, folder / "transfer.png")
+
+
+def _rows(task: str, found: Compared) -> list[dict[str, Any]]:
+    variation, agree = (np.array([getattr(one, name) for one in found.offline]) for name in ("variation", "agree"))
+    rows: list[dict[str, Any]] = [{"task": task, "robot": robot, **_plain(one)} for robot, one in found.live.items()]
+    for name, pick in (("least", np.min), ("median", np.median), ("most", np.max)):
+        rows.append(
+            {
+                "task": task,
+                "robot": f"offline seeds, {name}",
+                "variation": round(float(pick(variation)), 4),
+                "agree": round(float(pick(agree)), 4),
+                "compared": int(np.median([one.compared for one in found.offline])),
+            }
+        )
+    return rows
+
+
+def _plain(one: Distance) -> dict[str, Any]:
+    return {"variation": round(one.variation, 4), "agree": round(one.agree, 4), "compared": one.compared}
+
+
+def _claim(tasks: Mapping[str, Compared]) -> Claim:
+    texts, holds = [], True
+    for task, found in tasks.items():
+        one, most = found.live["pybullet"], max(seed.variation for seed in found.offline)
+        fewest = min(seed.agree for seed in found.offline)
+        holds = holds and one.variation <= most and one.agree >= fewest
+        texts.append(
+            f"{task}: total variation {one.variation:.3f} (offline seeds to {most:.3f}),"
+            f" same most frequent outcome {one.agree:.3f} (offline seeds from {fewest:.3f}), {one.compared} state-actions"
+        )
+    return CLAIMS[0].measured("; ".join(texts), holds)
+
+
+def _tasks(arguments: argparse.Namespace) -> list[str]:
+    return list(TASKS) if arguments.table else ["arms"]
+
+
+def _transitions(arguments: argparse.Namespace) -> int:
+    return min(20, arguments.transitions) if arguments.quick else int(arguments.transitions)

@@ -1,0 +1,84 @@
+"""Agents on the live processes in lockstep, until they have made their transitions; what is made stays on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from experiments.launched import LaunchFailed, summary_of
+from experiments.transfer.settings import GAINS, JOINTS, RATE, ROBOT, TASKS
+from mobee.store import STORE, TransitionStore
+
+ROBOTS = {  # settings of robot_sim; PyBullet has physics of its own, its motors are what was identified
+    "pybullet": {"backend": "pybullet", "motors": "published"},
+    "kinematic": {"backend": "kinematic", "motors": "identified"},
+}
+_ACTION = 6.0  # s of robot time, a little more than one takes
+_PIECE = 200  # transitions a part of one launch, after which progress is told
+_TRIES = 3  # launches without a single new transition
+
+_SCENARIO = """# Written by the experiment `transfer`.
+title = "Learning on {robot}, to be compared with the offline plant"
+
+[shared]
+robot = "{model}"
+world = "{world}"
+gains = "{gains}"
+seed = {seed}
+mode = "lock"
+
+[services.robot_sim]
+backend = "{backend}"
+motors = "{motors}"
+rate = {rate}
+
+[services.model]
+[services.controller]
+"""
+_AGENT = """
+[services.agent_{part}]
+joints = {joints}
+neighbours = {neighbours}
+seed = {agent_seed}
+run_dir = "{folder}"
+transitions = {transitions}
+"""
+
+
+def learn(task: str, robot: str, seed: int, transitions: int, folder: Path, told: Callable[[int], None]) -> None:
+    """Let every part of a task make that many transitions on one of the ROBOTS; goes on where an earlier call was broken off.
+
+    `told`: called with the number that the slowest part has.  Raises LaunchFailed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    idle = 0
+    while (made := _made(folder, task)) < transitions:
+        told(made)
+        goal = min(transitions, made + _PIECE)
+        scenario = folder / "scenario.toml"
+        scenario.write_text(_scenario(task, robot, seed, made, goal, folder.resolve()))
+        summary_of(str(scenario), ticks=round(_ACTION * RATE * (goal - made)), runs=folder / "launches")
+        idle = 0 if _made(folder, task) > made else idle + 1
+        if idle == _TRIES:
+            raise LaunchFailed(f"{folder}: {_TRIES} launches in a row made no transition; see their logs in {folder / 'launches'}")
+
+
+def _made(folder: Path, task: str) -> int:
+    """Transitions that every part has."""
+    path = folder / STORE
+    if not path.exists():
+        return 0
+    with TransitionStore(path, "") as store:
+        return min(len(store.load(part)) for part in TASKS[task].parts)
+
+
+def _scenario(task: str, robot: str, seed: int, made: int, goal: int, folder: Path) -> str:
+    """The seed of robot and encoders differs from piece to piece, that of the agents, which their store holds, does not."""
+    wanted = TASKS[task]
+    text = _SCENARIO.format(robot=robot, model=ROBOT, world=wanted.world, gains=GAINS, rate=RATE, seed=1000 * seed + made, **ROBOTS[robot])
+    for part in wanted.parts:
+        joints = str(list(JOINTS[part])).replace("'", '"')
+        text += _AGENT.format(
+            part=part, joints=joints, neighbours=wanted.neighbours[part], agent_seed=seed, folder=folder, transitions=goal
+        )
+    return text
