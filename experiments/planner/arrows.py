@@ -53,7 +53,7 @@ def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array)
                 axes.add_patch(arrow)
     axes.plot(*places.T, "o", color="0.2", markersize=2.2, zorder=2)
     _label(axes, places)
-    axes.set(aspect="equal", xlim=(-1.3, 2.0 * GAP + 3.0), ylim=(-1.6, 2.0 * GAP + 2.6))
+    axes.set(xlim=(-1.3, 2.0 * GAP + 3.0), ylim=(-1.6, 2.0 * GAP + 2.6))
     axes.set_axis_off()
     axes.text(GAP + 1.0, -1.55, f"{len(coloured)} coloured of {len(states)} state-actions", ha="center", fontsize=8)
 
