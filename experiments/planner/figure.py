@@ -42,12 +42,13 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
 
 def _moving(axes: Any, done: Mapping[str, CellResult]) -> None:
     tests = ("down", "moving", "up")
+    labels = {"still": "trained without it", "moving": "trained while it moved"}
     for shift, (way, color) in zip((-0.1, 0.1), COLORS.items(), strict=True):
         values = [tested(done, way, test, "touched") for test in tests]
         means = np.array([interquartile_mean(v) for v in values])
         bounds = np.array([interval(v) for v in values])
         spread = np.maximum(np.stack([means - bounds[:, 0], bounds[:, 1] - means]), 0.0)
-        axes.errorbar(np.arange(3) + shift, means, spread, fmt="o", color=color, capsize=3, label="trained without it" if way == "still" else "trained while it moved")
+        axes.errorbar(np.arange(3) + shift, means, spread, fmt="o", color=color, capsize=3, label=labels[way])
     axes.set_xticks(range(3), [f"table {test}" for test in tests])
     axes.set(ylabel="share of actions that end at the table", ylim=(-0.02, None), xlabel="while plans are carried out")
     axes.legend(fontsize=8)
