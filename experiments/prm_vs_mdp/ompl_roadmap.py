@@ -33,9 +33,10 @@ def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) ->
     space.setBounds(bounds)
 
     def pose(state: Any) -> Array:
-        return origin + belief.span * np.array([state[joint] for joint in range(len(origin))])
+        found: Array = origin + belief.span * np.array([state[joint] for joint in range(len(origin))])
+        return found
 
-    class Sampler(base.ValidStateSampler):  # type: ignore[misc]  # OMPL's own draws what no seed decides but the first of a process
+    class Sampler(base.ValidStateSampler):  # OMPL's own draws what no seed decides but the first of a process
         def sample(self, state: Any) -> bool:
             for joint, drawn in enumerate(rng.uniform(size=len(origin)) * high):
                 state[joint] = float(drawn)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -88,10 +89,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     run_cells(work, cells(arguments), folder, arguments)
     number = _transitions(arguments)
     with Progress() as progress:
-        for task in _tasks(arguments):
-            for robot in ROBOTS:
-                where = f"{task} on {robot}"
-                learn(task, robot, arguments.seed, number, folder / task / robot, lambda n, w=where: progress.show(n / number, f"{w}: {n}"))
+
+        def told(made: int) -> None:
+            progress.show(made / number, f"{task} on {robot}: {made} of {number}")
+
+        for task, robot in product(_tasks(arguments), ROBOTS):
+            learn(task, robot, arguments.seed, number, folder / task / robot, told)
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
     table = [row for task, found in tasks.items() for row in _rows(task, found)]
