@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.lattice import Lattice
-from tests.mobee.learning.toys import TORSO, arm, torso, toy_robot
+from tests.mobee.learning.toys import SHOULDER_ELBOW, TORSO, arm, torso, toy_robot
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,20 @@ def test_each_joint_may_have_levels_of_its_own():
     by_name = Lattice(toy_robot(), joints, dict(zip(joints[::-1], each[::-1], strict=True)), neighbours="equidistant")
     assert by_name.settings == space.settings
     assert space.settings["levels"] == [list(one) for one in each]
+
+
+@given(st.lists(st.sets(st.integers(0, 20), min_size=2, max_size=4), min_size=1, max_size=4), st.integers(0, 9))
+def test_samples_lie_in_their_own_states_and_goals_are_the_nearest_others_whatever_the_levels(levels, tie_seed):
+    joints = [f"l_{name}" for name in SHOULDER_ELBOW][: len(levels)]
+    fractions = [sorted(n / 20 for n in one) for one in levels]
+    space = Lattice(toy_robot(), joints, fractions, tie_seed=tie_seed)
+    assert [space.state_of(q) for q in space.samples] == list(range(len(space)))
+    low, high = space.robot.limits[[space.robot.motor_index(name) for name in joints]].T
+    points = (space.samples - low) / (high - low)
+    for s, goals in enumerate(space.goals):
+        assert s not in goals and (np.diff(goals) > 0).all()
+        distance = np.linalg.norm(points - points[s], axis=1)
+        assert distance[goals].max() <= np.delete(distance, [s, *goals]).min(initial=np.inf) + 1e-6
 
 
 def test_the_same_levels_for_each_joint_are_those_for_all():
