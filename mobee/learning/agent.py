@@ -124,7 +124,8 @@ class CuriousAgent:
         """
         plan = self._plans.made(key, reward, beliefs)
         if plan is None:
-            plan = self._plans.make(key, reward, beliefs, self._pursued() if reward is None else reward, beliefs or self.beliefs)
+            pursued = self._pursued() if reward is None else reward
+            plan = self._plans.make(key, reward, beliefs, pursued, self.beliefs if beliefs is None else beliefs)
         return plan
 
     def decide(self, state: int) -> int:
