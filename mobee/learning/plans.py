@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from mobee.errors import InvalidValue
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
 from mobee.robot.robot import Array
 
@@ -21,10 +24,12 @@ class Plans:
     """Plans by key: made once a transition, forgotten with it when it is interrupted, kept as next start when it is observed.
 
     `relative`: with a tolerance in units of the largest reward and warm starts; else Algorithm 7 as published, with an
-    absolute tolerance and every value zero at the start.
+    absolute tolerance and every value zero at the start.  Raises InvalidValue for a discount or tolerance out of range.
     """
 
     def __init__(self, discount: float, tolerance: float, relative: bool) -> None:
+        if not (0.0 <= discount < 1.0 and 0.0 < tolerance < np.inf):
+            raise InvalidValue(f"discount={discount!r}, tolerance={tolerance!r}: valid are 0 <= discount < 1 and a tolerance above 0.")
         self.discount, self.tolerance, self.relative = discount, tolerance, relative
         self._starts: dict[str, Array] = {}
         self._made: dict[str, _Made] = {}

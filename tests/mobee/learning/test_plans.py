@@ -3,10 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.errors import ActionInterrupted
+from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.value_iteration import value_iteration
 from mobee.plant import Outcome
+from mobee.store import TransitionStore
 from tests.mobee.learning.toys import FickleDice, InstantPlant, arm, toy_robot
 
 
@@ -81,3 +82,11 @@ def test_an_interruption_of_the_plant_undoes_the_plans_too():
         one.step()
     assert one.plan() is not before
     assert np.array_equal(one.plan()[1], before[1])
+
+
+@pytest.mark.parametrize("options", [{"discount": 1.0}, {"discount": -0.1}, {"tolerance": 0.0}, {"tolerance": np.nan}])
+def test_settings_out_of_range_are_refused_before_anything_is_on_record(tmp_path, options):
+    with TransitionStore(tmp_path / "run.sqlite", "left_arm") as store:
+        with pytest.raises(InvalidValue, match="discount=.*tolerance=.*valid are"):
+            CuriousAgent(arm(), InstantPlant(toy_robot()), store=store, **options)
+        assert store.settings() == {}
