@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.accuracy.findings import EXPLORED_BY, LOOKS, errors
+from experiments.accuracy.findings import errors, looks
 from experiments.accuracy.worlds import WORLDS
 from experiments.matplotlib_figure import new_figure
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
+from mobee.learning.explorers import EXPLORERS
 
 
 def draw(found: Mapping[str, CellResult], path: Path) -> Path:
@@ -22,14 +23,14 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
     drawing = new_figure(4.6 * len(worlds), 6.4)
     for (above, below), world in zip(drawing.subplots(2, len(worlds), squeeze=False, sharex=True).T, worlds, strict=True):
-        for number, explorer in enumerate(EXPLORED_BY):
+        for number, explorer in enumerate(EXPLORERS):
             if (world, explorer) in curves:
                 counts, _, debiased, stochastic = np.median(curves[world, explorer], axis=0).T
                 label = explorer.replace("_", " ")
-                above.plot(LOOKS, counts, "--", color=f"C{number}", linewidth=0.9)
-                above.plot(LOOKS, debiased, color=f"C{number}", label=label)
-                below.plot(LOOKS, stochastic, color=f"C{number}", label=label)
-        above.set(title=WORLDS[world], ylabel="L1, all actions", yscale="log")
+                above.plot(looks(world), counts, "--", color=f"C{number}", linewidth=0.9)
+                above.plot(looks(world), debiased, color=f"C{number}", label=label)
+                below.plot(looks(world), stochastic, color=f"C{number}", label=label)
+        above.set(title=WORLDS[world].text, ylabel="L1, all actions", yscale="log")
         above.title.set_fontsize(9)
         below.set(xlabel="transitions", ylabel="L1, stochastic actions", ylim=(0.0, None))
         above.grid(alpha=0.2)

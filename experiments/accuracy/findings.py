@@ -13,27 +13,30 @@ from experiments.learning.model_error import CERTAIN, l1, most_likely
 from experiments.statistics import interquartile_mean, interval, ratio, ratio_interval
 from experiments.sweep import CellResult
 from mobee import TransitionModel
-from mobee.learning.explorers import EXPLORERS
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.robot.robot import Array, Ints
 
-EXPLORED_BY = tuple(
-    name for name in ("curious", "least_tried", "random", "depleting", "count_bonus", "posterior_sampling") if name in EXPLORERS
-)
-LOOKS = (500, 1000, 1500, 2000, 3000, 4000)  # transitions
+SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0)  # of a world's transitions, after which its models are looked at
 MOST, BETTER, AIM, TEN = 0.04, 1.6, 2.0, 8.0  # L1; times; times; times
 
 _AIM = "aim of this reproduction"
 OVERALL = {
     world: Claim(_AIM, f"L1 of the model at most {MOST} after 4000 curious transitions with debiased counts ({text})", f"at most {MOST}")
-    for world, text in (("half-space", "half-space"), ("equidistant", "arm, equidistant neighbours"))
+    for world, text in (("half-space", "half-space"), ("rank3", "arm, 81 states"))
 }
-STOCHASTIC = Claim(_AIM, "on stochastic actions curiosity's model is truer than least-tried's (half-space)", f"at least {BETTER} x")
-DEPLETING = Claim(_AIM, "and the depleting explorer's is twice as true", f"at least {AIM} x")
-DEBIASED = Claim(_AIM, "without the imagined counts the model is many times truer (arm, equidistant neighbours)", f"at least {TEN:.0f} x")
-CLAIMS = (*OVERALL.values(), STOCHASTIC, DEPLETING, DEBIASED)
+STOCHASTIC = {
+    (world, explorer): Claim(
+        _AIM, f"on stochastic actions the {explorer} agent's model is truer than least-tried's ({text})", f"at least {times} x"
+    )
+    for world, text in (("half-space", "half-space"), ("rank4", "arm, 256 states"))
+    for explorer, times in (("curious", BETTER), ("depleting", AIM))
+}
+WITHOUT = Claim(_AIM, "without the imagined counts the model is many times truer (arm, 81 states)", f"at least {TEN:.0f} x")
+CLAIMS = (*OVERALL.values(), *STOCHASTIC.values(), WITHOUT)
 
-Errors = dict[tuple[str, str], Array]  # world and explorer -> (seeds, looks, 4): counts and debiased, over all and over stochastic actions
+COLUMNS = ("counts", "counts_stochastic", "debiased", "debiased_stochastic")
+COUNTS, DEBIASED, DEBIASED_STOCHASTIC = 0, 2, 3
+Errors = dict[tuple[str, str], Array]  # world and explorer -> (seeds, looks, columns)
 
 
 def errors(found: Mapping[str, CellResult]) -> Errors:
@@ -47,16 +50,21 @@ def errors(found: Mapping[str, CellResult]) -> Errors:
     return {key: np.array(curves) for key, curves in grouped.items()}
 
 
+def looks(world: str) -> list[int]:
+    """The transitions after which the models of a world are looked at."""
+    return [round(share * WORLDS[world].transitions) for share in SHARES]
+
+
 def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
-    """Learn again from a record (T, 3); the errors at the looks, shape (looks, 4), NaN beyond the record."""
-    model = TransitionModel(space_of(world))
+    """Learn again from a record (T, 3); the errors at the looks, shape (looks, columns), NaN beyond the record."""
+    model, at = TransitionModel(space_of(world)), looks(world)
     beliefs, stochastic = (model, model.debiased()), most_likely(truth) < CERTAIN
-    curve = np.full((len(LOOKS), 4), np.nan)
+    curve = np.full((len(at), len(COLUMNS)), np.nan)
     for n, transition in enumerate(seen.tolist(), 1):
         model.observe(*transition)
-        if n in LOOKS:
+        if n in at:
             each = [l1(one, truth) for one in beliefs]
-            curve[LOOKS.index(n)] = [
+            curve[at.index(n)] = [
                 value for error in each for value in (np.nanmean(error), error[stochastic].mean() if stochastic.any() else np.nan)
             ]
     return curve
@@ -67,40 +75,37 @@ def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:
     found_errors = errors(found)
     last = {key: curves[:, -1] for key, curves in found_errors.items()}
     stochastic = {world: int((most_likely(truth) < CERTAIN).sum()) for world, truth in truths(found).items()}
-    rows = {
-        f"{world}, {explorer}": _row(last[world, explorer], stochastic[world])
-        for world in WORLDS
-        for explorer in EXPLORED_BY
-        if (world, explorer) in last
-    }
+    rows = {" ".join(key): _row(mine, stochastic[key[0]]) for key, mine in last.items()}
     return {"runs": rows, "claims": [claim.record() for claim in _claims(last)]}
 
 
 def _row(last: Array, stochastic: int) -> dict[str, Any]:
-    names = ("counts", "counts_stochastic", "debiased", "debiased_stochastic")
-    numbers = {name: interquartile_mean(column) if np.isfinite(column).all() else None for name, column in zip(names, last.T, strict=True)}
+    numbers = {
+        name: interquartile_mean(column) if np.isfinite(column).all() else None for name, column in zip(COLUMNS, last.T, strict=True)
+    }
     return {"seeds": len(last), "stochastic_actions": stochastic, **numbers}
 
 
 def _claims(last: Mapping[tuple[str, str], Array]) -> list[Claim]:
-    def columns(world: str, explorer: str) -> Array | None:
+    def column(world: str, explorer: str, number: int) -> Array | None:
         rows = last.get((world, explorer))
-        return None if rows is None or not np.isfinite(rows[:, [0, 2]]).all() else rows
+        return None if rows is None or not np.isfinite(rows[:, number]).all() else rows[:, number]
 
     claims = []
     for world, claim in OVERALL.items():
-        mine = columns(world, "curious")
-        claims.append(claim if mine is None else claim.measured(_said(mine[:, 2]), interval(mine[:, 2])[1] <= MOST))
-    rival = columns("half-space", "least_tried")
-    for claim, explorer, times in ((STOCHASTIC, "curious", BETTER), (DEPLETING, "depleting", AIM)):
-        mine = columns("half-space", explorer)
-        claims.append(claim if mine is None or rival is None else _ratio(claim, rival[:, 3], mine[:, 3], times))
-    mine = columns("equidistant", "curious")
-    claims.append(DEBIASED if mine is None else _ratio(DEBIASED, mine[:, 0], mine[:, 2], TEN))
+        mine = column(world, "curious", DEBIASED)
+        claims.append(claim if mine is None else claim.measured(_said(mine), interval(mine)[1] <= MOST))
+    for (world, explorer), claim in STOCHASTIC.items():
+        times = BETTER if explorer == "curious" else AIM
+        claims.append(_ratio(claim, column(world, "least_tried", DEBIASED_STOCHASTIC), column(world, explorer, DEBIASED_STOCHASTIC), times))
+    claims.append(_ratio(WITHOUT, column("rank3", "curious", COUNTS), column("rank3", "curious", DEBIASED), TEN))
     return claims
 
 
-def _ratio(claim: Claim, above: Array, below: Array, times: float) -> Claim:
+def _ratio(claim: Claim, above: Array | None, below: Array | None, times: float) -> Claim:
+    """Whether what is above is that many times what is below; open if one is not known, or the interval holds the number."""
+    if above is None or below is None:
+        return claim
     low, high = ratio_interval(above, below)
     holds = True if low >= times else False if high < times else None
     said = f"{ratio(above, below):.2f} x [{low:.2f}, {high:.2f}] ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"

@@ -37,13 +37,13 @@ def test_the_truth_is_the_frequencies_of_what_was_seen():
 
 
 def test_walks_of_several_seeds_find_the_table_that_the_plant_draws_from():
-    truth = measure_truth(SPACE, plant_of, tries=40, seeds=[1, 2], most=40_000, processes=1)
+    truth = measure_truth(SPACE, plant_of, tries=25, seeds=[1, 2], most=40_000, processes=1)
     error = l1(truth, plant_of(0))
-    assert truth.tries[SPACE.goals >= 0].min() >= 80
+    assert truth.tries[SPACE.goals >= 0].min() >= 50
     stochastic = plant_of(0).probabilities.max(axis=-1) < 1
     stochastic &= SPACE.goals >= 0
     assert (error[(SPACE.goals >= 0) & ~stochastic] == 0).all()
-    assert error[stochastic].mean() < 0.25  # about 9 outcomes and 100 tries each
+    assert error[stochastic].mean() < 0.3  # about 9 outcomes and 60 tries each
 
 
 def test_it_comes_back_from_its_file_and_is_refused_for_another_space(tmp_path):
