@@ -47,7 +47,8 @@ def draw(folder: Path) -> Path:
     course.legend(fontsize=7)
     labels = [TERMS.sub("\n", clause_label(icub_at_table().robot, i)) for i in range(CLAUSES)]
     clauses.set_yticks(range(CLAUSES), labels, fontsize=6)
-    clauses.set(xlabel="largest violation [deg], red: allowed", title="By clause (open bars: client pushes)", xlim=(-60.0, 12.0))
+    farthest = max(12.0, *(state.worst + 2.0 for state in states))
+    clauses.set(xlabel="largest violation [deg], red: allowed", title="By clause (open bars: client pushes)", xlim=(-60.0, farthest))
     over_time.set(xlabel="time [s]", ylabel="violation [deg]", title="The worst tries", ylim=(-40.0, None))
     for axes in (course, clauses, over_time):
         axes.grid(alpha=0.2)
