@@ -11,8 +11,8 @@ from mobee import CuriousAgent
 from tests.experiments.learning.cells import Cell, finished
 
 
-def half_space_cells(explorers, seeds=1):
-    return [Cell(f"half-space-{e}-s{seed}", seed, {"world": "half-space", "explorer": e}) for e in explorers for seed in range(seeds)]
+def half_space_cells(explorers, seeds=(1,)):
+    return [Cell(f"half-space-{e}-s{seed}", seed, {"world": "half-space", "explorer": e}) for e in explorers for seed in seeds]
 
 
 def test_in_the_half_space_the_numbers_of_the_toy_experiments_come_back():
