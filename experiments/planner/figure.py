@@ -11,20 +11,21 @@ import numpy as np
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.matplotlib_figure import new_figure
 from experiments.planner.arrows import draw_arrows
-from experiments.planner.findings import ENTERS, entering, tested
+from experiments.planner.findings import ENTERS, ROADMAPS, entering, tested
+from experiments.planner.trial import TESTS
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
-COLORS = {"still": "tab:gray", "moving": "tab:red"}
-
 
 def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     """Two pictures of the model, one of each way of learning, and two panels; raises InvalidValue if cells are missing."""
-    ways = {way: sorted(name for name, r in done.items() if r.cell.settings["way"] == way) for way in ("still", "moving", "enters")}
+    ways = {
+        way: sorted(name for name, r in done.items() if r.cell.settings["way"] == way) for way in ("still", "moving", "enters", "roadmap")
+    }
     if not all(ways.values()):
         raise InvalidValue(f"{path.parent} lacks finished cells: go on with --resume.")
-    drawing = new_figure(17.0, 13.0)
+    drawing = new_figure(19.0, 13.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(2.0, 1.0))
     space = arm_space(RANK3, ARM_NEIGHBOURS)
     titles = {"still": "learned without the table", "moving": "learned while the table goes up and down"}
@@ -32,26 +33,27 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
         values = done[ways[way][0]].values
         draw_arrows(axes, space, values["outcomes"], values["probabilities"])
         axes.set_title(title, fontsize=10)
-    bars, recovering, plans = below.subplots(1, 3)
-    _moving(bars, done)
+    success, touched, recovering, plans = below.subplots(1, 4)
+    _moving(success, done, "success", "share of queries that succeed")
+    success.legend(fontsize=7)
+    _moving(touched, done, "touched", "share of actions that end at the table")
     _entering(recovering, done, "success", "share of queries that succeed")
     _entering(plans, done, "actions", "actions a query")
     drawing.savefig(path, dpi=110)
     return path
 
 
-def _moving(axes: Any, done: Mapping[str, CellResult]) -> None:
-    tests = ("down", "moving", "up")
-    labels = {"still": "trained without it", "moving": "trained while it moved"}
-    for shift, (way, color) in zip((-0.1, 0.1), COLORS.items(), strict=True):
-        values = [tested(done, way, test, "touched") for test in tests]
+def _moving(axes: Any, done: Mapping[str, CellResult], measure: str, label: str) -> None:
+    who = [("still", "plans", "MDP, trained without it", "tab:gray"), ("moving", "plans", "MDP, trained while it moved", "tab:red")]
+    who += [("roadmap", mode, f"roadmap, {mode}", color) for mode, color in zip(ROADMAPS, ("0.75", "tab:cyan", "tab:blue"), strict=True)]
+    for number, (way, mode, name, color) in enumerate(who):
+        values = [tested(done, way, test, measure, mode) for test in TESTS]
         means = np.array([interquartile_mean(v) for v in values])
         bounds = np.array([interval(v) for v in values])
         spread = np.maximum(np.stack([means - bounds[:, 0], bounds[:, 1] - means]), 0.0)
-        axes.errorbar(np.arange(3) + shift, means, spread, fmt="o", color=color, capsize=3, label=labels[way])
-    axes.set_xticks(range(3), [f"table {test}" for test in tests])
-    axes.set(ylabel="share of actions that end at the table", ylim=(-0.02, None), xlabel="while plans are carried out")
-    axes.legend(fontsize=8)
+        axes.errorbar(np.arange(3) + 0.1 * (number - 2), means, spread, fmt="o", color=color, capsize=3, markersize=5, label=name)
+    axes.set_xticks(range(3), [f"table {test}" for test in TESTS])
+    axes.set(ylabel=label, xlabel="while plans are carried out")
     axes.grid(alpha=0.2)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -11,10 +12,13 @@ from numpy.typing import NDArray
 from experiments.control.ride import place
 from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, silent, whole
 from experiments.planner.table import DOWN, UP, TablePlant
+from experiments.prm_vs_mdp.rivals import Rival
 from mobee import Lattice
 from mobee.learning.planner import Planner
 from mobee.learning.value_iteration import OutcomeModel
+from mobee.robot.robot import Array
 
+Queries = list[tuple[int, int]]  # states, start and goal
 LIMIT = 20  # actions
 WAY = np.linspace(0.0, 1.0, 41)  # where the straight way between two samples is looked at
 
@@ -24,17 +28,35 @@ class Followed:
     """Means over the queries."""
 
     success: float
-    """Share that arrived within LIMIT actions, planned anew after each."""
+    """Share that arrived within LIMIT actions."""
     actions: float
     """A query, LIMIT where it did not arrive."""
-    promised: float
-    """Probability that every action of the plan would end as it says."""
-    kept: float
-    """Share in which every one did."""
     touched: float
     """Share of actions that ended in the table's field."""
-    through: float
-    """Share of the states on the way, those between start and goal, in which the raised table is."""
+    ways: tuple[tuple[int, ...], ...]
+    """The states of each query, from start to end."""
+
+
+class Frozen:
+    """Plans by a transition model anew after each action, and learns nothing on the way."""
+
+    repairs = 0
+
+    def __init__(self, space: Lattice, beliefs: OutcomeModel) -> None:
+        self._space, self._beliefs = space, beliefs
+
+    def begin(self, goal: int) -> None:
+        """See Rival."""
+        self.planner = Planner(self._space, self._beliefs, [goal])
+
+    def aim(self, q: Array) -> Array | None:
+        """See Rival."""
+        state = self._space.state_of(q)
+        sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]
+        return sample
+
+    def observe(self, start: Array, end: Array) -> None:
+        """See Rival."""
 
 
 def zone(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
@@ -43,7 +65,7 @@ def zone(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
     return ~silent(plant.inner.model, space.samples, arm_clauses())
 
 
-def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tuple[int, int]]:
+def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries:
     """Pairs of states, start and goal, between which the raised table is in the straight way, and nothing else; it is in neither."""
     free = np.flatnonzero(~zone(plant, space, UP))
     pairs = list(permutations(free.tolist(), 2))
@@ -61,28 +83,40 @@ def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tu
     return chosen
 
 
-def follow(
-    space: Lattice, beliefs: OutcomeModel, wanted: list[tuple[int, int]], tops: list[float], blocked: NDArray[np.bool_], seed: int
-) -> Followed:
-    """Carry out plans from rest at one state's sample to another state, each with the table's top at its height [m]."""
+def follow(space: Lattice, rival: Rival, wanted: Queries, tops: Sequence[float], seed: int) -> Followed:
+    """Send someone from rest at one state's sample to another state, each time with the table's top at its height [m]."""
     plant = TablePlant(seed + 900)
-    rows = []
-    touched = actions = 0
-    passed: list[bool] = []
+    touched = 0
+    ways: list[tuple[int, ...]] = []
     for (start, goal), top in zip(wanted, tops, strict=True):
         plant.set_top(top)
         place(plant.inner, whole(space.samples[start]))
-        planner = Planner(space, beliefs, [goal])
-        plan = planner.plan(start)
-        states = [space.state_of(plant.measure(PART)[:JOINTS])]
-        while states[-1] != goal and len(states) <= LIMIT:
-            target = space.target(space.goal(states[-1], int(planner.policy[states[-1]])))
+        rival.begin(goal)
+        here = plant.measure(PART)[:JOINTS]
+        states = [space.state_of(here)]
+        while states[-1] != goal and len(states) <= LIMIT and (aim := rival.aim(here)) is not None:
+            target = space.target(goal)
+            target[:JOINTS] = aim
             outcome = plant.act(PART, target)
-            states.append(space.state_of(outcome.q[:JOINTS]))
+            rival.observe(here, outcome.q[:JOINTS])
+            here = outcome.q[:JOINTS]
+            states.append(space.state_of(here))
             touched += "table" in outcome.touched
-        actions += len(states) - 1
-        passed += [bool(blocked[state]) for state in states[1:-1]]
-        success = states[-1] == goal
-        rows.append((success, len(states) - 1 if success else LIMIT, plan.success, tuple(states) == plan.path))
-    success, needed, promised, kept = np.array(rows, dtype=np.float64).mean(axis=0).tolist()
-    return Followed(success, needed, promised, kept, touched / max(actions, 1), float(np.mean(passed)) if passed else 0.0)
+        ways.append(tuple(states))
+    arrived = np.array([way[-1] == goal for way, (_, goal) in zip(ways, wanted, strict=True)])
+    needed = np.array([len(way) - 1 for way in ways])
+    mean = float(np.where(arrived, needed, LIMIT).mean())
+    return Followed(float(arrived.mean()), mean, touched / max(int(needed.sum()), 1), tuple(ways))
+
+
+def promises(space: Lattice, beliefs: OutcomeModel, wanted: Queries, ways: Sequence[tuple[int, ...]]) -> tuple[float, float]:
+    """How likely a plan is believed to go as it says, and how often it did, means over the queries."""
+    plans = [Planner(space, beliefs, [goal]).plan(start) for start, goal in wanted]
+    kept = [plan.path == way for plan, way in zip(plans, ways, strict=True)]
+    return float(np.mean([plan.success for plan in plans])), float(np.mean(kept))
+
+
+def through(ways: Sequence[tuple[int, ...]], blocked: NDArray[np.bool_]) -> float:
+    """Share of the states on the ways, those between start and end, in which the raised table is."""
+    passed = [bool(blocked[state]) for way in ways for state in way[1:-1]]
+    return float(np.mean(passed)) if passed else 0.0

@@ -20,7 +20,7 @@ import numpy as np
 
 from experiments.claims import Claim
 from experiments.learning.published import arm_plant
-from experiments.prm_vs_mdp.belief import BELIEFS, Belief
+from experiments.prm_vs_mdp.belief import BELIEFS, believed
 from experiments.prm_vs_mdp.figure import draw
 from experiments.prm_vs_mdp.graphs import KINDS, NEIGHBOURS, make_roadmap, with_goals
 from experiments.prm_vs_mdp.queries import answer
@@ -79,7 +79,7 @@ def _rivals(cell: Cell, scene: Scene, lattice: Lattice) -> Iterator[tuple[str, R
         agent.run(settings["learned"])
         yield f"MDP, {settings['learned']} learned", Learned(lattice, agent.model), plant.time / 3600.0
     elif "belief" in settings:
-        belief = Belief(scene, settings["belief"])
+        belief = believed(scene, settings["belief"])
         for kind in KINDS:
             before = belief.looks
             roadmap = make_roadmap(kind, belief, lattice, cell.seed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,7 @@ from experiments.learning.arm_poses import arm_clauses, columns, silent
 from experiments.learning.published import robot
 from experiments.prm_vs_mdp.scene import Scene, world_of
 from mobee import Gains, Model
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Clause
 
 BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
 STEP = 0.02  # of a joint's range, between two poses of a motion that are looked at
@@ -19,16 +21,13 @@ class Belief:
     """Sound is a pose of the arm in which, as far as is believed, the reactive layer would exert no force.
 
     Args:
-        scene: what is true.
-        kind: "true", or what is hidden: "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and
-            joints 3 degrees off), "both", "gross" (both, three times as much off).
+        model: the robot in the world, as believed.
+        turns: (4,) rad, by how much the joints are believed to stand elsewhere than the encoders say.
+        clauses: the rows of cables that are known.
     """
 
-    def __init__(self, scene: Scene, kind: str) -> None:
-        times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
-        self._model = Model(robot(), world_of(scene.balls + times * scene.shifts))
-        self._turns = times * scene.turns
-        self._clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+    def __init__(self, model: Model, turns: Array, clauses: Sequence[Clause]) -> None:
+        self._model, self._turns, self._clauses = model, turns, clauses
         limits = robot().limits[columns()]
         self.limits: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
         """(4, 2) rad between which the joint limits exert no force."""
@@ -47,3 +46,14 @@ class Belief:
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
         return bool(self.sound(start + shares * (end - start)).all())
+
+
+def believed(scene: Scene, kind: str) -> Belief:
+    """A belief about a scene, of one of the BELIEFS.
+
+    "true", or what is hidden: "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and joints 3
+    degrees off), "both", "gross" (both, three times as much off).
+    """
+    times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
+    clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+    return Belief(Model(robot(), world_of(scene.balls + times * scene.shifts)), times * scene.turns, clauses)

@@ -5,8 +5,9 @@ import pytest
 
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.planner.findings import fates
-from experiments.planner.following import follow, queries, zone
+from experiments.planner.following import Frozen, follow, promises, queries, through, zone
 from experiments.planner.table import DOWN, PERIOD, UP, TablePlant
+from experiments.planner.trial import Trial, roadmaps
 from mobee import TransitionModel
 
 
@@ -40,11 +41,27 @@ def test_a_moving_table_moves_after_so_many_actions_and_a_still_one_never(space)
 
 
 def test_a_plan_without_obstacle_is_kept_and_its_way_is_counted(space):
-    model = TransitionModel(space)
+    beliefs = TransitionModel(space).debiased()
     wanted = [(0, int(space.goal(0, 0)))]
-    followed = follow(space, model.debiased(), wanted, [DOWN], np.ones(len(space), dtype=bool), seed=0)
-    assert (followed.success, followed.actions, followed.kept, followed.touched, followed.through) == (1.0, 1.0, 1.0, 0.0, 0.0)
-    assert followed.promised == pytest.approx(0.75)  # what an untried action is believed to do: 0.3 of 0.4
+    followed = follow(space, Frozen(space, beliefs), wanted, [DOWN], seed=0)
+    assert (followed.success, followed.actions, followed.touched, followed.ways) == (1.0, 1.0, 0.0, (wanted[0],))
+    promised, kept = promises(space, beliefs, wanted, followed.ways)
+    assert promised == pytest.approx(0.75) and kept == 1.0  # an untried action is believed to succeed with 0.3 of 0.4
+
+
+def test_states_on_the_way_count_without_start_and_end():
+    blocked = np.array([True, True, False, True])
+    assert through([(0, 1, 2, 3), (1, 2), (3,)], blocked) == 0.5
+    assert through([(0, 1)], blocked) == 0.0
+
+
+def test_a_roadmap_that_knows_no_table_fails_at_it_and_recovers_when_repaired(space):
+    plant = TablePlant(0)
+    trial = Trial(space, queries(plant, space, 12, seed=0), np.zeros(len(space), dtype=bool), 0)
+    rivals = roadmaps(plant, space)
+    once, repairs = (trial.in_all_worlds(rivals[name]) for name in ("planned once", "repairs"))
+    assert once["down"]["success"] == repairs["down"]["success"] == 1.0 and once["down"]["touched"] == 0.0
+    assert once["up"]["success"] < repairs["up"]["success"]
 
 
 def test_fates_count_what_was_tried_twice(space):

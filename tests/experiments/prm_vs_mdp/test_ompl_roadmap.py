@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from experiments.prm_vs_mdp.belief import Belief
+from experiments.prm_vs_mdp.belief import believed
 from experiments.prm_vs_mdp.ompl_roadmap import OmplMissing, ompl_roadmap
 from experiments.prm_vs_mdp.scene import BALLS, Scene
 
@@ -15,7 +15,7 @@ SCENE = Scene(np.full((BALLS, 3), 5.0), np.zeros((BALLS, 3)), np.zeros(4), EMPTY
 
 def test_a_roadmap_follows_from_its_seed_and_holds_only_sound_poses_and_motions():
     pytest.importorskip("ompl")
-    belief = Belief(SCENE, "true")
+    belief = believed(SCENE, "true")
     first, again, other = (ompl_roadmap(belief, 30, 5, seed) for seed in (3, 3, 4))
     assert len(first.vertices) >= 30 and first.edges > 30
     assert np.array_equal(first.vertices, again.vertices) and first.edges == again.edges
@@ -29,4 +29,4 @@ def test_a_roadmap_follows_from_its_seed_and_holds_only_sound_poses_and_motions(
 def test_without_ompl_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
     with pytest.raises(OmplMissing, match=r"planning"):
-        ompl_roadmap(Belief(SCENE, "true"), 30, 5, 0)
+        ompl_roadmap(believed(SCENE, "true"), 30, 5, 0)

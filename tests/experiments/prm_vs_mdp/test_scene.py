@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.learning.arm_poses import whole
-from experiments.prm_vs_mdp.belief import Belief
+from experiments.prm_vs_mdp.belief import believed
 from experiments.prm_vs_mdp.queries import LIMIT, answer
 from experiments.prm_vs_mdp.rivals import Straight
 from experiments.prm_vs_mdp.scene import SHIFT, TURN, Scene, make_scene, space, world_of
@@ -43,8 +43,8 @@ def test_hidden_cables_make_poses_sound_that_are_not():
     far = Scene(np.full((1, 3), 5.0), np.zeros((1, 3)), np.zeros(4), np.zeros((0, 4)), np.zeros(0, dtype=int), np.zeros(0, dtype=bool))
     samples = space().samples
     hard = [24, 51, 78]
-    assert not Belief(far, "true").sound(samples[hard]).any()
-    assert Belief(far, "no cables").sound(samples).all()
+    assert not believed(far, "true").sound(samples[hard]).any()
+    assert believed(far, "no cables").sound(samples).all()
 
 
 def test_a_ball_is_believed_where_calibration_puts_it():
@@ -53,8 +53,8 @@ def test_a_ball_is_believed_where_calibration_puts_it():
     palm = Model(robot).evaluate(whole(sample)).position("left_palm")
     nowhere = np.zeros((0, 4)), np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
     scene = Scene(palm[None], np.array([[0.0, 0.0, 1.0]]), np.zeros(4), *nowhere)
-    assert not Belief(scene, "true").sound(sample[None])[0]
-    assert Belief(scene, "miscalibrated").sound(sample[None])[0]
+    assert not believed(scene, "true").sound(sample[None])[0]
+    assert believed(scene, "miscalibrated").sound(sample[None])[0]
     assert len(Model(robot, world_of(palm[None])).evaluate(whole(sample)).table)
 
 
@@ -63,6 +63,6 @@ def test_a_motion_is_sound_only_if_all_of_it_is():
     nowhere = np.zeros((0, 4)), np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
     start, end = lattice.samples[36], lattice.samples[44]
     ball = Model(load_robot("icub_2014")).evaluate(whole((start + end) / 2)).position("left_palm")
-    belief = Belief(Scene(ball[None], np.zeros((1, 3)), np.zeros(4), *nowhere), "no cables")
+    belief = believed(Scene(ball[None], np.zeros((1, 3)), np.zeros(4), *nowhere), "no cables")
     assert belief.sound(np.array([start, end])).all()
     assert not belief.is_sound_motion(start, end)
