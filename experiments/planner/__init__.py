@@ -24,8 +24,7 @@ from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.learning.trial import explore
 from experiments.planner.figure import draw
 from experiments.planner.findings import CLAIMS, ENTERS, claims, fates, summary
-from experiments.planner.following import queries, zone
-from experiments.planner.table import DOWN, UP, TablePlant
+from experiments.planner.table import UP, TablePlant
 from experiments.planner.trial import TESTS, Trial, roadmaps
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
@@ -57,26 +56,17 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 def work(cell: Cell) -> dict[str, Any]:
     """Learn, and follow plans; the means over the queries by name."""
-    way, plant, space = (
-        cell.settings["way"],
-        TablePlant(cell.seed, moves=cell.settings["way"] == "moving"),
-        arm_space(RANK3, ARM_NEIGHBOURS),
-    )
-    trial = Trial(
-        space, queries(plant, space, cell.settings["queries"], cell.seed), zone(plant, space, UP) & ~zone(plant, space, DOWN), cell.seed
-    )
-    if way == "roadmap":
+    settings, space = cell.settings, arm_space(RANK3, ARM_NEIGHBOURS)
+    plant = TablePlant(cell.seed, moves=settings["way"] == "moving")
+    trial = Trial.of_seed(plant, space, settings["queries"], cell.seed)
+    if settings["way"] == "roadmap":
         return {"tests": {mode: trial.in_all_worlds(rival) for mode, rival in roadmaps(plant, space).items()}}
-    agent = CuriousAgent(space, plant, seed=cell.seed, forgetting=cell.settings.get("forgetting", 1.0))
-    if way == "enters":
-        before, after = round(BEFORE * cell.settings["share"]), [round(n * cell.settings["share"]) for n in AFTER]
-        rows = []
-        for n in after:
-            agent.run(before + n - agent.transitions)
-            plant.set_top(UP)
-            rows.append(trial.of_model(agent.model.debiased(), "up"))
-        return {"after": after, "rows": rows}
-    seen = explore(agent, round(LEARNED * cell.settings["share"]))
+    agent = CuriousAgent(space, plant, seed=cell.seed, forgetting=settings.get("forgetting", 1.0))
+    return _entered(agent, plant, trial, settings["share"]) if settings["way"] == "enters" else _learned(agent, trial, settings["share"])
+
+
+def _learned(agent: CuriousAgent, trial: Trial, share: float) -> dict[str, Any]:
+    seen = explore(agent, round(LEARNED * share))
     beliefs = agent.model.debiased()
     return {
         "seen": seen,
@@ -85,6 +75,16 @@ def work(cell: Cell) -> dict[str, Any]:
         "outcomes": np.array(beliefs.outcomes),
         "probabilities": np.array(beliefs.probabilities),
     }
+
+
+def _entered(agent: CuriousAgent, plant: TablePlant, trial: Trial, share: float) -> dict[str, Any]:
+    before, after = round(BEFORE * share), [round(n * share) for n in AFTER]
+    rows = []
+    for n in after:
+        agent.run(before + n - agent.transitions)
+        plant.set_top(UP)
+        rows.append(trial.of_model(agent.model.debiased(), "up"))
+    return {"after": after, "rows": rows}
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:

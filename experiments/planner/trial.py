@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.learning.arm_poses import arm_clauses
-from experiments.planner.following import Followed, Frozen, Queries, follow, promises, through
+from experiments.planner.following import Followed, Frozen, Queries, follow, promises, queries, through, zone
 from experiments.planner.table import DOWN, UP, TablePlant
 from experiments.prm_vs_mdp.belief import Belief
 from experiments.prm_vs_mdp.graphs import NEIGHBOURS, make_roadmap, with_goals
@@ -27,6 +27,12 @@ class Trial:
     wanted: Queries
     blocked: NDArray[np.bool_]
     seed: int
+
+    @classmethod
+    def of_seed(cls, plant: TablePlant, space: Lattice, count: int, seed: int) -> Trial:
+        """That many queries; leaves the table down."""
+        blocked = zone(plant, space, UP) & ~zone(plant, space, DOWN)
+        return cls(space, queries(plant, space, count, seed), blocked, seed)
 
     def of_model(self, beliefs: OutcomeModel, test: str) -> dict[str, float]:
         """Plans made with a transition model, in one world."""
