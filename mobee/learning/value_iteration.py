@@ -61,14 +61,16 @@ def value_iteration(
     if not tolerance > 0.0:
         raise InvalidValue(f"tolerance={tolerance!r}: valid is a number above 0.")
     values = np.zeros(len(outcomes)) if start is None else np.array(start, dtype=np.float64)
-    if values.shape != (len(outcomes),) or not np.isfinite(values).all():
-        raise InvalidValue(f"start has shape {values.shape} or is not finite: give one value for each of the {len(outcomes)} states.")
+    if values.shape != (len(outcomes),):
+        raise InvalidValue(f"start has shape {values.shape}: give one value for each of the {len(outcomes)} states.")
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
     sweeps, action_values = load_planning(), np.empty(reward.shape)
     done = sweeps.solve(probabilities, outcomes, reward, values, action_values, discount, tolerance, relative, method == "modified")
     if done == sweeps.BAD_REWARD:
         raise InvalidValue(BAD_REWARD)
+    if done == sweeps.BAD_START:
+        raise InvalidValue("start holds NaN or an infinity: give finite values.")
     if done == sweeps.BAD_OUTCOME:
         raise InvalidValue(f"the model leads to a state that it does not have: valid are 0 to {len(outcomes) - 1}.")
     return values, action_values

@@ -1,0 +1,156 @@
+"""How right and how fast plans are: beside exact policy iteration, SciPy's sparse matrices and quantecon."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from experiments.bench.rounds import Contestant, one_core, rates
+from experiments.bench.vi_peers import QUANTECON, Problem, load_quantecon
+from experiments.bench.vi_workload import Tables, Work, at_random, at_work, of_size
+from experiments.progress import Progress
+from mobee.learning.policy_iteration import policy_iteration
+from mobee.learning.value_iteration import METHODS, value_iteration
+from mobee.robot.robot import Array
+
+DISCOUNT, TOLERANCE = 0.9, 1e-3  # published
+COLD, WARM, ALGORITHM_7, SCIPY = "ours, cold", "ours, warm", "ours, Algorithm 7, cold", "SciPy sparse, cold"
+PEERS = (SCIPY, QUANTECON["value_iteration"])
+LARGE = 100_000  # states
+
+# Name, key of the result, at least or at most, bound.
+REQUIREMENTS = (
+    ("largest difference from policy iteration, relative", "difference", "most", 1e-9),
+    ("largest residual, in units of the tolerance", "residual", "most", 1.0),
+    (f"cold, times faster than {PEERS[0]}", "cold_times_scipy", "least", 4.0),
+    (f"cold, times faster than {PEERS[1]}", "cold_times_quantecon", "least", 4.0),
+    (f"warm, times faster than {PEERS[0]}", "warm_times_scipy", "least", 20.0),
+    (f"warm, times faster than {PEERS[1]}", "warm_times_quantecon", "least", 20.0),
+    ("warm, us a plan", "warm_us", "most", 40.0),
+    (f"{LARGE} states, cold, s", "large_seconds", "most", 10.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How much is solved."""
+
+    problems: int = 1000
+    rounds: int = 15
+    observations: int = 10
+    large: int = LARGE
+
+
+QUICK = Settings(problems=50, rounds=3, observations=5)
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """All numbers, for people and scripts; raises QuanteconMissing."""
+    load_quantecon()
+    with one_core() as core, Progress() as progress:
+        differences, residuals = [], []
+        for number in range(settings.problems):
+            if number % 10 == 0:
+                progress.show(0.4 * number / settings.problems, "random problems")
+            difference, residual = _checked(number)
+            differences.append(difference)
+            residuals.append(residual)
+        progress.show(0.4, "81 states, 16 actions")
+        solvers = contestants(at_work(1000, settings.observations))
+        found = {name: float(np.median(1e6 / values)) for name, values in rates(solvers, settings.rounds).items()}
+        progress.show(0.8, f"{settings.large} states")
+        large = of_size(settings.large).tables
+        seconds = 1.0 / rates({COLD: Contestant(lambda: _cold(large), 1)}, 1)[COLD][0]
+    result: dict[str, Any] = {"problems": settings.problems, "difference": max(differences), "residual": max(residuals)}
+    result |= {"core": core, "rounds": settings.rounds, "us": found, "warm_us": found[WARM], "large_seconds": float(seconds)}
+    for key, peer in zip(("scipy", "quantecon"), PEERS, strict=True):
+        result |= {f"cold_times_{key}": found[peer] / found[COLD], f"warm_times_{key}": found[peer] / found[WARM]}
+    result["requirements"] = [_required(result, *one) for one in REQUIREMENTS]
+    result["passed"] = all(one["passed"] for one in result["requirements"])
+    return result
+
+
+def contestants(work: Work, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
+    """Every solver of a problem; ours warm after each change of it, from the values before."""
+    first = work.tables
+    peer = Problem(first, first.reward, discount, TOLERANCE)
+    theirs = peer.quantecon()
+    exact, _ = value_iteration(first, first.reward, discount, 1e-9, method="modified")
+    peers = {SCIPY: peer.scipy_values} | {name: partial(peer.quantecon_values, theirs, method) for method, name in QUANTECON.items()}
+    limit = 2.0 * TOLERANCE * discount / (1.0 - discount)  # each is within half of it of the truth
+    for name, solve in peers.items():
+        off = np.abs(solve() - exact).max()
+        if off > limit:
+            raise ArithmeticError(f"{name} is wrong by {off:.3g}, which is more than {limit:.3g}.")
+    ours = {
+        COLD: partial(_cold, first, discount),
+        WARM: partial(_warm, work, exact, discount),
+        ALGORITHM_7: partial(value_iteration, first, first.reward, discount, TOLERANCE),
+    }
+    return {
+        name: Contestant(partial(_repeat, solve, repeats), repeats * (len(work.changes) if name == WARM else 1))
+        for name, solve in (ours | peers).items()
+    }
+
+
+def _repeat(solve: Callable[[], object], times: int) -> None:
+    for _ in range(times):
+        solve()
+
+
+def _cold(tables: Tables, discount: float = DISCOUNT) -> tuple[Array, Array]:
+    return value_iteration(tables, tables.reward, discount, TOLERANCE, method="modified")
+
+
+def _warm(work: Work, start: Array, discount: float) -> None:
+    tables = work.tables
+    for change in work.changes:
+        tables.put(change)
+        start, _ = value_iteration(tables, tables.reward, discount, TOLERANCE, start, method="modified")
+
+
+def _checked(seed: int) -> tuple[float, float]:
+    """Of a random problem: the difference from policy iteration over the largest value, and the residual over the tolerance."""
+    tables, discount = at_random(seed)
+    exact, exact_actions = policy_iteration(tables, tables.reward, discount)
+    exists, size = np.isfinite(exact_actions), float(np.abs(exact).max(initial=1.0))
+    difference = residual = 0.0
+    for method in METHODS:
+        values, found = value_iteration(tables, tables.reward, discount, 1e-12, relative=True, method=method)
+        off = max(np.abs(values - exact).max(), np.abs(found[exists] - exact_actions[exists]).max(initial=0.0))
+        difference = max(difference, float(off) / size)
+        values, _ = value_iteration(tables, tables.reward, discount, TOLERANCE, method=method)
+        residual = max(residual, _residual(tables, exists, discount, values) / TOLERANCE)
+    return difference, residual
+
+
+def _residual(tables: Tables, exists: Array, discount: float, values: Array) -> float:
+    """The sup-norm Bellman residual over the states that have actions."""
+    onwards = (tables.probabilities * values[tables.outcomes]).sum(axis=-1)
+    acting = exists.any(axis=1)
+    best = np.where(exists, tables.reward + discount * onwards, -np.inf)[acting].max(axis=1)
+    return float(np.abs(best - values[acting]).max(initial=0.0))
+
+
+def _required(result: dict[str, Any], name: str, key: str, sense: str, bound: float) -> dict[str, Any]:
+    found = result[key]
+    passed = found <= bound if sense == "most" else found >= bound
+    return {"name": name, "found": found, f"at_{sense}": bound, "passed": bool(passed)}
+
+
+def report(result: dict[str, Any]) -> str:
+    """The measurements as text."""
+    lines = [
+        f"81 states, 16 actions, discount {DISCOUNT}, tolerance {TOLERANCE}; processor time",
+        f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, medians of {result['rounds']} rounds, in us a plan:",
+    ]
+    lines += [f"  {name:<40}{us:10.1f}" for name, us in result["us"].items()]
+    lines.append(f"{result['problems']} random problems, both methods, and requirements:")
+    for one in result["requirements"]:
+        bound = f">= {one['at_least']:g}" if "at_least" in one else f"<= {one['at_most']:g}"
+        lines.append(f"  {one['name']:<53}{one['found']:9.3g} {bound:>8} {'pass' if one['passed'] else 'SHORT'}")
+    return "\n".join(lines)

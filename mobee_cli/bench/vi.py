@@ -1,0 +1,41 @@
+"""Plans against exact policy iteration on random problems, and their cost beside SciPy's sparse matrices and quantecon."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from mobee_cli.bench.model import picture
+from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may be chosen."""
+    parser.add_argument("--quick", action="store_true", help="50 random problems, 3 rounds; figure: up to 10 000 states")
+    parser.add_argument("--figure", type=picture, metavar="FILE", help="draw cost against states and discount instead (.png, .svg, .pdf)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and print."""
+    if arguments.figure:
+        return _figure(arguments.figure, arguments.quick, arguments.json)
+    from experiments.bench.vi import QUICK, Settings, measure, report
+
+    result = measure(QUICK if arguments.quick else Settings())
+    print(json.dumps(result, indent=2) if arguments.json else report(result))
+    return 0 if result["passed"] else FAILED
+
+
+def _figure(path: Path, quick: bool, as_json: bool) -> int:
+    from experiments.bench.vi_cost import draw, empty_figure, measure
+    from experiments.matplotlib_figure import MatplotlibMissing
+
+    try:
+        figure = empty_figure()  # before it is measured
+    except MatplotlibMissing as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    curves = measure(quick)
+    draw(figure, curves, path)
+    print(json.dumps(curves, indent=2) if as_json else path)
+    return 0

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from experiments.bench.vi import Settings, contestants, measure, report
+from experiments.bench.vi_peers import Problem, QuanteconMissing, load_quantecon
+from experiments.bench.vi_workload import at_work, of_size
+from mobee.learning.policy_iteration import policy_iteration
+from mobee_cli.__main__ import main
+
+
+@pytest.fixture(scope="module")
+def result():
+    pytest.importorskip("quantecon")
+    return measure(Settings(problems=4, rounds=1, observations=2, large=200))
+
+
+def test_plans_are_right_on_random_problems(result):
+    right = [one for one in result["requirements"] if one["name"].startswith("largest")]
+    assert len(right) == 2 and all(one["passed"] for one in right)
+
+
+def test_ratios_are_those_of_the_times(result):
+    us = result["us"]
+    assert all(value > 0.0 for value in us.values())
+    assert result["cold_times_scipy"] == pytest.approx(us["SciPy sparse, cold"] / us["ours, cold"])
+    assert result["warm_times_quantecon"] == pytest.approx(us["quantecon value iteration"] / us["ours, warm"])
+    assert result["passed"] == all(one["passed"] for one in result["requirements"])
+
+
+def test_the_report_fits_80_columns_and_marks_what_falls_short(result):
+    changed = result | {"requirements": [result["requirements"][0] | {"passed": False}]}
+    lines = report(changed).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert sum(line.endswith("SHORT") for line in lines) == 1
+
+
+def test_peers_solve_the_same_problem():
+    pytest.importorskip("quantecon")
+    tables = of_size(300).tables
+    exact, _ = policy_iteration(tables, tables.reward)
+    problem = Problem(tables, tables.reward, 0.9, 1e-9)
+    assert problem.scipy_values() == pytest.approx(exact, abs=1e-7)
+    assert problem.quantecon_values(problem.quantecon(), "value_iteration") == pytest.approx(exact, abs=1e-7)
+
+
+def test_a_peer_that_is_wrong_is_found_out(monkeypatch):
+    pytest.importorskip("quantecon")
+    monkeypatch.setattr(Problem, "scipy_values", lambda self: np.zeros(len(self.first)))
+    with pytest.raises(ArithmeticError, match="SciPy sparse, cold is wrong by"):
+        contestants(of_size(100))
+
+
+def test_changes_there_and_back_leave_what_an_agent_knew_as_it_was():
+    known = at_work(50, 5)
+    before = known.tables.probabilities.copy(), known.tables.reward.copy()
+    assert len(known.changes) == 10
+    changed = 0
+    for change in known.changes:
+        known.tables.put(change)
+        changed += not np.array_equal(known.tables.reward, before[1])
+    assert changed >= 8
+    assert np.array_equal(known.tables.probabilities, before[0]) and np.array_equal(known.tables.reward, before[1])
+
+
+def test_without_quantecon_it_names_the_extra(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "quantecon.markov", None)
+    with pytest.raises(QuanteconMissing):
+        load_quantecon()
+    assert main(["bench", "vi", "--quick"]) == 3
+    assert capsys.readouterr().err == "mobee bench: quantecon is not installed: pip install '.[bench]' in MoBeE's folder\n"
