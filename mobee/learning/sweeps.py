@@ -59,9 +59,17 @@ def _pack(
 
 @inner_exact
 def _evaluate(
-    chosen: Ints, ends: Ints, weights: Array, following: UInts, rewards: Array, values: Array, discount: float, tolerance: float
+    chosen: Ints,
+    ends: Ints,
+    weights: Array,
+    following: UInts,
+    rewards: Array,
+    values: Array,
+    new: Array,
+    discount: float,
+    tolerance: float,
 ) -> None:
-    """A few sweeps over one row a state, each using the newest values.
+    """A few sweeps over one row a state, all from the old values, so that states that are alike stay so.
 
     Where all values change by much the same, they will go on to by discount / (1 - discount) times as much: that step is taken at once.
     """
@@ -70,17 +78,18 @@ def _evaluate(
         for s in range(len(values)):
             row = chosen[s]
             if row >= 0:
-                value = rewards[row]
+                value = 0.0
                 for k in range(ends[row], ends[row + 1]):
                     value += weights[k] * values[following[k]]
+                value += rewards[row]
                 least, most = min(least, value - values[s]), max(most, value - values[s])
-                values[s] = value
-        change = max(abs(least), abs(most))
+                new[s] = value
+        change, ahead = max(abs(least), abs(most)), 0.0
         if most - least < _ALIKE * change:
-            for s in range(len(values)):
-                if chosen[s] >= 0:
-                    values[s] += 0.5 * (least + most) * discount / (1.0 - discount)
-            change = most - least
+            change, ahead = most - least, 0.5 * (least + most) * discount / (1.0 - discount)
+        for s in range(len(values)):
+            if chosen[s] >= 0:
+                values[s] = new[s] + ahead
         if change < tolerance:
             return
 
@@ -152,7 +161,7 @@ def solve(
         if change < limit or change <= _ROUNDING * largest:
             break
         if evaluate and sweeps <= _EVALUATED:
-            _evaluate(chosen, ends, weights, following, rewards, values, discount, 0.5 * (1.0 - discount) * limit)
+            _evaluate(chosen, ends, weights, following, rewards, values, new, discount, 0.5 * (1.0 - discount) * limit)
     found[:] = -np.inf
     for s in range(states):
         for row in range(first[s], first[s + 1]):

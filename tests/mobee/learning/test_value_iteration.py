@@ -190,3 +190,11 @@ def test_tables_of_unequal_shape_are_refused():
     model, reward = chain()
     with pytest.raises(InvalidValue, match=r"valid is \(S, A, B\)"):
         value_iteration(Table(model.outcomes, np.ones((6, 1, 2))), reward)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("discount", [0.5, 0.9, 0.99])
+def test_actions_of_which_nothing_is_known_stay_ties(method, discount):
+    model = TransitionModel(arm(neighbours=16))
+    _, q = value_iteration(model, model.reward, discount, 0.01, relative=True, method=method)
+    assert np.ptp(q) < 1e-12
