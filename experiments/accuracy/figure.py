@@ -22,7 +22,7 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
     if not worlds:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
     drawing = new_figure(4.6 * len(worlds), 6.4)
-    for (above, below), world in zip(drawing.subplots(2, len(worlds), squeeze=False, sharex=True).T, worlds, strict=True):
+    for (above, below), world in zip(drawing.subplots(2, len(worlds), squeeze=False, sharex="col").T, worlds, strict=True):
         for number, explorer in enumerate(EXPLORERS):
             if (world, explorer) in curves:
                 counts, _, debiased, stochastic = np.median(curves[world, explorer], axis=0).T
@@ -33,6 +33,8 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
         above.set(title=WORLDS[world].text, ylabel="L1, all actions", yscale="log")
         above.title.set_fontsize(9)
         below.set(xlabel="transitions", ylabel="L1, stochastic actions", ylim=(0.0, None))
+        if not any(np.isfinite(curves[key][:, :, 3]).any() for key in curves if key[0] == world):
+            below.text(0.5, 0.5, "there is none", transform=below.transAxes, ha="center")
         above.grid(alpha=0.2)
         below.grid(alpha=0.2)
     drawing.axes[0].legend(fontsize=7, title="debiased; dashed: with imagined counts", title_fontsize=7)
