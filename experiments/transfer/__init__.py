@@ -25,6 +25,7 @@ from experiments.options import positive_whole
 from experiments.progress import Progress
 from experiments.run_folder import read, write
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from experiments.table.session import explore_together
 from experiments.transfer.comparing import Distance
 from experiments.transfer.figure import draw
 from experiments.transfer.live import ROBOTS, learn
@@ -66,22 +67,8 @@ def work(cell: Cell) -> dict[str, Any]:
     """Learn offline; what each part has seen, (T, 3)."""
     task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
     plant = offline_plant(task, cell.seed)
-    by_part = {agent.part: agent for agent in agents(task, plant, cell.seed)}
-    seen: dict[str, list[tuple[int, int, int]]] = {part: [] for part in by_part}
-    waiting = list(by_part)
-    while waiting or min(len(rows) for rows in seen.values()) < number:
-        for part in waiting:
-            agent = by_part[part]
-            plant.begin(part, agent.target(agent.decide(agent.state)))
-        waiting = []
-        for part, outcome in plant.advance():
-            agent = by_part[part]
-            agent.observe(outcome)
-            last = agent.last
-            assert last is not None
-            seen[part].append((last.s, last.a, last.s_next))
-            waiting += [part] if len(seen[part]) < number else []
-    return {f"seen_{part}": np.array(rows, dtype=np.int32) for part, rows in seen.items()}
+    logs = explore_together(agents(task, plant, cell.seed), plant, number)
+    return {f"seen_{part}": np.array(log.seen[:number], dtype=np.int32) for part, log in logs.items()}
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
