@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,12 @@ def arm_clauses() -> list[Clause]:
     return [clause for clause in robot().clauses if clause.part == PART]
 
 
+@cache
+def clause_width() -> float:
+    """Where the published law begins to push away from a clause, in units of a.q + b."""
+    return Gains.published_2014().constraint_width
+
+
 def whole(q: Array) -> Array:
     """Poses of the four joints (..., 4) as poses of the robot (..., n), else at home; rad."""
     body = robot()
@@ -36,9 +43,8 @@ def whole(q: Array) -> Array:
 def silent(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
     """In which of the poses (P, 4) rad neither a field nor one of the clauses exerts a force, by the published law."""
     poses = whole(q)
-    width = Gains.published_2014().constraint_width  # in units of a.q + b, as that law has it
     good = np.ones(len(poses), dtype=bool)
     good[model.evaluate(poses).table.pose] = False
     for clause in clauses:
-        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= width
+        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= clause_width()
     return good
