@@ -1,24 +1,25 @@
 """Does what is learned on the offline plant hold on a robot with physics?
 
 Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of
-PyBullet's robot.  Source: issue of this project; the paper (4.1) gives the robot's time as what limits it, and no simulated rival.
+PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) names the robot's time as what limits learning.
 Published: no number.  Run time: about ten minutes on 2 cores for the arms; the table as much again.
 
 Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at once; with --table those of torso and
 arms at the table.  Live: all services in lockstep, with PyBullet, and with the motor model alone as control.  Offline: the same
-agents with five seeds; how far each of them is from the four others is the noise that even a perfect twin would show.
-PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
+agents with five other seeds; how far each of them is from the four others is the noise that even a perfect twin would show, so a live
+robot, too, is held against four of them at a time.  It passes within what one more seed would do with 95 %, or within 0.01.  PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student_t
 
 from experiments.claims import Claim
 from experiments.options import positive_whole
@@ -39,9 +40,11 @@ CLAIMS = (
     Claim(
         "aim of this reproduction",
         "the transition model learned offline with identified motors is that of PyBullet's robot in lockstep",
-        "within the spread of offline seeds",
+        "as near as another offline seed",
     ),
 )
+NEAR = 0.01  # what is nearer than that is the same, whatever the spread
+LIVE_SEED = 100  # added to the seed: the live agents are not those of an offline seed
 LEAST_FILE = "least.json"
 TRANSITIONS, LEAST = 800, 2  # a part; tries of a state-action that is compared
 
@@ -81,7 +84,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             progress.show(made / number, f"{task} on {robot}: {made} of {number}")
 
         for task, robot in product(_tasks(arguments), ROBOTS):
-            learn(task, robot, arguments.seed, number, folder / task / robot, told)
+            learn(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, told)
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
     table = [row for task, found in tasks.items() for row in _rows(task, found)]
@@ -118,14 +121,21 @@ def _plain(one: Distance) -> dict[str, Any]:
 def _claim(tasks: Mapping[str, Compared]) -> Claim:
     texts, holds = [], True
     for task, found in tasks.items():
-        one, most = found.live["pybullet"], max(seed.variation for seed in found.offline)
-        fewest = min(seed.agree for seed in found.offline)
-        holds = holds and one.variation <= most and one.agree >= fewest
+        one = found.live["pybullet"]
+        most = _bound([seed.variation for seed in found.offline])
+        fewest = 1.0 - _bound([1.0 - seed.agree for seed in found.offline])
+        holds = holds and one.variation <= max(most, NEAR) and one.agree >= min(fewest, 1.0 - NEAR)
         texts.append(
-            f"{task}: total variation {one.variation:.3f} (offline seeds to {most:.3f}),"
-            f" same most frequent outcome {one.agree:.3f} (offline seeds from {fewest:.3f}), {one.compared} state-actions"
+            f"{task}: total variation {one.variation:.3f} (another offline seed: up to {most:.3f}),"
+            f" same most frequent outcome {one.agree:.3f} (from {fewest:.3f}), {one.compared} state-actions"
         )
     return CLAIMS[0].measured("; ".join(texts), holds)
+
+
+def _bound(values: Sequence[float]) -> float:
+    """What one more value of the same kind stays below with 95 %, if they are normally distributed."""
+    n = len(values)
+    return float(np.mean(values) + student_t.ppf(0.95, n - 1) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
 
 
 def _tasks(arguments: argparse.Namespace) -> list[str]:

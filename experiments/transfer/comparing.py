@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,3 +53,10 @@ def distance(first: Counts, second: Counts, least: int) -> Distance:
     if not both.any():
         return Distance(float("nan"), float("nan"), 0)
     return Distance(float(apart[both].mean()), float(same[both].mean()), int(both.sum()))
+
+
+def mean(distances: Sequence[Distance]) -> Distance:
+    """Of several."""
+    rows = np.array([(one.variation, one.agree, one.compared) for one in distances])
+    variation, agree, compared = rows.mean(axis=0)
+    return Distance(float(variation), float(agree), round(float(compared)))

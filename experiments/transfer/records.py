@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.sweep import load_cells
-from experiments.transfer.comparing import Counts, Distance, counts_of, distance
+from experiments.transfer.comparing import Counts, Distance, counts_of, distance, mean
 from experiments.transfer.live import ROBOTS
 from experiments.transfer.settings import ROBOT, TASKS, space
 from mobee import load_robot
@@ -18,7 +18,7 @@ from mobee.store import STORE, TransitionStore
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """A task's live robots and offline seeds, each against the offline seeds together, a seed against the others."""
+    """A task's live robots and offline seeds, each against all offline seeds but one; of a live robot the mean of that."""
 
     live: dict[str, Distance]
     offline: tuple[Distance, ...]
@@ -35,7 +35,8 @@ def compared(folder: Path, task: str, least: int) -> Compared:
     spaces = {part: space(robot, TASKS[task], part) for part in parts}
     seeds = [{part: counts_of(result.values[f"seen_{part}"], spaces[part]) for part in parts} for result in results]
     together = {part: np.sum([seed[part] for seed in seeds], axis=0) for part in parts}
-    offline = tuple(distance(seed, {part: together[part] - seed[part] for part in parts}, least) for seed in seeds)
+    without = [{part: together[part] - seed[part] for part in parts} for seed in seeds]
+    offline = tuple(distance(seed, others, least) for seed, others in zip(seeds, without, strict=True))
     counts: dict[str, Counts] = {"offline": together}
     for name in ROBOTS:
         path = folder / task / name / STORE
@@ -43,4 +44,5 @@ def compared(folder: Path, task: str, least: int) -> Compared:
             with TransitionStore(path, "") as store:
                 rows = {part: np.array([(t.s, t.a, t.s_next) for t in store.load(part)]).reshape(-1, 3) for part in parts}
             counts[name] = {part: counts_of(rows[part][: results[0].cell.settings["transitions"]], spaces[part]) for part in parts}
-    return Compared({name: distance(counts[name], together, least) for name in counts if name in ROBOTS}, offline, counts)
+    live = {name: mean([distance(counts[name], others, least) for others in without]) for name in counts if name in ROBOTS}
+    return Compared(live, offline, counts)
