@@ -6,8 +6,9 @@ Published: no number.  Run time: about ten minutes on 2 cores for the arms; the 
 
 Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at once; with --table those of torso and
 arms at the table.  Live: all services in lockstep, with PyBullet, and with the motor model alone as control.  Offline: the same
-agents with five other seeds; how far each of them is from the four others is the noise that even a perfect twin would show, so a live
-robot, too, is held against four of them at a time.  It passes within what one more seed would do with 95 %, or within 0.01.  PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
+agents with five other seeds.  How far each of them is from the four others is the noise that even a perfect twin would show, so a
+live robot is held against four of them at a time too.  It passes within what one more seed would do with 95 %, or within 0.01.
+PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from experiments.claims import Claim
 from experiments.options import positive_whole
@@ -135,7 +136,7 @@ def _claim(tasks: Mapping[str, Compared]) -> Claim:
 def _bound(values: Sequence[float]) -> float:
     """What one more value of the same kind stays below with 95 %, if they are normally distributed."""
     n = len(values)
-    return float(np.mean(values) + student_t.ppf(0.95, n - 1) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
+    return float(np.mean(values) + stdtrit(n - 1, 0.95) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
 
 
 def _tasks(arguments: argparse.Namespace) -> list[str]:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from experiments.sweep import Cell
-from experiments.transfer import work
+from experiments.transfer import _bound, _claim, work
+from experiments.transfer.comparing import Distance
+from experiments.transfer.records import Compared
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -16,3 +18,17 @@ def test_parts_learn_at_once_and_each_makes_its_number_of_transitions():
     for part, rows in first.items():
         assert rows.shape == (4, 3) and np.array_equal(rows, again[part])
         assert np.array_equal(rows[1:, 0], rows[:-1, 2])
+
+
+def test_the_bound_is_that_of_one_more_value():
+    rng = np.random.default_rng(0)
+    draws = rng.normal(3.0, 0.5, size=(4000, 6))
+    below = [row[-1] <= _bound(list(row[:-1])) for row in draws]
+    assert np.mean(below) == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
+def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
+    offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
+    found = Compared({"pybullet": Distance(variation, agree, 300)}, offline, {})
+    assert _claim({"arms": found}).verdict == verdict
