@@ -17,6 +17,7 @@ ALL_ALIVE = "alive/*/*"
 ALL_STATES = "*/state"
 ALL_EVENTS = "event/*"
 ALL_TRANSITIONS = "agents/*/transition"
+ALL_LEARNED = "agents/*/learned"
 ALL_WORLD = "world/*"
 ALL_DONE = "done/*"
 
@@ -110,6 +111,11 @@ def camera(eye: str) -> str:
 def transition(agent: str) -> str:
     """One observed transition of an agent."""
     return f"agents/{chunk(agent)}/transition"
+
+
+def learned(agent: str) -> str:
+    """What an agent knows and expects now."""
+    return f"agents/{chunk(agent)}/learned"
 
 
 def event(who: str) -> str:

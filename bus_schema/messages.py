@@ -203,6 +203,28 @@ class Transition(Message, frozen=True, kw_only=True):
     touched: list[Name]
 
 
+class Surprise(Struct, frozen=True, forbid_unknown_fields=True):
+    """An outcome of an action that was not its goal."""
+
+    s: Count
+    a: Count
+    s_next: Count
+    share: Annotated[float, Meta(gt=0, le=1)]  # of the action's tries
+
+
+class Learned(Message, frozen=True, kw_only=True):
+    """What an agent knows and expects now, over its state-actions: S states with at most A actions, rows of states."""
+
+    agent: Name
+    n: Count  # transitions observed
+    s: Count  # where it is
+    space: Annotated[str, Meta(max_length=1_000_000)]  # JSON of the space's settings, from which it can be made again
+    tries: bytes  # (S A) little-endian uint32; 0 too where a state has no such action
+    reward: bytes  # (S A) little-endian float32, nats; -inf where a state has no such action
+    value: bytes  # (S A) little-endian float32, of the plan; -inf likewise
+    surprises: list[Surprise]
+
+
 class Event(Message, frozen=True, kw_only=True):
     """What a service has to tell a person."""
 

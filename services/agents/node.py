@@ -12,6 +12,7 @@ from mobee import ActionInterrupted, CuriousAgent, Lattice
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
+from services.agents.learned import LearnedStream
 from services.common.bus_plant import BusPlant
 from services.common.delivery import EVENTS
 from services.common.service import Service
@@ -52,6 +53,7 @@ class AgentNode:
             goal_weight=config.goal_weight or None,
         )
         self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
+        self._learned = LearnedStream(service.bus, self._agent)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 
@@ -94,6 +96,7 @@ class AgentNode:
             duration=made.duration,
             touched=list(made.touched),
         )
+        self._learned.put(time.monotonic())
 
     def _mark(self) -> None:
         self._made = self._timeouts = self._interrupted = 0

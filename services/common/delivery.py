@@ -24,3 +24,4 @@ STOP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # emer
 DATA = Delivery(_DROP, zenoh.Priority.DATA)  # perceived objects, ground truth
 BULK = Delivery(_DROP, zenoh.Priority.DATA_LOW)  # pictures: behind everything else
 EVENTS = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=100)  # what a person reads; late joiners get the last ones
+NEWEST = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=1)  # large and slow: late joiners get the last one

@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
         robot = load_robot(config.robot)
-        with open_output(config, blueprint(), recording_of(config)) as output, Service("monitor", config, robot) as service:
+        with open_output(config, blueprint(config.page), recording_of(config)) as output, Service("monitor", config, robot) as service:
             MonitorNode(service, config, robot, output)
             service.ready()
             service.run()

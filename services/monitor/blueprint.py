@@ -13,8 +13,24 @@ WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
 
 
-def blueprint() -> rrb.Blueprint:
-    """The robot large, its pictures and the log below it, plots on the right, no side panels."""
+TABS = ("robot", "learning")
+
+
+def blueprint(page: str = TABS[0]) -> rrb.Blueprint:
+    """Two tabs, the one called `page` open: the robot and what moves it, and what the agents know; no side panels."""
+    return rrb.Blueprint(
+        rrb.Tabs(_robot(), _learning(), active_tab=TABS.index(page)),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TopPanel(state="hidden"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _robot() -> rrb.Horizontal:
+    """The robot large, its pictures and the log below it, plots on the right."""
     left = rrb.Vertical(_scene(), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
     plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
     learning = rrb.Tabs(
@@ -24,15 +40,26 @@ def blueprint() -> rrb.Blueprint:
     )
     forces = _plot("forces, rad/s²", "plots/forces")
     right = rrb.Vertical(*plots, rrb.Horizontal(forces, learning), row_shares=[1, 1, 1, 0.9])
-    return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[1.75, 1]),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TopPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
-        auto_views=False,
-        auto_layout=False,
+    return rrb.Horizontal(left, right, column_shares=[1.75, 1], name=TABS[0])
+
+
+def _learning() -> rrb.Horizontal:
+    """A column an agent: its space with the actions that surprised it, and bars over all its state-actions."""
+    return rrb.Horizontal(*(_agent(part) for part in PARTS), column_shares=[1, 1.4, 1.4], name=TABS[1])
+
+
+def _agent(part: str) -> rrb.Vertical:
+    named = part.replace("_", " ")
+    space = rrb.Spatial2DView(
+        origin=f"/learning/{part}/space",
+        name=f"{named}: states, actions that surprised it coloured",
+        background=rrb.Background(color=BACKGROUND),
     )
+    bars = [
+        rrb.BarChartView(origin=f"/learning/{part}/{name}", name=f"{named}: {title}")
+        for name, title in (("tries", "tries of state-actions"), ("reward", "reward, nats"), ("value", "value"))
+    ]
+    return rrb.Vertical(space, *bars, row_shares=[3, 1, 1, 1])
 
 
 def _scene() -> rrb.Spatial3DView:

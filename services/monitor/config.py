@@ -24,6 +24,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Where the page gets its data."""
     run_dir: str = ""
     """Folder for recording.rrd; empty: no recording."""
+    page: Literal["robot", "learning"] = "robot"
+    """The tab that is open at first."""
     rate: Annotated[float, Meta(ge=1, le=20)] = 20.0
     """Looks at the newest state a second."""
     image_rate: Annotated[float, Meta(gt=0, le=10)] = 2.0

@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from bus_schema import keys
-from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Image, Motion, Transition, WorldObject
+from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Image, Learned, Motion, Transition, WorldObject
 from bus_schema.rpc import World
 from mobee.robot.robot import Robot
 from services.common.body import Body
@@ -19,9 +19,11 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.monitor.blueprint import TIMELINE
 from services.monitor.config import Config
+from services.monitor.learning import Learning
 from services.monitor.output import Output
 from services.monitor.palette import PARTS
 from services.monitor.plots import Plots
+from services.monitor.poses import Poses
 from services.monitor.scene import Scene
 
 WORLD_PERIOD = 1.0  # s between looks at the model's world
@@ -46,12 +48,14 @@ class MonitorNode:
         self._mark()
         self._set_time()
         self._scene, self._plots = Scene(self._stream, robot), Plots(self._stream, robot)
+        self._learning, self._poses = Learning(self._stream, robot), Poses(self._stream, robot)
         service.mark, service.describe = self._mark, self._describe
         service.on_run(self._new_run)
         service.on_clock(self._note_clock)
         service.on_alive(self._note_alive)
         service.on_each(keys.ALL_WORLD, WorldObject, self._see)
         service.on_each(keys.ALL_TRANSITIONS, Transition, self._learn)
+        service.on_each(keys.ALL_LEARNED, Learned, self._know, history=True)
         service.on_each(keys.ALL_EVENTS, Event, self._tell, history=True, any_run=True)
         self._rate, self._image_rate, self._world_rate = Rate(1.0 / config.rate), Rate(1.0 / config.image_rate), Rate(WORLD_PERIOD)
         for rate, look in ((self._rate, self._look), (self._image_rate, self._look_out), (self._world_rate, self._ask_world)):
@@ -107,7 +111,14 @@ class MonitorNode:
         part = seen.agent.removeprefix("agent_")
         if part in PARTS:
             self._plots.log_transition(part, seen)
+            self._learning.log_step(part, seen)
+            if self._body.update():
+                self._poses.note(self._body.q())
             self._transitions += 1
+
+    def _know(self, told: Learned) -> None:
+        if told.agent in PARTS:
+            self._learning.log(told.agent, told)
 
     def _tell(self, event: Event) -> None:
         self._stream.log("events", rr.TextLog(f"{event.src}: {event.text}", level=LEVELS[event.level]))

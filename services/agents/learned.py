@@ -1,0 +1,50 @@
+"""What an agent knows and expects, for whoever watches."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Learned, Surprise
+from mobee import CuriousAgent, TransitionModel
+from services.common.bus import Bus
+from services.common.delivery import NEWEST
+
+PERIOD = 0.5  # s of the clock on the wall between two messages: in lockstep transitions come faster than anybody looks
+
+
+class LearnedStream:
+    """Puts `Learned` after a transition, unless the last one is too recent."""
+
+    def __init__(self, bus: Bus, agent: CuriousAgent) -> None:
+        self._agent = agent
+        self._space = json.dumps(agent.space.settings)
+        self._stream = bus.publisher(keys.learned(agent.part), Learned, NEWEST)
+        self._next = -np.inf  # s, monotonic clock
+
+    def put(self, now: float) -> None:
+        """Tell, if it is time."""
+        if now < self._next:
+            return
+        self._next = now + PERIOD
+        agent, model = self._agent, self._agent.model
+        self._stream.put(
+            agent=agent.part,
+            n=agent.transitions,
+            s=agent.state,
+            space=self._space,
+            tries=model.tries.astype("<u4").tobytes(),
+            reward=model.reward.astype("<f4").tobytes(),
+            value=agent.plan()[1].astype("<f4").tobytes(),
+            surprises=surprises(model),
+        )
+
+
+def surprises(model: TransitionModel) -> list[Surprise]:
+    """The outcomes that were observed and are not the goals of their actions, with their shares of the tries."""
+    real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
+    unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
+    share = real / np.maximum(real.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
+    return [Surprise(int(s), int(a), int(model.outcomes[s, a, b]), float(share[s, a, b])) for s, a, b in np.argwhere(unexpected)]

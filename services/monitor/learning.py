@@ -1,0 +1,112 @@
+"""What the agents know: the state space with its surprising actions, and rewards, values and tries of all state-actions."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from bus_schema.messages import Learned, Transition
+from mobee.errors import MobeeError
+from mobee.learning.flat import flat
+from mobee.learning.recorded import space_from
+from mobee.learning.space import Space
+from mobee.robot.robot import Array, Ints, Robot
+from services.monitor import palette
+
+SOUND = (92, 98, 110, 110)  # an action that has always reached its goal
+THIN, THICK = 0.012, 0.06  # widths of arrows, in steps of the lattice
+DOT, BIG = 0.06, 0.16  # radii of states, likewise
+LIFT = 0.12  # how far an arrow's ends are from the centres of its states
+QUANTITIES = ("tries", "reward", "value")
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A space as it is drawn: where its states are, (S, 2), and which entries of (S, A) are state-actions."""
+
+    space: Space
+    places: Array
+    exists: Array
+
+
+class Learning:
+    """Logs to a stream under learning/."""
+
+    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+        self._stream, self._robot = stream, robot
+        self._drawn: dict[str, Drawn | None] = {}
+        self._made_from: dict[str, str] = {}
+
+    def log(self, part: str, told: Learned) -> None:
+        """The space, arrows, and bars of an agent; nothing if this robot cannot make its space, or the numbers do not fit it."""
+        drawn = self._space(part, told.space)
+        if drawn is None:
+            return
+        shape = drawn.space.goals.shape
+        tries, reward, value = (_numbers(data, kind, shape) for data, kind in ((told.tries, "<u4"), (told.reward, "<f4"), (told.value, "<f4")))
+        if tries is None or reward is None or value is None:
+            return
+        path, color = f"learning/{part}", palette.PARTS[part]
+        for name, numbers in zip(QUANTITIES, (tries, reward, value), strict=True):
+            self._stream.log(f"{path}/{name}", rr.BarChart(numbers[drawn.exists].astype(np.float32), color=color))
+        surprising = np.zeros(shape, dtype=bool)
+        found = [one for one in told.surprises if one.s < shape[0] and one.a < shape[1] and one.s_next < shape[0]]
+        for one in found:
+            surprising[one.s, one.a] = True
+        states, actions = np.nonzero((tries > 0) & ~surprising)
+        self._arrows(f"{path}/space/sound", drawn, states, drawn.space.goals[states, actions], THIN, SOUND)
+        self._log_surprises(f"{path}/space/surprising", drawn, [(one.s, one.a, one.s_next, one.share) for one in found])
+        best = np.where(drawn.exists, value, -np.inf).max(axis=1)
+        self._log_states(f"{path}/space/states", drawn, best, told.s)
+
+    def log_step(self, part: str, seen: Transition) -> None:
+        """The newest transition: where it was meant to go, and where it went."""
+        drawn = self._drawn.get(part)
+        if drawn is None or max(seen.s, seen.goal, seen.s_next) >= len(drawn.places):
+            return
+        color = (*palette.PARTS[part], 255)
+        ends = np.array([seen.goal, seen.s_next])
+        self._arrows(f"learning/{part}/space/newest", drawn, np.array([seen.s, seen.s]), ends, THICK, [(255, 255, 255, 120), color])
+
+    def _space(self, part: str, settings: str) -> Drawn | None:
+        if self._made_from.get(part) != settings:
+            self._made_from[part] = settings
+            try:
+                space = space_from(json.loads(settings), self._robot)
+            except (MobeeError, ValueError, TypeError):  # of another robot or version: its numbers cannot be placed
+                self._drawn[part] = None
+            else:
+                self._drawn[part] = Drawn(space, flat(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
+        return self._drawn[part]
+
+    def _log_states(self, path: str, drawn: Drawn, best: Array, here: int) -> None:
+        """States, the larger the more valuable; the agent's own is white."""
+        span = np.ptp(best)
+        radii = DOT + (BIG - DOT) * ((best - best.min()) / span if span > 0.0 else np.zeros(len(best)))
+        colors = [(255, 255, 255) if state == here else (150, 160, 176) for state in range(len(best))]
+        self._stream.log(path, rr.Points2D(drawn.places, radii=radii, colors=colors))
+
+    def _log_surprises(self, path: str, drawn: Drawn, found: list[tuple[int, int, int, float]]) -> None:
+        """One colour a state-action, as in the paper's figure 7; the width is the probability."""
+        colors = [(*palette.JOINTS[(7 * s + a) % len(palette.JOINTS)], 255) for s, a, _, _ in found]
+        widths = [THIN + (THICK - THIN) * share for *_, share in found]
+        states, ends = (np.array([one[k] for one in found], dtype=np.intp) for k in (0, 2))
+        self._arrows(path, drawn, states, ends, widths, colors)
+
+    def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: object, colors: object) -> None:
+        """Arrows between states; one that stays is a dot beside its state."""
+        start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        unit = np.divide(way, length, out=np.full_like(way, 0.7), where=length > 0.0)
+        self._stream.log(
+            path, rr.Arrows2D(origins=start + LIFT * unit, vectors=np.maximum(length - 2.0 * LIFT, 0.05) * unit, radii=radii, colors=colors)
+        )
+
+
+def _numbers(data: bytes, kind: str, shape: tuple[int, ...]) -> Array | None:
+    """The matrix in a message; None if it has another size."""
+    found = np.frombuffer(data, kind) if len(data) == 4 * int(np.prod(shape)) else None
+    return None if found is None else found.reshape(shape).astype(np.float64)

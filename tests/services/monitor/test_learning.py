@@ -1,0 +1,82 @@
+"""What the monitor shows of what an agent knows."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bus_schema.messages import Learned, Surprise
+from mobee import Lattice, TransitionModel, load_robot
+from mobee.learning.flat import flat
+from services.agents.learned import surprises
+
+rr = pytest.importorskip("rerun")
+from services.monitor.learning import Learning  # noqa: E402
+from services.monitor.poses import Poses  # noqa: E402
+
+ROBOT = load_robot("icub")
+ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]
+SPACE = Lattice(ROBOT, ARM, neighbours="equidistant")
+
+
+class Notebook:
+    """A recording stream that remembers what was logged last at each path."""
+
+    def __init__(self) -> None:
+        self.logged: dict[str, Any] = {}
+
+    def log(self, path: str, *what: Any, static: bool = False) -> None:
+        self.logged[path] = what[-1]
+
+
+def told(model: TransitionModel, **changes: Any) -> Learned:
+    header = {"v": 1, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
+    numbers = {"tries": model.tries.astype("<u4").tobytes(), "reward": model.reward.astype("<f4").tobytes()}
+    fields = {"agent": "left_arm", "n": 3, "s": 0, "space": json.dumps(SPACE.settings), "value": numbers["reward"]}
+    return Learned(**(header | numbers | fields | {"surprises": surprises(model)} | changes))
+
+
+def test_surprises_are_the_outcomes_that_are_no_goals_with_their_shares() -> None:
+    model = TransitionModel(SPACE)
+    goal = SPACE.goal(15, 2)
+    for outcome in (goal, 3, 3, 15):
+        model.observe(15, 2, outcome)
+    model.observe(0, 0, SPACE.goal(0, 0))
+    assert surprises(model) == [Surprise(15, 2, 15, 0.25), Surprise(15, 2, 3, 0.5)]
+
+
+def test_what_surprised_is_an_arrow_and_what_worked_another() -> None:
+    model, notebook = TransitionModel(SPACE), Notebook()
+    model.observe(15, 2, 3)
+    model.observe(0, 0, SPACE.goal(0, 0))
+    Learning(notebook, ROBOT).log("left_arm", told(model))
+    assert len(notebook.logged["learning/left_arm/space/surprising"].vectors) == 1
+    assert len(notebook.logged["learning/left_arm/space/sound"].vectors) == 1
+    assert len(notebook.logged["learning/left_arm/space/states"].positions) == 81
+    bars = notebook.logged["learning/left_arm/tries"].values.as_arrow_array().to_pylist()[0]["buffer"]
+    assert len(bars) == SPACE.state_actions
+
+
+@pytest.mark.parametrize("wrong", [{"space": "{}"}, {"space": "no json"}, {"tries": b"12345"}, {"surprises": [Surprise(500, 0, 1, 1.0)]}])
+def test_what_does_not_fit_is_not_drawn_and_does_no_harm(wrong: dict[str, Any]) -> None:
+    notebook = Notebook()
+    Learning(notebook, ROBOT).log("left_arm", told(TransitionModel(SPACE), **wrong))
+    arrows = notebook.logged.get("learning/left_arm/space/surprising")
+    assert arrows is None or len(arrows.vectors) == 0
+
+
+def test_poses_add_up() -> None:
+    notebook = Notebook()
+    poses = Poses(notebook, ROBOT)
+    poses.note(ROBOT.home)
+    poses.note(ROBOT.home + 0.1)
+    assert len(notebook.logged["scene/poses"].strips) == 4  # two arms, twice
+
+
+def test_no_two_states_are_drawn_at_one_place() -> None:
+    for space in (SPACE, Lattice(ROBOT, ARM, levels=(0.2, 0.4, 0.6, 0.8)), Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours=8)):
+        distances = np.linalg.norm(flat(space)[:, None] - flat(space), axis=-1)
+        assert distances[~np.eye(len(space), dtype=bool)].min() > 0.99
