@@ -46,7 +46,9 @@ class Learning:
         if drawn is None:
             return
         shape = drawn.space.goals.shape
-        tries, reward, value = (_numbers(data, kind, shape) for data, kind in ((told.tries, "<u4"), (told.reward, "<f4"), (told.value, "<f4")))
+        tries, reward, value = (
+            _numbers(data, kind, shape) for data, kind in ((told.tries, "<u4"), (told.reward, "<f4"), (told.value, "<f4"))
+        )
         if tries is None or reward is None or value is None:
             return
         path, color = f"learning/{part}", palette.PARTS[part]

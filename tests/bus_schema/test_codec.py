@@ -18,7 +18,7 @@ from bus_schema import VERSION, Refused, decode, encode, encoding_of, messages, 
 from bus_schema.messages import Clock, Command, Contacts, Forces, State
 
 NOT_SENT = {messages.Message, rpc.Request, rpc.Reply, messages.MarkerPose, messages.ContactItem}
-NOT_SENT |= {messages.Geometry, messages.ObjectTruth, rpc.ObjectState}
+NOT_SENT |= {messages.Geometry, messages.Surprise, messages.ObjectTruth, rpc.ObjectState}
 
 
 def sent_types() -> list[type[Struct]]:
@@ -61,7 +61,7 @@ def values(hint: Any, metas: tuple[Meta, ...] = ()) -> st.SearchStrategy[Any]:
         type(None): st.none(),
         bytes: st.binary(max_size=20),
         str: st.text(min_size=bound("min_length") or 0, max_size=min(bound("max_length") or 20, 64)),
-        float: st.floats(allow_nan=False, allow_infinity=False, min_value=1e-6 if bound("gt") == 0 else None),
+        float: st.floats(allow_nan=False, allow_infinity=False, min_value=1e-6 if bound("gt") == 0 else None, max_value=bound("le")),
         int: st.integers(-(2**63) if bound("ge", "gt") is None else 1, bound("le") or 2**62),
     }
     return plain[hint]

@@ -77,6 +77,10 @@ def test_poses_add_up() -> None:
 
 
 def test_no_two_states_are_drawn_at_one_place() -> None:
-    for space in (SPACE, Lattice(ROBOT, ARM, levels=(0.2, 0.4, 0.6, 0.8)), Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours=8)):
+    for space in (
+        SPACE,
+        Lattice(ROBOT, ARM, levels=(0.2, 0.4, 0.6, 0.8)),
+        Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours=8),
+    ):
         distances = np.linalg.norm(flat(space)[:, None] - flat(space), axis=-1)
         assert distances[~np.eye(len(space), dtype=bool)].min() > 0.99
