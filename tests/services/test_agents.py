@@ -170,13 +170,18 @@ def test_an_answer_that_gets_lost_does_not_make_a_second_action(stage: Stage) ->
     assert stage.told("interrupted") == []
 
 
-def test_after_a_kill_it_goes_on_where_it_was(stage: Stage) -> None:
-    agent = stage.agent()
-    stage.made(6)
-    assert agent.stop(signal.SIGKILL) == -signal.SIGKILL
-    first = stage.rows()
+def test_after_each_kill_it_goes_on_where_it_was(stage: Stage, rng: np.random.Generator) -> None:
+    first: list[dict[str, Any]] = []
+    for _ in range(3):
+        agent, count = stage.agent(), len(stage.transitions)
+        stage.made(count + 3)
+        time.sleep(rng.uniform(0.0, 0.1))
+        assert agent.stop(signal.SIGKILL) == -signal.SIGKILL
+        before, first = first, stage.rows()
+        assert first[: len(before)] == before and len(first) >= len(before) + 3
+        told = [t.n for t in stage.transitions]
+        assert told == sorted(set(told)) and set(told) <= {row["n"] for row in first}  # the last of each may not have been told any more
     count = len(stage.transitions)
-    assert len(first) >= 6
     again = stage.agent("--transitions", str(len(first) + 4))
     assert again.wait(30.0) == 0
     both = stage.rows()
