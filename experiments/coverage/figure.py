@@ -27,23 +27,25 @@ LABELS = {
     "nearest_untried": "nearest untried",
     "depleting": "depleting (ours)",
 }
+LEAST_DETOUR = 1e-3  # drawn
 TITLES = {"nearest": "16 nearest neighbours", "equidistant": "equidistant neighbours"}
 
 
 def draw(found: Mapping[str, CellResult], path: Path) -> Path:
-    """A row a graph: constrained, free, and the early phase; raises InvalidValue if there is nothing to draw."""
+    """A row a graph: constrained, free, the early phase, and each run's detour; raises InvalidValue if there is nothing to draw."""
     grouped = groups(found)
     if not grouped:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
     graphs = [graph for graph in TITLES if any(key[0] == graph for key in grouped)]
-    drawing = new_figure(13.0, 3.9 * len(graphs))
-    for row, graph in zip(drawing.subplots(len(graphs), 3, squeeze=False), graphs, strict=True):
+    drawing = new_figure(16.0, 3.8 * len(graphs))
+    for row, graph in zip(drawing.subplots(len(graphs), 4, squeeze=False), graphs, strict=True):
         for axes, world in zip(row, ("constrained", "free"), strict=False):
             mine = {key[2]: values for key, values in grouped.items() if key[:2] == (graph, world)}
             _untried(axes, mine)
             axes.set_title(f"{TITLES[graph]}, {world}", fontsize=10)
         _states(row[2], {key[2]: values for key, values in grouped.items() if key[:2] == (graph, "constrained")})
         row[2].set_title("states seen early, constrained", fontsize=10)
+        _detours(row[3], {key[1:]: values for key, values in grouped.items() if key[0] == graph})
         row[0].legend(fontsize=7)
     drawing.savefig(path, dpi=150)
     return path
@@ -71,4 +73,21 @@ def _states(axes: Any, mine: Mapping[str, list[dict[str, Any]]]) -> None:
         axes.plot(times, seen.mean(axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
     axes.axvline(EARLY, color="k", linestyle=":", linewidth=0.8)
     axes.set(xlabel="transitions", ylabel="states seen, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
+    axes.grid(alpha=0.2)
+
+
+def _detours(axes: Any, mine: Mapping[tuple[str, str], list[dict[str, Any]]]) -> None:
+    """A dot a run: how much longer it took than the shortest walk."""
+    names = [name for name in COLORS if any(key[1] == name for key in mine)]
+    for shift, (world, marker) in zip((-0.12, 0.12), (("constrained", "o"), ("free", "^")), strict=True):
+        for place, name in enumerate(names):
+            values = mine.get((world, name), [])
+            detours = 100.0 * np.maximum(covered(values) / [one["floor"] for one in values] - 1.0, LEAST_DETOUR)
+            label = world if place == 0 else None
+            axes.plot(np.full(len(detours), place + shift), detours, marker, color=COLORS[name], markersize=4.0, alpha=0.6, label=label)
+    axes.set_yscale("log")
+    axes.set_yticks(ticks := (0.1, 1, 10, 100, 1000), [f"{tick:g} %" for tick in ticks])
+    axes.set_xticks(range(len(names)), ["\n".join(LABELS[name].rsplit(" ", 1)) for name in names], fontsize=7)
+    axes.set_title("longer than the postman's walk", fontsize=10)
+    axes.legend(fontsize=7)
     axes.grid(alpha=0.2)

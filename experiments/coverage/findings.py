@@ -104,8 +104,8 @@ def _claims(published: Mapping[tuple[str, str], list[dict[str, Any]]]) -> list[C
     claims += [_best(times, published), _novel(published), _aggressive(published)]
     for world, claim in FLOOR.items():
         shares = times[world, "curious"] / [one["floor"] for one in published[world, "curious"]]
-        mean = interquartile_mean(shares)
-        claims.append(claim.measured(_number(mean, *interval(shares), digits=3), mean <= FLOORS[world]))
+        low, high = interval(shares)
+        claims.append(claim.measured(_number(interquartile_mean(shares), low, high, digits=3), _at_most(FLOORS[world], [(low, high)])))
     return [*claims, _depletes(times)]
 
 
@@ -142,7 +142,14 @@ def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
     if not shares:
         return DEPLETES
     text = ", ".join(f"{_number(*share, digits=3)} {world}" for share, world in zip(shares, FLOORS, strict=True))
-    return DEPLETES.measured(text, all(share[0] <= 1.0 + SLACK for share in shares))
+    return DEPLETES.measured(text, _at_most(1.0 + SLACK, [(low, high) for _, low, high in shares]))
+
+
+def _at_most(bound: float, intervals: list[tuple[float, float]]) -> bool | None:
+    """Whether all are below the bound, or one is above it; None where an interval does not decide."""
+    if all(high <= bound for _, high in intervals):
+        return True
+    return False if any(low > bound for low, _ in intervals) else None
 
 
 def _number(value: float, low: float, high: float, digits: int = 2) -> str:
