@@ -19,6 +19,7 @@ MODULES = (
     "mobee.simulation.noise",
     "mobee.simulation.drive",
     "mobee.simulation.loop",
+    "mobee.simulation.braking",
     "mobee.learning.sweeps",
     "mobee.learning.gains",
     "mobee.engine.evaluate",

@@ -11,6 +11,7 @@ from types import ModuleType
 class Compiled:
     """The modules."""
 
+    braking: ModuleType
     drive: ModuleType
     loop: ModuleType
     noise: ModuleType
@@ -22,6 +23,6 @@ def compiled() -> Compiled:
     from mobee.engine.load import load
 
     load()
-    from mobee.simulation import drive, loop, noise
+    from mobee.simulation import braking, drive, loop, noise
 
-    return Compiled(drive, loop, noise)
+    return Compiled(braking, drive, loop, noise)
