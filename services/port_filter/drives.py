@@ -40,7 +40,12 @@ class DriveDesk:
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
     def rest(self, part: str) -> None:
-        """Have robot_sim hold the part: its owner must arm it again; without an owner anybody may take it."""
+        """Have robot_sim hold the part: its owner must arm it again; without an owner anybody may take it.
+
+        One that is dead need not be waited for: it comes back in hold, owned by nobody.
+        """
+        if not self._service.alive.get("robot_sim"):
+            return
         try:
             self._call(part, "hold" if self._owners[part] else "release")
         except CallFailed as failed:
