@@ -25,6 +25,7 @@ class Entry:
 
 
 _PICTURES = 10  # nice value of whatever may come late
+_PLANS = 5  # of who plans: the control chain must not wait for a thought
 
 _ENTRIES = {
     "robot_sim": Entry(
@@ -74,7 +75,14 @@ def entry_of(who: str, module: str | None) -> Entry | None:
     """The entry of a service; `module`: another program in its place, or one that is not shipped.  None: nobody knows it."""
     entry = _ENTRIES.get(who)
     if who.startswith(AGENT):
-        entry = Entry("services.agents", "services.agents.config:Config", 3, after=("controller",), given={"part": who.removeprefix(AGENT)})
+        entry = Entry(
+            "services.agents",
+            "services.agents.config:Config",
+            3,
+            after=("controller",),
+            nice=_PLANS,
+            given={"part": who.removeprefix(AGENT)},
+        )
     if module is None:
         return entry
     place = entry or Entry("", "", 3, after=("controller",))

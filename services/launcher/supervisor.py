@@ -21,7 +21,8 @@ LOOK = 0.05  # s between looks at the processes
 POLL = 0.5  # s between questions
 ANSWER = 1.0  # s within which a service answers
 UNANSWERED = 2  # questions in a row, then it counts as frozen
-FROZEN, FROZEN_LATE = 2.0, 10.0  # s without an answer; the latter for what yields to others, and so is slow where they are busy
+FROZEN, FROZEN_LATE = 2.0, 10.0  # s without an answer; the latter for what yields to all others, and so is slow where they are busy
+PICTURES = 10  # niceness from which that is so
 READY = 60.0  # s from its start until a service is ready
 FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before a restart: doubled with every failure
 RESTARTS, WINDOW = 5, 60.0  # so many in so many s, then it is given up
@@ -107,7 +108,7 @@ class Supervisor:
 
     def _is_frozen(self, child: Child, now: float) -> bool:
         """Both, since a call to a process whose connection was dropped fails at once, and the launcher itself may have been stopped."""
-        limit = max(FROZEN_LATE if child.program.nice else FROZEN, child.program.patience)
+        limit = max(FROZEN_LATE if child.program.nice >= PICTURES else FROZEN, child.program.patience)
         return child.unanswered >= UNANSWERED and now - child.answered_at >= limit
 
     def ask(self, child: Child) -> None:
