@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 
 CLOCK = "clock"
+TICK = "tick"
+COMMANDS = "commands"
 ESTOP = "estop"
 ESTOP_RESET = "estop/rpc/reset"
 MODEL_FORCES = "model/forces"
@@ -34,12 +36,12 @@ def chunk(name: str) -> str:
 
 
 def state(part: str) -> str:
-    """Motor state of a part: robot_sim to all."""
+    """Motor state of a part at its own sampling time: robot_sim to whoever listens."""
     return f"{chunk(part)}/state"
 
 
 def command(part: str) -> str:
-    """Motor command of a part: controller to robot_sim."""
+    """Motor command of one part: whoever drives a single part, to robot_sim; the controller sends COMMANDS."""
     return f"{chunk(part)}/cmd"
 
 

@@ -54,6 +54,7 @@ class StepDone(Message, frozen=True, kw_only=True):
     ok: bool = True  # False: it lacked something, so the run cannot be repeated
     busy: list[Name] = []  # of the controller: services with nothing to decide, every part that they own being under way
     last: bool = False  # it takes part no longer
+    including: list[Name] = []  # others whose answers to that tick it is formed of, so that they need not say so themselves
 
 
 class Turn(Message, frozen=True, kw_only=True):

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 import zenoh
 import zenoh.ext
-from zenoh.handlers import RingChannel
+from zenoh.handlers import Callback, RingChannel
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Event, Message
@@ -24,6 +24,7 @@ class Publisher(Generic[_M]):
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
+        self._is_heard: bool | None = None  # None: nobody asked yet
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
             "congestion_control": delivery.congestion,
@@ -55,7 +56,14 @@ class Publisher(Generic[_M]):
     @property
     def heard(self) -> bool:
         """Whether anybody subscribes: what is dear to make need not be made otherwise."""
-        return bool(self._publisher.matching_status.matching)
+        if self._is_heard is None:
+            self._publisher.declare_matching_listener(Callback(self._note_matching, indirect=False))
+            self._is_heard = bool(self._publisher.matching_status.matching)
+        return self._is_heard
+
+    def _note_matching(self, status: zenoh.MatchingStatus) -> None:
+        """On Zenoh's thread: to be told is much cheaper than to ask in every tick."""
+        self._is_heard = bool(status.matching)
 
 
 class Latest(Generic[_M]):

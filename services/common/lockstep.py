@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 
 from bus_schema import keys
+from bus_schema.chain import Answer
 from bus_schema.messages import StepDone, Turn
 from services.common.delivery import STEP
 from services.common.service import Service
@@ -26,17 +27,24 @@ class Participant:
         self._locked = service.keeps_step = service.locked
         self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
         if self._locked:
-            service.dawdle = self._dawdle
+            service.dawdle = self.dawdle
             self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
 
-    def done(self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False) -> None:
-        """All that this service has to say to tick k is put; see StepDone for the rest."""
+    def done(
+        self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), told: bool = False
+    ) -> None:
+        """All that this service has to say to tick k is put; see StepDone for the rest.
+
+        `told`: somebody else will say so, in whose answer this one is included.
+        """
         if not self._locked:
             return
-        self._dawdle()
-        self._done.put(re_k=k, ok=ok, busy=list(busy), last=last)
+        self.dawdle()
+        if not told:
+            self._done.put(re_k=k, ok=ok, busy=list(busy), last=last, including=list(including))
 
-    def _dawdle(self) -> None:
+    def dawdle(self) -> None:
+        """Be late, in tests that ask for it: before every answer."""
         if self._delay:
             time.sleep(random.uniform(0.0, self._delay))  # not seeded: it stands for the scheduler
 
@@ -64,15 +72,16 @@ class Barrier:
         self._service, self._tell, self._referee, self._patience = service, tell, referee, patience
         self._expected = set(participants)
         self._present: set[str] = set()
-        self._answers: dict[str, StepDone] = {}
+        self._answered: dict[str, int] = {}  # newest tick that each has answered
+        self._busy: Sequence[str] = ()  # of the referee's newest answer
         self._turns = {who: service.bus.publisher(keys.turn(who), Turn, STEP) for who in sorted(self._expected - {referee})}
-        service.on_each(keys.ALL_DONE, StepDone, self._note)
+        service.on_each(keys.ALL_DONE, StepDone, self._note_done)
         service.on_alive(self._note_alive)
 
     def begin(self) -> None:
         """A new run: everybody has to come anew."""
         self._present.clear()
-        self._answers.clear()
+        self._answered.clear()
 
     def absent(self) -> list[str]:
         """Who is expected and does not take part (yet)."""
@@ -80,11 +89,10 @@ class Barrier:
 
     def missing(self, k: int) -> list[str]:
         """Who must still answer tick k."""
-        waiting = [who for who in self._present if (answer := self._answers.get(who)) is None or answer.re_k < k]
-        if not waiting or self._referee in waiting:
-            return sorted(waiting)
-        referee = self._answers.get(self._referee)
-        return sorted(set(waiting) - set(referee.busy)) if referee is not None and referee.re_k == k else sorted(waiting)
+        waiting = {who for who in self._present if self._answered.get(who, -1) < k}
+        if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
+            waiting.difference_update(self._busy)
+        return sorted(waiting)
 
     def wait(self, k: int) -> list[str]:
         """Handle what comes until tick k is answered by all, or until those who have not are late: these are dropped, and named."""
@@ -106,21 +114,26 @@ class Barrier:
     def _give_turns(self, busy: Sequence[str]) -> None:
         k = self._service.bus.k
         for who, turn in self._turns.items():
-            answer = self._answers.get(who)
-            if k == 0 or (who not in busy and (answer is None or answer.re_k < k)):
+            if k == 0 or (who not in busy and self._answered.get(who, -1) < k):
                 turn.put(dt=self._service.bus.dt)
 
-    def _note(self, done: StepDone) -> None:
-        self._answers[done.src] = done
+    def note(self, who: str, re_k: int, answer: Answer) -> None:
+        """Somebody has answered tick re_k, and with that those whose answers are included."""
+        for one in (who, *answer.including):
+            self._answered[one] = re_k
+            self._present.add(one)
+        if who == self._referee and re_k == self._service.bus.k:
+            self._busy = answer.busy
+            self._give_turns(answer.busy)
+        if not answer.ok:
+            self._tell(who, f"lacked something at tick {re_k}")
+
+    def _note_done(self, done: StepDone) -> None:
         if done.last:
             self._present.discard(done.src)
             self._expected.discard(done.src)
-            return
-        self._present.add(done.src)
-        if done.src == self._referee and done.re_k == self._service.bus.k:
-            self._give_turns(done.busy)
-        if not done.ok:
-            self._tell(done.src, f"lacked something at tick {done.re_k}")
+        else:
+            self.note(done.src, done.re_k, Answer(done.ok, done.busy, done.including))
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         if not up and not self._service.alive.get(who):

@@ -18,6 +18,7 @@ import zenoh.ext
 from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
+from bus_schema.chain import Tick
 from bus_schema.messages import Clock, Message, Turn
 from bus_schema.rpc import Config, Done, Empty, Failure, Reply, Request, Stat
 from mobee.errors import MobeeError
@@ -32,7 +33,7 @@ from services.common.session import LEASE, open_client, spare_threads
 _M = TypeVar("_M", bound=Message)
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
-_T = TypeVar("_T", Clock, Turn)
+_T = TypeVar("_T", Clock, Tick, Turn)
 
 ORPHANED = 10.0  # s without a router after which a service ends
 REMEMBERED = 256  # replies kept, so that a repeated call is harmless
@@ -56,8 +57,12 @@ class Service:
         robot: Robot | None = None,
         session: zenoh.Session | None = None,
         inbox: Inbox | None = None,
+        prompt: bool = False,
     ) -> None:
-        """`session` and `inbox`: its own unless they are given; two services of one process share an inbox."""
+        """`session` and `inbox`: its own unless they are given; two services of one process share an inbox.
+
+        `prompt`: every tick waits for it, and it never computes for long, so that Zenoh's own thread may put into its inbox.
+        """
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
@@ -67,6 +72,7 @@ class Service:
         lease = config.patience if config.mode == "lock" else LEASE
         session = session or open_client(config.endpoint, namespace=config.namespace, lease=lease)
         self.inbox = inbox or Inbox()
+        self._direct = prompt or config.mode == "lock"
         try:
             self._begin(session, robot)
         except BaseException:
@@ -161,12 +167,23 @@ class Service:
         return offer
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
-        """Each subscriber has a thread of its own, which in lockstep would mix up what one service put on two keys."""
-        self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self.locked else offer))
+        """Each subscriber has a thread of its own, which costs time and in lockstep would mix up what one service put on two keys."""
+        self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
         self._on_time(keys.CLOCK, Clock, handler)
+
+    def on_tick(self, handler: Callable[[Tick], None]) -> None:
+        """As on_clock, for who computes on the body: every tick comes with the newest state of every part."""
+
+        def whole(tick: Tick) -> None:
+            if tick.parts.keys() == self.bus.part_sizes.keys():
+                handler(tick)
+            else:
+                self.bus.reject("part", f"Tick of {', '.join(tick.parts)}: this robot has {', '.join(self.bus.part_sizes)}")
+
+        self._on_time(keys.TICK, Tick, whole)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
         """Lockstep, instead of `on_clock`: have only those ticks handled that wait for this service."""

@@ -17,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "services.controller")
     with explained("services.controller"):
         robot = load_robot(config.robot)
-        with Service("controller", config, robot) as service:
+        with Service("controller", config, robot, prompt=True) as service:
             ControllerNode(service, config, robot)
             service.ready()
             service.run()

@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable
 
 from bus_schema import keys
-from bus_schema.messages import EStop, State
+from bus_schema.chain import PartStatus
+from bus_schema.messages import EStop
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed
@@ -39,7 +40,7 @@ class Drives:
     def _now(self) -> float:
         return self._service.bus.t * 1e-9 if self._service.locked else time.monotonic()
 
-    def armed(self, part: str, state: State) -> bool:
+    def armed(self, part: str, state: PartStatus) -> bool:
         """Whether the part does what this controller commands, as of its newest state; or will have, if it was armed just now."""
         if self.epochs[part] == 0:
             return False
@@ -58,11 +59,11 @@ class Drives:
         """An emergency stop, or its reset: between them nothing is armed."""
         self._stopped = message.set
 
-    def can_arm(self, state: State) -> bool:
+    def can_arm(self, state: PartStatus) -> bool:
         """Whether a part in that state may be taken and armed."""
         return not self._stopped and state.gate in ("idle", "hold", "armed")
 
-    def try_arm(self, part: str, state: State) -> None:
+    def try_arm(self, part: str, state: PartStatus) -> None:
         """Begin to take and arm a part that is idle or in hold; `armed` says when it is done."""
         now = self._now()
         if not self.can_arm(state) or now < self._next_try[part] or part in self._asking:

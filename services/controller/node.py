@@ -7,15 +7,15 @@ import time
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Command, EStop, Motion
+from bus_schema.chain import Answer, Commands, Order, Tick
+from bus_schema.messages import EStop, Mode, Motion
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
 from mobee.control.checked import LARGEST_FORCE
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Robot
-from services.common.body import Body
+from mobee.robot.robot import Array, Robot
 from services.common.figures import Percentiles
 from services.common.fingerprint import robot_hash
 from services.common.inbox import CROWDED_WITH_STOPS
@@ -30,6 +30,7 @@ from services.controller.goals import GoalDesk
 BAD_INPUT = 2  # exit code: the same again would not help
 OLDEST = 3  # ticks: with forces older than that the robot holds
 SOMETIMES = 10  # ticks: so often a part under way tells of its motion in lockstep
+NEWS = 0.01  # s of real time: so often every part tells of its motion in free mode, and of a change at once
 STALE = 100_000_000  # ns: a part whose state is older than that is not under control
 
 
@@ -42,16 +43,18 @@ class ControllerNode:
         self._law = Controller(Model(robot), gains, config.modality, speed_scale=config.speed_scale)
         self._actions = {part: Action(gains.settle) for part in robot.parts}
         self._drives = Drives(service, robot)
-        self._body = Body(service.bus, robot)
         self._forces: ForcesMessage | None = None
-        self._clock: Clock | None = None  # of the tick that still waits for its forces
+        self._acting: Forces  # the same as vectors
+        self._q: Array = robot.home  # measured, at the newest tick
+        self._where = {name: part.slice for name, part in robot.parts.items()}
+        self._tick: Tick | None = None  # that still waits for its forces
         self._last_k = -1
         bus = service.bus
-        self._commands = {part: bus.publisher(keys.command(part), Command, bus.control) for part in robot.parts}
+        self._commands = bus.publisher(keys.COMMANDS, Commands, bus.control)
         self._motions = {part: bus.publisher(keys.motion(part), Motion, bus.control) for part in robot.parts}
         self._step_to_answer: tuple[int, bool] | None = None  # lockstep: tick, whether nothing was lacking
         self._participant = Participant(service)
-        self._told: dict[str, tuple[str, Owner | None]] = {}  # lockstep: of each part's last motion message
+        self._told: dict[str, tuple[str, Owner | None]] = {}  # of each part's last motion message
         self._drives.answered = self._answer
         self._jitter = Percentiles()  # ms, of the time between two steps
         self._mark()
@@ -61,7 +64,7 @@ class ControllerNode:
         service.on_run(self._new_run)
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
         service.on_each(keys.ESTOP, EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
-        service.on_clock(self._tick)
+        service.on_tick(self._begin)
         if service.locked:
             service.on_alive(self._note_alive)
 
@@ -75,34 +78,33 @@ class ControllerNode:
                 if not lower <= q <= upper:
                     raise InvalidValue(f"posture of {part}: {motor} at {q:g} rad, its range is {lower:.4f} to {upper:.4f}")
 
-    def _tick(self, clock: Clock) -> None:
-        if clock.mode == "paused":
+    def _begin(self, tick: Tick) -> None:
+        if tick.mode == "paused":
             return
-        if clock.dt / 1e9 >= self._law.max_dt:
-            self._service.bus.reject("rate", f"ticks of {clock.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
+        if tick.dt / 1e9 >= self._law.max_dt:
+            self._service.bus.reject("rate", f"ticks of {tick.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
             return
-        self._clock, self._step_to_answer = clock, None
-        if self._forces is not None and self._forces.re_k >= clock.k:
+        self._tick, self._step_to_answer = tick, None
+        if self._forces is not None and self._forces.re_k >= tick.k:
             self._step()
-            return
-        if clock.mode == "lock":
-            self._body.update()  # while the model computes
+        elif tick.mode == "lock":
             self._go_without_model()
-            return
-        k = clock.k
-        self._service.inbox.at(time.monotonic() + 0.5e-9 * clock.dt / clock.rate, lambda: self._wait_is_over(k))
+        else:
+            k = tick.k
+            self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
-        if max(map(abs, (*forces.limits, *forces.constraints, *forces.collision)), default=0.0) > LARGEST_FORCE / 3:
+        acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
+        if max(np.abs(force).max(initial=0.0) for force in (acting.limits, acting.constraints, acting.collision)) > LARGEST_FORCE / 3:
             self._service.bus.reject("value", f"forces of tick {forces.re_k}: larger than any law makes them")
             return
-        self._forces = forces
-        if self._clock is not None and forces.re_k >= self._clock.k:
+        self._forces, self._acting = forces, acting
+        if self._tick is not None and forces.re_k >= self._tick.k:
             self._step()
 
     def _go_without_model(self) -> None:
         """Lockstep: a tick waits for its forces as long as there is somebody to send them."""
-        if self._clock is not None and not self._service.alive.get("model"):
+        if self._tick is not None and not self._service.alive.get("model"):
             self._forces = None
             self._step()
 
@@ -111,32 +113,32 @@ class ControllerNode:
             self._go_without_model()
 
     def _wait_is_over(self, k: int) -> None:
-        if self._clock is not None and self._clock.k == k:
+        if self._tick is not None and self._tick.k == k:
             self._late_forces += 1
             self._step()
 
     def _step(self) -> None:
-        clock, self._clock = self._clock, None
-        if clock is None or not self._body.update():
+        tick, self._tick = self._tick, None
+        if tick is None:
             return
-        fresh = self._forces is not None and self._are_fresh(self._forces, clock.k)
-        self._supervise(clock, fresh)
-        if clock.k > 0:
-            self._control(clock, fresh)
-        self._publish_motion(clock)
-        if clock.mode == "lock" and (clock.k > 0 or (fresh and self._has_begun())):
-            self._step_to_answer = clock.k, fresh
-            self._answer()
-
-    def _control(self, clock: Clock, fresh: bool) -> None:
-        gap, self._last_k = max(clock.k - self._last_k, 1) if self._last_k >= 0 else 1, clock.k
-        self._long_gaps += gap > OLDEST
-        self._watch_period(gap * clock.dt / 1e9 / clock.rate)
-        if fresh and self._forces is not None:
-            self._advance(clock, min(gap, OLDEST), self._forces)
+        self._q = np.array(tick.q)
+        fresh = self._forces is not None and self._are_fresh(self._forces, tick.k)
+        self._supervise(tick, fresh)
+        orders, reference = self._control(tick, fresh) if tick.k > 0 else ({}, self._q)
+        if tick.mode == "lock":
+            self._tell_motion(tick)  # who hears that it is its turn must have heard where its action stands
+            self._close(tick, fresh, orders, reference)
         else:
-            self._starve(clock.k)
+            self._command(tick.k, orders, reference)
+            self._tell_motion(tick)
+
+    def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
+        """What becomes of each part in this tick."""
+        gap, self._last_k = max(tick.k - self._last_k, 1) if self._last_k >= 0 else 1, tick.k
+        self._long_gaps += gap > OLDEST
+        self._watch_period(gap * tick.dt / 1e9 / tick.rate)
         self._ticks += 1
+        return self._advance(tick, min(gap, OLDEST)) if fresh else (self._starve(tick), self._q)
 
     def _watch_period(self, due: float) -> None:
         """How far from due [s] after the tick before this one comes; in lockstep none is due."""
@@ -144,88 +146,109 @@ class ControllerNode:
         if before > 0.0 and not self._service.locked:
             self._jitter.add(abs(self._stepped_at - before - due) * 1e3)
 
-    def _has_begun(self) -> bool:
+    def _close(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
+        """Lockstep: command, and answer the tick in the same message unless a part is being armed; tick 0 when all has begun."""
+        if tick.k == 0 and not (fresh and self._has_begun(tick)):
+            return
+        including = [self._forces.src] if self._forces is not None and self._forces.re_k == tick.k else []
+        self._step_to_answer = tick.k, Answer(fresh, busy_owners(self._actions.values()), including)
+        if tick.k == 0 or not orders or self._drives.asking:
+            self._command(tick.k, orders, reference)
+            self._answer()
+            return
+        self._participant.dawdle()
+        self._command(tick.k, orders, reference, self._step_to_answer[1])
+        self._step_to_answer = None
+
+    def _has_begun(self, tick: Tick) -> bool:
         """Lockstep, tick 0: whether all is under control that can be, and somebody hears the commands."""
-        ready = (self._drives.armed(part, state) or not self._drives.can_arm(state) for part, state in self._body.states.items())
-        return all(ready) and all(stream.heard for stream in self._commands.values())
+        ready = (self._drives.armed(part, state) or not self._drives.can_arm(state) for part, state in tick.parts.items())
+        return all(ready) and self._commands.heard
 
     def _answer(self) -> None:
         """Lockstep: the tick is answered when no part is being armed any more."""
         if self._step_to_answer is not None and not self._drives.asking:
-            k, ok = self._step_to_answer
+            k, answer = self._step_to_answer
             self._step_to_answer = None
-            self._participant.done(k, ok=ok, busy=busy_owners(self._actions.values()))
+            busy = busy_owners(self._actions.values())
+            self._participant.done(k, ok=answer.ok, busy=busy, including=answer.including)
 
     def _are_fresh(self, forces: ForcesMessage, k: int) -> bool:
         """Whether they answer a tick near k, and were formed of states of all parts near that tick: a contact concerns many."""
-        return abs(k - forces.re_k) <= OLDEST and all(forces.part_age.get(part, STALE + 1) <= STALE for part in self._robot.parts)
+        return abs(k - forces.re_k) <= OLDEST and all(forces.part_age.get(part, STALE + 1) <= STALE for part in self._where)
 
-    def _supervise(self, clock: Clock, fresh: bool) -> None:
+    def _supervise(self, tick: Tick, fresh: bool) -> None:
         """Arm what can be armed; what is not under control has no action and rests where it is."""
         for part, action in self._actions.items():
-            state = self._body.states[part]
-            lacking = "no fresh forces" if not fresh else "no fresh state" if clock.t - state.t > STALE else ""
+            state = tick.parts[part]
+            lacking = "no fresh forces" if not fresh else "no fresh state" if tick.t - state.t > STALE else ""
             if lacking or not self._drives.armed(part, state):
                 if not lacking:
                     self._drives.try_arm(part, state)
                 if action.status != "held":
-                    self._held(part, clock.k, lacking or f"gate {state.gate}")
-                self._law.rest(part, np.array(state.q))
+                    self._held(part, tick.k, lacking or f"gate {state.gate}")
+                self._law.rest(part, self._q[self._where[part]])
                 self._held_ticks += 1
             elif action.status == "held":
-                self._law.rest(part, np.array(state.q))
+                self._law.rest(part, self._q[self._where[part]])
                 self._seek_posture(part)
-                action.resume(clock.k)
+                action.resume(tick.k)
 
-    def _advance(self, clock: Clock, ticks: int, forces: ForcesMessage) -> None:
+    def _advance(self, tick: Tick, ticks: int) -> tuple[dict[str, Order], Array]:
         """Step the law over the ticks that have passed, and command what is armed."""
-        acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
-        q = self._body.q()
         for _ in range(ticks):
-            command = self._law.step(q, clock.dt / 1e9, acting)
-        reference = getattr(command, self._config.modality)
+            command = self._law.step(self._q, tick.dt / 1e9, self._acting)
+        modality: Mode = self._config.modality
         velocity, acceleration = self._law.velocity, self._law.acceleration
+        orders = {}
         for part, action in self._actions.items():
             if action.status != "held":
-                where = self._robot.part(part).slice
-                self._send(part, clock.k, self._config.modality, reference[where].tolist())
-                action.look(clock.k, clock.t * 1e-9, velocity[where], acceleration[where])
+                where = self._where[part]
+                orders[part] = Order(self._drives.epochs[part], modality)
+                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where])
+        return orders, getattr(command, modality)
 
-    def _starve(self, k: int) -> None:
+    def _starve(self, tick: Tick) -> dict[str, Order]:
         """No forces, no motion: tell every part that still obeys to hold."""
-        for part, state in self._body.states.items():
-            if self._drives.armed(part, state):
-                self._send(part, k, "hold", [0.0] * len(state.q))
+        return {part: Order(self._drives.epochs[part], "hold") for part, state in tick.parts.items() if self._drives.armed(part, state)}
 
-    def _send(self, part: str, k: int, mode: str, reference: list[float]) -> None:
-        self._commands[part].put(epoch=self._drives.epochs[part], re_k=k, mode=mode, ref=reference, ttl=self._config.ttl)
+    def _command(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
+        if orders:
+            self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._config.ttl, answer=answer)
 
-    def _publish_motion(self, clock: Clock) -> None:
+    def _tell_motion(self, tick: Tick) -> None:
+        """Where the actions stand, of those of which that is not known."""
+        parts = [part for part in self._actions if not self._goes_without_saying(part, tick)]
+        if not parts:
+            return
         touched = self._forces.touched if self._forces is not None else {}
-        for part, action in self._actions.items():
-            if clock.mode == "lock" and self._goes_without_saying(part, clock.k):
-                continue
-            where = self._robot.part(part).slice
+        velocity, acceleration, attractor = self._law.velocity, self._law.acceleration, self._law.attractor
+        for part in parts:
+            action, where = self._actions[part], self._where[part]
             self._motions[part].put(
-                k=clock.k,
-                t=clock.t,
+                k=tick.k,
+                t=tick.t,
                 action_id=action.id,
                 epoch=action.owner.epoch if action.owner is not None else 0,
                 status=action.status,
                 since_k=action.since_k,
                 start_k=action.start_k,
-                q=self._body.states[part].q,
-                dq=self._law.velocity[where].tolist(),
-                ddq=self._law.acceleration[where].tolist(),
-                goal=self._law.attractor[where].tolist(),
+                q=self._q[where].tolist(),
+                dq=velocity[where].tolist(),
+                ddq=acceleration[where].tolist(),
+                goal=attractor[where].tolist(),
                 touched=touched.get(part, []),
             )
 
-    def _goes_without_saying(self, part: str, k: int) -> bool:
-        """Lockstep: whether the part is under way as it was, which is told only now and then."""
-        action = self._actions[part]
+    def _goes_without_saying(self, part: str, tick: Tick) -> bool:
+        """Whether the part is under way as it was, or in free mode goes on in any way, which is told only now and then."""
+        action, k = self._actions[part], tick.k
         known, self._told[part] = self._told.get(part), (action.id, action.owner)
-        return action.status == "moving" and known == self._told[part] and action.since_k < k and k % SOMETIMES > 0
+        if known != self._told[part] or action.since_k >= k:
+            return False
+        if tick.mode == "lock":
+            return action.status == "moving" and k % SOMETIMES > 0
+        return k % max(1, round(1e9 * NEWS * tick.rate / tick.dt)) > 0
 
     def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)
@@ -234,8 +257,8 @@ class ControllerNode:
 
     def _stay(self, part: str) -> None:
         """Its owner is gone: brake and stay where it is, or go to its posture if one is given."""
-        if part in self._body.states:
-            self._law.hold(part, np.array(self._body.states[part].q))
+        if self._last_k >= 0:
+            self._law.hold(part, self._q[self._where[part]])
             self._seek_posture(part)
 
     def _seek_posture(self, part: str) -> None:
@@ -254,9 +277,8 @@ class ControllerNode:
 
     def _new_run(self) -> None:
         self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare)
-        self._body.forget()
         self._drives.forget()
-        self._forces, self._clock, self._last_k, self._step_to_answer = None, None, -1, None
+        self._forces, self._tick, self._last_k, self._step_to_answer = None, None, -1, None
         self._law.reset(self._robot.home)
         for part, action in self._actions.items():
             action.hold(self._service.bus.k)

@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     with explained("services.model"):
         load_engine()  # before the bus hears of it: compiled anew, it takes half a minute
         robot = load_robot(config.robot)
-        with Service("model", config, robot) as service:
+        with Service("model", config, robot, prompt=True) as service:
             ModelNode(service, config, robot)
             service.ready()
             service.run()

@@ -7,7 +7,8 @@ import time
 import numpy as np
 
 from bus_schema import VERSION, keys
-from bus_schema.messages import Clock, ContactItem, Contacts, Forces, MarkerPose, Pose
+from bus_schema.chain import Tick
+from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model, load_world
 from mobee.collision.contact import Contact
@@ -17,7 +18,6 @@ from mobee.errors import MobeeError
 from mobee.kinematics.quaternion import from_matrix
 from mobee.model import Pose as ModelPose
 from mobee.robot.robot import Array, Robot
-from services.common.body import Body
 from services.common.delivery import LATEST
 from services.common.figures import Percentiles
 from services.common.lockstep import Participant
@@ -37,7 +37,6 @@ class ModelNode:
                 self._model.world.remove(name)
         self._track = self._model.track()
         self._gains = Gains.named(config.gains)
-        self._body = Body(service.bus, robot)
         self._q: Array = robot.home
         self._desk = WorldDesk(service, self._model)
         bus = service.bus
@@ -51,35 +50,32 @@ class ModelNode:
         service.mark, service.describe = self._mark, self._describe
         service.on_request(keys.MODEL_JACOBIAN, JacobianAt, lambda r, _: self._jacobian(r))
         service.on_run(self._new_run)
-        service.on_clock(self._tick)
+        service.on_tick(self._tick)
         constraint_forces(self._desk.pose, self._gains, config.propagate)  # what is built once is built before the robot moves
 
     def _new_run(self) -> None:
-        self._body.forget()
         self._desk.forget()
         self._last_k = -1
 
-    def _tick(self, clock: Clock) -> None:
-        if not self._body.update():
-            return
+    def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
-        self._desk.expire(clock.t)
-        self._q = self._body.q()
+        self._desk.expire(tick.t)
+        self._q = np.array(tick.q)
         pose = self._desk.pose = self._track.evaluate(self._q)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         touching = {part: list(names) for part, names in touched(pose).items() if names}
         self._forces.put(
-            re_k=clock.k,
+            re_k=tick.k,
             limits=forces.limits.tolist(),
             constraints=forces.constraints.tolist(),
             collision=forces.collision.tolist(),
-            part_age=self._body.ages(clock.t),
+            part_age={part: tick.t - status.t for part, status in tick.parts.items()},
             touched=touching,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
-        self._participant.done(clock.k)
-        self._publish_pose(clock.k, pose)
-        self._count(clock.k, pose, touching)
+        self._participant.done(tick.k, told=tick.k > 0 and bool(self._service.alive.get("controller")))
+        self._publish_pose(tick.k, pose)
+        self._count(tick.k, pose, touching)
 
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
         """What is dear to make is made only if somebody listens."""

@@ -11,7 +11,7 @@ from services.common.bus import Bus
 REMEMBERED = 1000  # commands under way, at most
 
 
-class Commands:
+class Stream:
     """One stream with one numbering, and which number of the client's is behind each."""
 
     def __init__(self, bus: Bus, part: str) -> None:

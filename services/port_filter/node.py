@@ -1,10 +1,11 @@
-"""The port filter's tick: states through, judgement, clock through, and the reflex's commands when the clients are cut off."""
+"""The port filter's tick: states through, judgement, tick through, and the reflex's commands when the clients are cut off."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bus_schema import VERSION, keys
+from bus_schema.chain import Tick
 from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty
 from mobee.robot.robot import Array, Robot
@@ -15,8 +16,6 @@ from services.port_filter.drives import DriveDesk
 from services.port_filter.passage import Passage
 from services.port_filter.switch import Switch
 from services.port_filter.twin import HandThrough
-
-STALE = 100_000_000  # ns: a part whose state is older cannot be judged
 
 
 class FilterNode:
@@ -40,6 +39,7 @@ class FilterNode:
             lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"),
             patience=config.patience,
         )
+        self._passage.answered = lambda commands, answer: self._barrier.note(commands.src, commands.re_k, answer)
         self._declare()
 
     def _declare(self) -> None:
@@ -48,7 +48,7 @@ class FilterNode:
         twin.describe = self._describe
         twin.on_request(keys.waypoint("*"), Empty, self._waypoint, part_of_key=True)
         service.on_run(self._new_run)
-        service.on_clock(self._tick)
+        service.on_tick(self._tick)
 
     def _why_cut(self) -> str:
         """Why the clients are cut off; "" when they are not."""
@@ -57,22 +57,24 @@ class FilterNode:
             return f"{self._where()}, and there is no way back; if this pose is safe, say so by the call rpc/waypoint of any part"
         return "" if state == "forward" else f"the reflex takes the robot back ({state}); wait, then arm again"
 
-    def _tick(self, clock: Clock) -> None:
+    def _tick(self, tick: Tick) -> None:
         twin = self._twin.bus
         if self._is_waiting:
             return  # robot_sim went on without its late participants
-        twin.run, twin.k, twin.t, twin.dt = clock.run, clock.k, clock.t, clock.dt
-        if clock.mode != "paused" and clock.k != self._last_k and self._passage.is_complete:
+        twin.run, twin.k, twin.t, twin.dt = tick.run, tick.k, tick.t, tick.dt
+        self._passage.note(tick)
+        if tick.mode != "paused" and tick.k != self._last_k:
             if self._last_k < 0:
-                self._switch.restart(clock.dt * 1e-9)
-            self._last_k = clock.k
-            self._judge(clock)
-        self._clock.put(dt=clock.dt, mode=clock.mode, rate=clock.rate)
-        if clock.mode == "lock":
-            self._answer(clock.k)
+                self._switch.restart(tick.dt * 1e-9)
+            self._last_k = tick.k
+            self._judge(tick)
+        self._passage.pass_on(tick)
+        if self._clock.heard:
+            self._clock.put(dt=tick.dt, mode=tick.mode, rate=tick.rate)
+        if tick.mode == "lock":
+            self._answer(tick.k)
 
-    def _judge(self, clock: Clock) -> None:
-        self._passage.is_stale = clock.t - min(state.t for state in self._passage.states.values()) > STALE
+    def _judge(self, tick: Tick) -> None:
         if self._passage.is_stale:
             return
         reflex = self._switch.reflex
@@ -87,7 +89,7 @@ class FilterNode:
         if before != "forward" and reflex.state == "forward":
             self._hand_back()
         if target is not None and reflex.state != "stuck":
-            self._command(clock.k, target, moving=reflex.state != "brake")
+            self._command(tick.k, target, moving=reflex.state != "brake")
 
     def _command(self, k: int, target: Array, moving: bool) -> None:
         for part in self._driven:

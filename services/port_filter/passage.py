@@ -7,11 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from bus_schema import keys
+from bus_schema.chain import Answer, Commands, PartStatus, Tick
 from bus_schema.messages import Command, State
 from mobee.robot.robot import Array, Robot
 from services.common.service import Service
-from services.port_filter.commands import Commands
+from services.port_filter.commands import Stream
 from services.port_filter.moves import Moves
+
+STALE = 100_000_000  # ns: a part whose state is older cannot be judged
 
 
 class Passage:
@@ -23,32 +26,38 @@ class Passage:
         """`epochs`: the drive epoch of each part; `why_cut` as for DriveDesk; `mark` is called when a position move begins."""
         self._service, self._twin, self._robot = service, twin, robot
         self._epochs, self._why_cut, self._mark = epochs, why_cut, mark
-        self.states: dict[str, State] = {}
+        self._parts: dict[str, PartStatus] = {}
+        self._q: Array = robot.home
+        self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
         self.is_stale = False  # the states are too old to be judged, so that no command may follow them
-        self.commands = {part: Commands(service.bus, part) for part in robot.parts}
+        self.commands = {part: Stream(service.bus, part) for part in robot.parts}
         self._moves = {part: Moves() for part in robot.parts}
         self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
         self._streams = {part: twin.bus.publisher(keys.state(part), State, twin.bus.control) for part in robot.parts}
+        self._tick = twin.bus.publisher(keys.TICK, Tick, twin.bus.control)
+        twin.on_newest(keys.COMMANDS, Commands, self._down_all)
         for part in robot.parts:
             twin.on_newest(keys.command(part), Command, lambda command, part=part: self._down(part, command), part=part)
             service.on_newest(keys.state(part), State, lambda state, part=part: self._up(part, state), part=part)
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether every part has reported in this run."""
-        return len(self.states) == len(self._robot.parts)
+    def note(self, tick: Tick) -> None:
+        """A tick begins, with the body as it is."""
+        self._parts, self._q = tick.parts, np.array(tick.q)
+        self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > STALE
+
+    def pass_on(self, tick: Tick) -> None:
+        """Tell the clients of it."""
+        parts = {part: self._as_told(part, state) for part, state in tick.parts.items()}
+        self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
     def q(self) -> Array:
-        """Motor positions as the encoders say, (n,) rad; only when it is complete."""
-        q = np.empty(len(self._robot.motors))
-        for name, part in self._robot.parts.items():
-            q[part.slice] = self.states[name].q
-        return q
+        """Motor positions as the encoders say, (n,) rad."""
+        return self._q
 
     def obeys(self, part: str) -> bool:
-        """Whether robot_sim does with the part what this filter commands, as of its newest state."""
-        state = self.states[part]
-        return state.gate == "armed" and state.epoch == self._epochs[part]
+        """Whether robot_sim does with the part what this filter commands, as of the newest tick."""
+        state = self._parts.get(part)
+        return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 
     def forget_moves(self) -> None:
         """The clients are cut off: what they command next is a new motion."""
@@ -57,7 +66,7 @@ class Passage:
 
     def forget(self) -> None:
         """A new run."""
-        self.states.clear()
+        self._parts = {}
         self.is_stale = False
         self._newest = dict.fromkeys(self._newest, (0, -1))
         self.forget_moves()
@@ -79,18 +88,43 @@ class Passage:
                 self._mark()
             self.commands[part].forward(command)
 
+    def _down_all(self, commands: Commands) -> None:
+        """A client's commands to several parts."""
+        for part, order in commands.parts.items():
+            if part not in self._robot.parts:
+                self._twin.bus.reject("part", f"Commands to {part}: this robot has {', '.join(self._robot.parts)}")
+                continue
+            fields = {name: getattr(commands, name) for name in ("v", "run", "src", "seq", "k", "t", "tw", "re_k", "ttl")}
+            one = Command(**fields, epoch=order.epoch, mode=order.mode, ref=commands.ref[self._robot.parts[part].slice])
+            self._down(part, one)
+        if commands.answer is not None:
+            self.answered(commands, commands.answer)
+
     def _up(self, part: str, state: State) -> None:
-        """The robot's state, as the client's own robot would be in: while it is cut off, in hold."""
-        self.states[part] = state
+        """The robot's state, as the client's own robot would be in."""
         self._twin.bus.run = self._service.bus.run
-        is_cut = state.gate == "armed" and bool(self._why_cut())
-        seq = -1 if is_cut else self.commands[part].theirs(state.cmd_seq)
+        told = self._as_told(part, state)
         self._streams[part].put(
             k=state.k,
             t=state.t,
             q=state.q,
             dq=state.dq,
             tau=state.tau,
+            mode=told.mode,
+            gate=told.gate,
+            faults=told.faults,
+            epoch=told.epoch,
+            cmd_seq=told.cmd_seq,
+            cmd_age=told.cmd_age,
+        )
+
+    def _as_told(self, part: str, state: State | PartStatus) -> PartStatus:
+        """How a client sees the part: while it is cut off, in hold."""
+        is_cut = state.gate == "armed" and bool(self._why_cut())
+        seq = -1 if is_cut else self.commands[part].theirs(state.cmd_seq)
+        return PartStatus(
+            k=state.k,
+            t=state.t,
             mode="hold" if is_cut else state.mode,
             gate="hold" if is_cut else state.gate,
             faults=state.faults,

@@ -19,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     with explained("services.robot_sim"):
         robot = load_robot(config.robot)
         backend = make_backend(config, robot)
-        with Service("robot_sim", config, robot) as service:
+        with Service("robot_sim", config, robot, prompt=True) as service:
             node = Node(service, config, robot, backend)
             service.ready()
             node.run()

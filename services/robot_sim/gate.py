@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from bus_schema import Refused
-from bus_schema.messages import Command, GateState, Mode
+from bus_schema.messages import GateState, Mode
 from mobee.robot.robot import Array
+from services.robot_sim.admission import Admission
 from services.robot_sim.limits import Limits
+from services.robot_sim.order import Order
 from services.robot_sim.shaper import Shaper
 
-MAX_AGE = 0.1  # s between the tick a command answers and the tick it arrives in
-MAX_TTL = 1000  # ms
 LOCKED_TTL = 3  # ticks after which a part holds in lockstep, where the clock on the wall means nothing
-MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
-START = math.radians(2.0)  # rad between the measured position and the first position commanded
-STEP = 2.0  # times the distance that full speed covers, by which a position reference may move
 
 Tell = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
@@ -39,8 +33,7 @@ HOLD = Drive("hold")
 class InForce:
     """An accepted command."""
 
-    command: Command
-    reference: Array
+    order: Order
     expires: int  # ns, monotonic clock
 
 
@@ -66,8 +59,8 @@ class Gate:
         self.mode: Mode = "hold"  # these three: as applied in the tick that runs
         self.seq = -1
         self.age = -1  # ticks
-        self._limits, self._dt = limits, dt
         self._tell = tell or (lambda code, text, values: None)
+        self._admission = Admission(part, limits, dt, ttl_ticks)
         self._shaper = Shaper(limits, dt)
         self._in_force: InForce | None = None
         self._newest_seq = -1
@@ -130,31 +123,26 @@ class Gate:
         if self.state not in ("fault", "estop"):
             self._enter("fault", why)
 
-    def admit(self, command: Command, k: int, now: int, q: Array) -> None:
-        """Put a command in force from the next tick on, or raise Refused with the reason.
+    def admit(self, order: Order, k: int, now: int, q: Array) -> None:
+        """Put an order in force from the next tick on, or raise Refused with the reason.
 
         `k`: the tick that runs; `now`: ns, monotonic clock; `q`: (n,) rad measured.
         """
         if self.state != "armed":
             raise Refused("not_armed", f"{self.part} is in {self.state}")
-        if command.epoch != self.epoch:
-            raise Refused("epoch", f"{self.part}: epoch {command.epoch}, in force is {self.epoch}")
-        if command.seq <= self._newest_seq:
-            raise Refused("seq", f"{self.part}: seq {command.seq} after {self._newest_seq}")
-        self._newest_seq = command.seq
-        reference = np.array(command.ref, dtype=np.float64)
-        if reference.shape != self._limits.lower.shape:
-            raise Refused("length", f"{self.part}: {reference.size} numbers for {self._limits.lower.size} motors")
-        if not np.isfinite(reference).all():
-            raise Refused("value", f"{self.part}: NaN or infinity")
-        self._check_limits(command.mode, reference)
-        self._check_time(command, k)
-        if command.mode == "position":
-            self._check_step(reference, k, q)
-            self._last_position = (reference, k)
+        if order.epoch != self.epoch:
+            raise Refused("epoch", f"{self.part}: epoch {order.epoch}, in force is {self.epoch}")
+        if order.seq <= self._newest_seq:
+            raise Refused("seq", f"{self.part}: seq {order.seq} after {self._newest_seq}")
+        self._newest_seq = order.seq
+        self._admission.check(order, k)
+        if order.mode == "position":
+            before, at = self._last_position or (None, k)
+            self._admission.check_step(order.reference, before, k - at, q)
+            self._last_position = (order.reference, k)
         else:
             self._last_position = None
-        self._in_force = InForce(command, reference, now + command.ttl * 1_000_000)
+        self._in_force = InForce(order, now + order.ttl * 1_000_000)
 
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
         """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): where they are."""
@@ -164,15 +152,15 @@ class Gate:
         if current is None:
             self.mode, self.seq, self.age = "hold", -1, -1
             return HOLD
-        command = current.command
-        if command.mode != self.mode:
+        order = current.order
+        if order.mode != self.mode:
             self._shaper.start(q, velocity)
-        self.mode, self.seq, self.age = command.mode, command.seq, k - command.re_k
-        return self._shaped(command.mode, current.reference, q, velocity)
+        self.mode, self.seq, self.age = order.mode, order.seq, k - order.re_k
+        return self._shaped(order.mode, order.reference, q, velocity)
 
     def _has_expired(self, current: InForce, k: int, now: int) -> bool:
         """Whether it is too old; then the part holds."""
-        age, ttl, late = k - current.command.re_k, float(current.command.ttl), (now - current.expires) / 1e6
+        age, ttl, late = k - current.order.re_k, float(current.order.ttl), (now - current.expires) / 1e6
         if self._ttl_ticks is not None:
             if age > self._ttl_ticks:
                 self._enter("hold", f"no valid command for {age} ticks, limit {self._ttl_ticks}", age=float(age))
@@ -206,42 +194,5 @@ class Gate:
             in_force = f"epoch {self.epoch} does" if self.owner else "nobody does"
             raise Refused("epoch", f"{self.part}: epoch {epoch} does not own it, {in_force}; take it first")
 
-    def _check_limits(self, mode: Mode, reference: Array) -> None:
-        limits = self._limits
-        if mode == "position" and ((reference < limits.lower - MARGIN) | (reference > limits.upper + MARGIN)).any():
-            raise Refused("position", f"{self.part}: {_worst(reference - limits.upper, limits.lower - reference):.3f} rad beyond a limit")
-        if mode == "velocity" and (np.abs(reference) > limits.velocity * _EXACT).any():
-            raise Refused("velocity", f"{self.part}: {_worst(np.abs(reference) - limits.velocity):.3f} rad/s beyond the limit")
-        if mode == "torque" and (np.abs(reference) > limits.torque * _EXACT).any():
-            raise Refused("torque", f"{self.part}: {_worst(np.abs(reference) - limits.torque):.3f} N m beyond the limit")
 
-    def _check_time(self, command: Command, k: int) -> None:
-        if command.re_k > k:
-            raise Refused("future", f"{self.part}: answers tick {command.re_k}, it is {k}")
-        ticks = k - command.re_k
-        if self._ttl_ticks is not None and ticks > self._ttl_ticks:
-            raise Refused("age", f"{self.part}: answers a tick {ticks} ticks ago, limit {self._ttl_ticks}")
-        age = ticks * self._dt
-        if age > MAX_AGE:
-            raise Refused("age", f"{self.part}: answers a tick {age * 1e3:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
-        if not 0 < command.ttl <= MAX_TTL:  # 0 must not mean "for ever"
-            raise Refused("ttl", f"{self.part}: ttl {command.ttl} ms, valid: 1 to {MAX_TTL}")
-
-    def _check_step(self, reference: Array, k: int, q: Array) -> None:
-        if self._last_position is None:
-            before, allowed = q, np.full(len(q), START)
-        else:
-            before, at = self._last_position
-            ticks = min(max(k - at, 1), max(round(MAX_AGE / self._dt), 1))
-            allowed = STEP * self._limits.velocity * self._dt * ticks
-        step = np.abs(reference - before)
-        if (step > allowed).any():
-            raise Refused("step", f"{self.part}: a jump of {step.max():.3f} rad, allowed {allowed[int(np.argmax(step - allowed))]:.3f}")
-
-
-_EXACT = 1.0 + 1e-9  # a limit that went through the wire is still the limit
 _REMEDY = {"estop": "reset the emergency stop first", "fault": "reset the simulator"}
-
-
-def _worst(*excess: Array) -> float:
-    return float(max(e.max() for e in excess))

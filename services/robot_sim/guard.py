@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterable
 
 from bus_schema import VERSION, Refused, keys
+from bus_schema.chain import Answer, Commands
 from bus_schema.messages import Command, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.robot.robot import Array, Robot
@@ -14,6 +16,7 @@ from services.common.service import CallRefused, Service
 from services.robot_sim.backend import Backend
 from services.robot_sim.gate import LOCKED_TTL, Gate
 from services.robot_sim.limits import Limits
+from services.robot_sim.order import Order, orders_of
 from services.robot_sim.refuse import refused_as_call
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
@@ -25,8 +28,12 @@ class Guard:
 
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float) -> None:
         self._service, self._robot, self._backend, self._dt = service, robot, backend, dt
+        self._where = {name: part.slice for name, part in robot.parts.items()}
         self._estop_reason = ""
-        self._waiting: list[tuple[str, Command]] = []  # lockstep: commands for the next tick
+        self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
+        self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
+        if not service.locked:
+            self._newest = service.bus.latest(keys.COMMANDS, Commands)
         self._estop = service.bus.publisher(keys.ESTOP, EStop, LATEST)
         # Epochs grow over restarts too: what a controller holds from before never fits again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
@@ -44,16 +51,19 @@ class Guard:
         now = time.monotonic_ns()
         motors = self._backend.motors
         q, velocities = motors.q, motors.motor_velocities
+        if not self._service.locked and (commands := self._newest.take()) is not None:
+            for part, order in self._orders(commands):
+                self._admit(part, order, q, k - 1)
         for part, gate in self.gates.items():
-            where = self._robot.parts[part].slice
+            where = self._where[part]
             drive = gate.tick(k, now, q[where], velocities[where])
             motors.command(where, drive.mode, drive.reference)
 
     def obey(self) -> None:
         """Lockstep: admit what came in answer to this tick, in the order of the names, whichever came first."""
         q = self._backend.motors.q
-        for part, command in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
-            self._admit(part, command, q)
+        for part, order in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
+            self._admit(part, order, q, self._service.bus.k)
         self._waiting.clear()
 
     def do_without(self, who: str) -> None:
@@ -80,6 +90,8 @@ class Guard:
         service = self._service
         for part in self.gates:
             self._listen(part)
+        if service.locked:
+            service.on_each(keys.COMMANDS, Commands, self._take_commands)
         service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
         for verb in ("arm", "release", "hold"):
             service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
@@ -88,17 +100,36 @@ class Guard:
         service.on_alive(self._on_alive)
 
     def _listen(self, part: str) -> None:
-        if self._service.locked:
-            self._service.on_each(keys.command(part), Command, lambda command: self._waiting.append((part, command)), part=part, later=True)
+        """Who drives a single part has a stream of its own."""
+        service = self._service
+        if service.locked:
+            service.on_each(keys.command(part), Command, lambda command: self._wait(part, Order.of(command)), part=part, later=True)
         else:
-            self._service.on_newest(
-                keys.command(part), Command, lambda command: self._admit(part, command, self._backend.motors.q), part=part
-            )
+            service.on_newest(keys.command(part), Command, lambda command: self._admit_now(part, Order.of(command)), part=part)
 
-    def _admit(self, part: str, command: Command, q: Array) -> None:
-        """`q` (n,) rad: where all motors are."""
+    def _take_commands(self, commands: Commands) -> None:
+        for part, order in self._orders(commands):
+            self._wait(part, order)
+        if commands.answer is not None:
+            self.answered(commands, commands.answer)
+
+    def _orders(self, commands: Commands) -> Iterable[tuple[str, Order]]:
         try:
-            self.gates[part].admit(command, self._service.bus.k, time.monotonic_ns(), q[self._robot.parts[part].slice])
+            return orders_of(commands, self._robot).items()
+        except KeyError as unknown:
+            self._service.bus.reject("part", f"Commands to {unknown}: this robot has {', '.join(self._robot.parts)}")
+            return ()
+
+    def _wait(self, part: str, order: Order) -> None:
+        self._waiting.append((part, order))
+
+    def _admit_now(self, part: str, order: Order) -> None:
+        self._admit(part, order, self._backend.motors.q, self._service.bus.k)
+
+    def _admit(self, part: str, order: Order, q: Array, k: int) -> None:
+        """`q` (n,) rad: where all motors are; `k`: the tick that runs."""
+        try:
+            self.gates[part].admit(order, k, time.monotonic_ns(), q[self._where[part]])
         except Refused as refused:  # told and counted; robot_sim goes on
             self._service.bus.reject(refused.reason, str(refused))
 

@@ -20,6 +20,7 @@ class Lockstep:
         """`last_tick`: where the run ends, 0: nowhere."""
         self._service, self._guard = service, guard
         self._barrier = Barrier(service, participants, self._note, patience=service.config.patience)
+        guard.answered = lambda commands, answer: self._barrier.note(commands.src, commands.re_k, answer)
         self._last_tick = last_tick
         self.flaws = 0
         self._told = -TELLS  # monotonic clock

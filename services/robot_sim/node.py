@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Mapping
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from services.robot_sim.meta import part_meta
 from services.robot_sim.sensors import Sensors
 from services.robot_sim.streams import Phases
 
-SPREAD = 0.002  # s, a tick shorter than this has its parts one after the other without waiting between them
+SPREAD = 0.002  # s, a tick shorter than this has its parts read one after the other without waiting between them
+CLOCK_RATE = 100.0  # messages a second of real time on `clock` at most, in free mode: who needs every tick has `tick`
 IDLE = 1.0  # s, lockstep: between looks when there is nothing to do
 NOT_FINITE = 1  # fault bit
 
@@ -47,6 +48,7 @@ class Node:
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
         self._clock = self._bus.publisher(keys.CLOCK, Clock, self._bus.control)
+        self._clock_period = max(1, round(1.0 / (CLOCK_RATE * self._period)))  # ticks
         self._truth = self._bus.publisher(keys.SIM_TRUTH, Truth, DATA)
         self._truth_period = max(1, round(config.rate / config.truth_rate))  # ticks
         self._deepest = SolidContact()  # since the last truth message
@@ -85,7 +87,7 @@ class Node:
                 self._service.check_router()
                 router_check = now + 1.0
             if self._bus.k == 0 and not lockstep.is_complete():
-                self._publish_start("lock")
+                self._publish_start()
                 self._service.spin(now + GATHERING, lockstep.is_complete)
             elif self._paused or lockstep.is_over():
                 self._service.spin(now + IDLE)
@@ -99,7 +101,8 @@ class Node:
         self._bus.k += 1
         self._bus.t += self._dt_ns
         self._guard.tick(self._bus.k)
-        self._publish_start("lock")
+        self._publish_start()
+        self._sensors.digest()
         self._backend.step(self._dt)
         self._counters.tick_time.add((time.monotonic() - begin) * 1e3)
         self._count()
@@ -107,33 +110,44 @@ class Node:
             self._publish_truth()
         lockstep.wait(self._bus.k)
 
-    def _publish_start(self, mode: str) -> None:
-        """How everything is at the beginning of the tick, and that it begins."""
-        self._sensors.publish_now(self._backend.motors, self._guard.gates)
-        self._publish_clock(mode)
+    def _publish_start(self) -> None:
+        """How everything is at the beginning of a tick in lockstep, and that it begins."""
+        self._sensors.sample_now(self._backend.motors, self._guard.gates)
+        self._publish_tick("lock")
 
     def _tick(self, start: float) -> None:
         bus, backend = self._bus, self._backend
         bus.k += 1
         bus.t += self._dt_ns
         self._guard.tick(bus.k)
-        self._publish_clock("free")
+        self._publish_tick("free")
         self._sensors.begin(backend.motors)
         backend.step(self._dt)
         self._counters.tick_time.add((time.monotonic() - start) * 1e3)
         self._count()
-        run = bus.run
-        for share, part in self._phases.next():
-            if self._period >= SPREAD:
-                self._service.spin(start + share * self._period)
-                if bus.run != run:  # reset meanwhile
-                    return
-            self._sensors.publish(part, share, backend.motors, self._guard.gates[part])
+        if not self._read(start):
+            return
         if bus.k % self._truth_period == 0:
             self._publish_truth()
 
-    def _publish_clock(self, mode: str) -> None:
-        self._clock.put(dt=self._dt_ns, mode=mode, rate=self._config.speed)
+    def _read(self, start: float) -> bool:
+        """Read every part in its time; False when the run has ended meanwhile."""
+        shares, motors, gates = self._phases.next(), self._backend.motors, self._guard.gates
+        if self._period < SPREAD:
+            self._sensors.sample(shares, motors, gates)
+            return True
+        run = self._bus.run
+        for share, part in shares:
+            self._service.spin(start + share * self._period)
+            if self._bus.run != run:  # reset
+                return False
+            self._sensors.sample([(share, part)], motors, gates)
+        return True
+
+    def _publish_tick(self, mode: Literal["free", "lock", "paused"]) -> None:
+        self._sensors.publish(mode, self._dt_ns, self._config.speed)
+        if (mode != "free" or self._bus.k % self._clock_period == 0) and self._clock.heard:
+            self._clock.put(dt=self._dt_ns, mode=mode, rate=self._config.speed)
 
     def _count(self) -> None:
         motors, gates = self._backend.motors, self._guard.gates
@@ -212,7 +226,7 @@ class Node:
             self._paused = True
             self._guard.hold_all(f"paused by {request.who}")
             self._disturb("paused")
-            self._publish_clock("paused")
+            self._publish_tick("paused")
         return Done(v=VERSION)
 
     def _resume(self, request: Empty, key: str) -> Done:

@@ -14,17 +14,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Meta, Struct
 
-from bus_schema import VERSION, Refused, decode, encode, encoding_of, messages, rpc
+from bus_schema import VERSION, Refused, chain, decode, encode, encoding_of, messages, rpc
 from bus_schema.messages import Clock, Command, Contacts, Forces, State
 
 NOT_SENT = {messages.Message, rpc.Request, rpc.Reply, messages.MarkerPose, messages.ContactItem}
-NOT_SENT |= {messages.Geometry, messages.Surprise, messages.ObjectTruth, rpc.ObjectState}
+NOT_SENT |= {messages.Geometry, messages.Surprise, messages.ObjectTruth, rpc.ObjectState, chain.PartStatus, chain.Order, chain.Answer}
 
 
 def sent_types() -> list[type[Struct]]:
     found = [
         cls
-        for module in (messages, rpc)
+        for module in (messages, chain, rpc)
         for _, cls in inspect.getmembers(module, inspect.isclass)
         if issubclass(cls, Struct) and cls.__module__ == module.__name__
     ]

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from msgspec import Struct
 
-from bus_schema import keys, messages, rpc
+from bus_schema import chain, keys, messages, rpc
 
 TEXT = (Path(__file__).parents[2] / "docs" / "bus.md").read_text()
 WORDS = set(re.findall(r"`([^`]+)`", TEXT))
 BASES = {messages.Message, rpc.Request, rpc.Reply}
 STRUCTS = {
     name: cls
-    for module in (messages, rpc)
+    for module in (messages, chain, rpc)
     for name, cls in inspect.getmembers(module, inspect.isclass)
     if issubclass(cls, Struct) and cls not in BASES and cls.__module__ == module.__name__
 }

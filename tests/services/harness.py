@@ -21,7 +21,8 @@ import numpy as np
 import zenoh
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
-from bus_schema.messages import Clock, Command, Forces, Message, Motion, State
+from bus_schema.chain import Answer, Commands, PartStatus, Tick
+from bus_schema.messages import Clock, Command, Forces, Message, Motion
 from bus_schema.rpc import Driven, Empty, Failure, Goal, Reply, Request, Started, Stat, Take, Taken, WithEpoch
 from mobee.robot.robot import Array, Robot
 from services.common import rpc
@@ -236,10 +237,12 @@ class FakeSim:
         self.gates = {part: FakeGate(velocity=np.zeros(len(p)), epoch=100) for part, p in rig.robot.parts.items()}
         self.commands: dict[str, list[Command]] = {part: [] for part in rig.robot.parts}
         self._lock = threading.Lock()
+        self.answers_along: list[tuple[int, Answer]] = []  # lockstep: ticks that were answered with the commands
+        self._measured = self.q.copy()
+        self.statuses: dict[str, PartStatus] = {}
+        self._tick = rig.bus.publisher(keys.TICK, Tick, LATEST)
         self._clock = rig.bus.publisher(keys.CLOCK, Clock, LATEST)
-        self._states = {part: rig.bus.publisher(keys.state(part), State, LATEST) for part in rig.robot.parts}
-        for part in rig.robot.parts:
-            rig.listen(keys.command(part), lambda sample, part=part: self._obey(part, sample))
+        rig.listen(keys.COMMANDS, self._obey)
         rig.serve(keys.drive("*", "take"), Take, self._take)
         rig.serve(keys.drive("*", "arm"), WithEpoch, self._arm)
         self.new_run()
@@ -249,20 +252,27 @@ class FakeSim:
         bus = self.rig.bus
         bus.run, bus.k, bus.t = f"run_{secrets.token_hex(3)}", 0, 0
         self.q = self.robot.home.copy()
+        self.statuses = {}
         for gate in self.gates.values():
             gate.state, gate.owner, gate.velocity = "idle", "", 0.0 * gate.velocity
 
     def tick(self, skip: int = 0, mode: str = "free", dt_ns: int | None = None) -> int:
-        """States of the tick that ends, then the clock of the next; `skip`: ticks of which nobody hears before."""
+        """Samples at the end of a tick, then the start of the next; `skip`: ticks of which nobody hears before."""
         bus = self.rig.bus
         bus.k += skip
         bus.t += skip * self.dt_ns
-        self._publish_states()
+        self.sample()
         bus.k += 1
         bus.t += self.dt_ns
         self._move()
-        self._clock.put(dt=dt_ns or self.dt_ns, mode=mode, rate=1.0)
+        self.begin(mode, dt_ns)
         return bus.k
+
+    def begin(self, mode: str = "free", dt_ns: int | None = None, whole: bool = True) -> None:
+        """The tick begins; nobody hears of it before every part was sampled, unless it need not be the `whole` body."""
+        if len(self.statuses) == len(self.gates) or not whole:
+            self._tick.put(dt=dt_ns or self.dt_ns, mode=mode, rate=1.0, q=self._measured.tolist(), parts=self.statuses)
+        self._clock.put(dt=dt_ns or self.dt_ns, mode=mode, rate=1.0)
 
     def play(self, until: Callable[[], Any], what: str, answered: Callable[[int], Any], ticks: int = 3000) -> Any:
         """Tick until the condition holds; the next tick comes when the last is answered, or 50 ms later."""
@@ -284,23 +294,16 @@ class FakeSim:
     def of(self, part: str) -> Array:
         return self.q[self.robot.part(part).slice]
 
-    def _publish_states(self) -> None:
-        for part, publisher in self._states.items():
+    def sample(self) -> None:
+        """Every part is read, but those that are silent."""
+        bus = self.rig.bus
+        for part, gate in self.gates.items():
             if part in self.silent:
                 continue
-            gate, q = self.gates[part], self.of(part)
-            publisher.put(
-                t=self.rig.bus.t + self.dt_ns // 2,
-                q=q.tolist(),
-                dq=gate.velocity.tolist(),
-                tau=[0.0] * len(q),
-                mode="velocity" if gate.state == "armed" else "hold",
-                gate=gate.state,
-                faults=0,
-                epoch=gate.epoch,
-                cmd_seq=gate.seq,
-                cmd_age=gate.age,
-            )
+            where = self.robot.part(part).slice
+            self._measured[where] = self.q[where]
+            mode = "velocity" if gate.state == "armed" else "hold"
+            self.statuses[part] = PartStatus(bus.k, bus.t + self.dt_ns // 2, mode, gate.state, 0, gate.epoch, gate.seq, gate.age)
 
     def _move(self) -> None:
         with self._lock:
@@ -310,14 +313,22 @@ class FakeSim:
                     limits = self.robot.limits[where]
                     self.q[where] = np.clip(self.q[where] + gate.velocity * self.dt_ns * 1e-9, limits[:, 0], limits[:, 1])
 
-    def _obey(self, part: str, sample: zenoh.Sample) -> None:
-        command = decode(Command, sample.payload.to_bytes(), str(sample.encoding), part=self.rig.bus.part_sizes[part])
+    def _obey(self, sample: zenoh.Sample) -> None:
+        whole = decode(Commands, sample.payload.to_bytes(), str(sample.encoding), robot=self.rig.bus.robot_size)
         with self._lock:
-            self.commands[part].append(command)
-            gate = self.gates[part]
-            if gate.state == "armed" and command.epoch == gate.epoch and command.run == self.rig.bus.run:
-                gate.velocity = np.array(command.ref) if command.mode == "velocity" else 0.0 * gate.velocity
-                gate.seq, gate.age = command.seq, self.rig.bus.k - command.re_k
+            for part, order in whole.parts.items():
+                header = {name: getattr(whole, name) for name in ("v", "run", "src", "seq", "k", "t", "tw", "re_k", "ttl")}
+                ref = whole.ref[self.robot.part(part).slice]
+                self._obey_one(part, Command(**header, epoch=order.epoch, mode=order.mode, ref=ref))
+            if whole.answer is not None:
+                self.answers_along.append((whole.re_k, whole.answer))
+
+    def _obey_one(self, part: str, command: Command) -> None:
+        self.commands[part].append(command)
+        gate = self.gates[part]
+        if gate.state == "armed" and command.epoch == gate.epoch and command.run == self.rig.bus.run:
+            gate.velocity = np.array(command.ref) if command.mode == "velocity" else 0.0 * gate.velocity
+            gate.seq, gate.age = command.seq, self.rig.bus.k - command.re_k
 
     def _take(self, request: Take, key: str) -> Taken:
         part = key.split("/")[0]
@@ -348,15 +359,15 @@ class FakeModel:
         self.touched: dict[str, list[str]] = {}
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
-        rig.listen(keys.CLOCK, self._answer)
+        rig.listen(keys.TICK, self._answer)
 
     def _answer(self, sample: zenoh.Sample) -> None:
         try:
-            clock = decode(Clock, sample.payload.to_bytes(), str(sample.encoding))
+            tick = decode(Tick, sample.payload.to_bytes(), str(sample.encoding))
         except Refused:  # a test of random bytes
             return
         if not self.silent:
-            self.put(max(clock.k - self.behind, 0))
+            self.put(max(tick.k - self.behind, 0))
 
     def put(self, re_k: int) -> None:
         zeros = [0.0] * len(self.collision)

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from bus_schema import VERSION, encode, encoding_of, keys
-from bus_schema.messages import Clock, Command, EStop, Event, Forces, Motion, State
+from bus_schema.chain import Tick
+from bus_schema.messages import Command, EStop, Event, Forces, Motion
 from bus_schema.rpc import Done, Empty, Force, Goal, Started, Take, Taken, WithEpoch
 from mobee import Controller, Gains, Model, load_robot
 from mobee.control import Forces as Acting
@@ -573,9 +574,9 @@ def test_a_paused_and_a_much_too_slow_clock_are_not_answered(run: Stage) -> None
 def test_random_bytes_on_every_key_move_nothing(run: Stage, rng: np.random.Generator) -> None:
     run.play(lambda: np.abs(run.motion("head").dq).max() < 1e-3, "the head to rest")
     before = run.sim.q.copy()
-    targets = [(keys.CLOCK, Clock), (keys.MODEL_FORCES, Forces), (keys.state("torso"), State), (keys.goal("torso", "goal"), Goal)]
+    targets = [(keys.TICK, Tick), (keys.MODEL_FORCES, Forces), (keys.goal("torso", "goal"), Goal)]
     for n in range(300):
-        key, cls = targets[n % 4]
+        key, cls = targets[n % 3]
         payload = rng.bytes(int(rng.integers(0, 300)))
         if cls is Goal:
             assert [a.ok for a in run.rig.session.get(key, payload=payload, encoding=encoding_of(cls), timeout=2.0)] == [None]
@@ -583,7 +584,7 @@ def test_random_bytes_on_every_key_move_nothing(run: Stage, rng: np.random.Gener
             run.rig.session.put(key, payload, encoding=encoding_of(cls))
         if n % 30 == 0:
             run.sim.tick()  # which may be overtaken by bytes on the same key: then it is a lost tick
-    run.rig.session.put(keys.CLOCK, b"the last", encoding=encoding_of(Goal))
+    run.rig.session.put(keys.TICK, b"the last", encoding=encoding_of(Goal))
     wait_for(lambda: run.rig.stat("controller").rejected.get("type") == 1, "the last refusal")
     assert run.rig.stat("controller").rejected["decode"] >= 75
     run.ticks(10)

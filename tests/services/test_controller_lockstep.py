@@ -19,15 +19,29 @@ SILENCE = 0.3  # s in which something would have happened
 
 
 @dataclass
+class Answered:
+    """What the controller said to a tick, along with its commands or by itself."""
+
+    re_k: int
+    ok: bool
+    busy: list[str]
+
+
+@dataclass
 class Bench:
     stage: Stage
-    answers: list[StepDone]
+    alone: list[StepDone]
 
-    def tick(self) -> StepDone:
+    @property
+    def answers(self) -> list[Answered]:
+        along = [Answered(k, answer.ok, answer.busy) for k, answer in self.stage.sim.answers_along]
+        return sorted([*along, *(Answered(done.re_k, done.ok, done.busy) for done in self.alone)], key=lambda answer: answer.re_k)
+
+    def tick(self) -> Answered:
         k = self.stage.sim.tick(mode="lock")
         return self.answer(k)
 
-    def answer(self, k: int) -> StepDone:
+    def answer(self, k: int) -> Answered:
         return wait_for(lambda: next((done for done in self.answers if done.re_k == k), None), f"the answer to tick {k}")
 
 
@@ -41,8 +55,8 @@ def begun(made: Rig) -> Bench:
         bus = made.bus
         bus.k, bus.t = -1, -bench.stage.sim.dt_ns
         bus.k, bus.t = 0, 0
-        bench.stage.sim._publish_states()
-        bench.stage.sim._clock.put(dt=bench.stage.sim.dt_ns, mode="lock", rate=1.0)
+        bench.stage.sim.sample()
+        bench.stage.sim.begin("lock")
         time.sleep(0.02)
         return bool(answers)
 
@@ -81,6 +95,14 @@ def test_its_answer_comes_after_its_commands_and_names_who_is_under_way(bench: B
     done = bench.tick()
     assert done.busy == ["agent_torso"]
     wait_for(lambda: all(bench.stage.commands(part, since=done.re_k - 1) for part in PARTS), "the commands")
+
+
+def test_its_answer_travels_with_its_commands_and_includes_the_models(bench: Bench) -> None:
+    before = len(bench.alone)
+    k = bench.tick().re_k
+    assert len(bench.alone) == before
+    newest, answer = bench.stage.sim.answers_along[-1]
+    assert (newest, answer.including) == (k, ["test"])  # the rig's name, which here is the model's
 
 
 def test_it_waits_for_the_forces_of_the_tick_however_long(bench: Bench) -> None:

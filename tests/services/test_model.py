@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from bus_schema import encoding_of, keys
-from bus_schema.messages import Clock, Contacts, Event, Forces, Geometry, Pose, State, WorldObject
+from bus_schema.chain import Tick
+from bus_schema.messages import Clock, Contacts, Event, Forces, Geometry, Pose, WorldObject
 from bus_schema.rpc import (
     AddObject,
     Attach,
@@ -205,15 +206,20 @@ def test_ticks_on_the_table_are_counted(run: Stage) -> None:
     assert numbers["evaluate_ms_p50"] > 0
 
 
-def test_a_new_run_forgets_states_and_what_was_perceived(run: Stage) -> None:
+def test_a_new_run_forgets_what_was_perceived(run: Stage) -> None:
     run.perceive([-0.3, 0.0, 0.1], valid_for=10_000)
     wait_for(lambda: "ball" in run.world(), "the ball")
     run.sim.new_run()
-    run.sim.silent = {"torso"}
-    run.sim.tick()
-    wait_for(lambda: "ball" not in run.world(), "the ball to be forgotten")
-    assert run.forces[-1].run != run.rig.bus.run  # the torso's last state was of another run
-    run.sim.silent = set()
+    assert run.tick().run == run.rig.bus.run
+    assert "ball" not in run.world()
+
+
+def test_a_tick_without_some_part_is_refused(run: Stage) -> None:
+    before = len(run.forces)
+    del run.sim.statuses["torso"]
+    run.sim.begin(whole=False)
+    wait_for(lambda: run.rig.stat("model").rejected.get("part"), "the refusal")
+    assert len(run.forces) == before
     assert run.tick().run == run.rig.bus.run
 
 
@@ -393,8 +399,8 @@ def test_jacobians_on_request_are_the_librarys(run: Stage, rng: np.random.Genera
 
 
 def test_random_bytes_and_absurd_numbers_harm_nothing(run: Stage, rng: np.random.Generator) -> None:
-    targets = [keys.CLOCK, keys.state("torso"), keys.state("left_arm"), keys.world("ball"), keys.world_rpc("add"), keys.MODEL_JACOBIAN]
-    types = [Clock, State, State, WorldObject, AddObject, JacobianAt]
+    targets = [keys.CLOCK, keys.TICK, keys.world("ball"), keys.world_rpc("add"), keys.MODEL_JACOBIAN]
+    types = [Clock, Tick, WorldObject, AddObject, JacobianAt]
     for _ in range(300):
         at = int(rng.integers(len(targets)))
         payload = rng.bytes(int(rng.integers(0, 300)))

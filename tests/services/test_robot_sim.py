@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from bus_schema import encode, encoding_of, keys
+from bus_schema.chain import Commands, Order, Tick
 from bus_schema.messages import Clock, Command, EStop, Event, Message, State, Truth
 from bus_schema.rpc import Done, Driven, Empty, PartMeta, Place, Request, Take, Taken, WithEpoch
 from mobee.kinematics.gravity import gravity_torque
@@ -99,6 +101,44 @@ def elbow(value: float) -> list[float]:
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with rig(tmp_path_factory.mktemp("robot_sim"), ROBOT) as bus:
         yield Bench(bus, "--backend", "kinematic")
+
+
+def test_a_tick_holds_what_each_part_said_last(bench: Bench) -> None:
+    ticks = bench.rig.record(keys.TICK, Tick)
+    wait_for(lambda: len(ticks) > 10, "ticks")
+    tick = ticks[5]
+    for part, states in bench.states.items():
+        state = wait_for(lambda s=states, part=part: next((x for x in s if x.t == tick.parts[part].t), None), f"the state of {part}")
+        assert (state.k, state.gate, state.epoch) == (tick.parts[part].k, tick.parts[part].gate, tick.parts[part].epoch)
+        assert state.k == tick.k - 1
+        assert state.q == tick.q[ROBOT.part(part).slice]
+
+
+def test_the_clock_is_told_a_hundred_times_a_second_at_most_and_every_tick_is(tmp_path: Path) -> None:
+    with rig(tmp_path, ROBOT) as bus:
+        ticks, clocks = bus.record(keys.TICK, Tick), bus.record(keys.CLOCK, Clock)
+        bus.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--rate", "400")
+        wait_for(lambda: len(ticks) > 100 and len(clocks) > 20, "ticks")
+        assert {clock.k % 4 for clock in clocks} == {0}
+        assert min(after.k - before.k for before, after in pairwise(ticks)) == 1
+
+
+def test_orders_to_all_parts_come_in_one_message_and_refusals_concern_a_part(bench: Bench) -> None:
+    epochs = {part: bench.arm(part) for part in ("torso", "left_arm")}
+    commands = bench.rig.bus.publisher(keys.COMMANDS, Commands, LATEST)
+    orders = {"torso": Order(epochs["torso"], "velocity"), "left_arm": Order(epochs["left_arm"] - 1, "velocity")}
+    before = bench.rejected("epoch")
+
+    def send() -> bool:
+        commands.put(re_k=bench.clocks[-1].k, parts=orders, ref=[0.0] * len(ROBOT.motors), ttl=1000, answer=None)
+        time.sleep(DT)
+        return bench.newest("torso").mode == "velocity"
+
+    wait_for(send, "the torso to obey")
+    assert bench.newest("left_arm").mode == "hold"
+    assert bench.rejected("epoch") > before
+    for part in epochs:
+        bench.free(part)
 
 
 def test_every_part_streams_its_motors_at_the_tick_rate_each_at_its_own_phase(bench: Bench) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
+from bus_schema.chain import Commands, Tick
 from bus_schema.messages import (
     Camera,
     Clock,
@@ -186,6 +187,8 @@ FORBIDDEN: dict[str, type[Message]] = {
     **{keys.state(part): State for part in PARTS},
     **{keys.motion(part): Motion for part in PARTS},
     **{keys.command(part): Command for part in PARTS},
+    keys.TICK: Tick,
+    keys.COMMANDS: Commands,
     keys.SIM_TRUTH: Truth,
     keys.MODEL_FORCES: Forces,
     keys.MODEL_POSE: Pose,

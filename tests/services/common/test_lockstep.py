@@ -77,6 +77,13 @@ def test_who_is_not_busy_must_answer_and_is_told_that_it_is_its_turn(bench: Benc
     assert bench.barrier.missing(1) == []
 
 
+def test_an_answer_counts_for_those_whose_answers_it_includes(bench: Bench) -> None:
+    bench.begun().done("controller", 1, busy=["agent"], including=["model"])
+    assert bench.barrier.missing(1) == []
+    bench.done("controller", 2, busy=["agent"], including=["model", "newcomer"])
+    assert bench.barrier.missing(3) == ["agent", "controller", "model", "newcomer"]
+
+
 def test_who_is_busy_is_left_alone(bench: Bench) -> None:
     bench.begun().service.turns.clear()
     bench.done("model", 1)

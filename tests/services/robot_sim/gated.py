@@ -13,6 +13,7 @@ from mobee.robot.robot import Array
 from mobee.simulation.motors import MotorParameters, Motors
 from services.robot_sim.gate import Drive, Gate
 from services.robot_sim.limits import Limits
+from services.robot_sim.order import Order
 
 ROBOT = load_robot("icub")
 PART = "torso"
@@ -50,7 +51,7 @@ class Gated:
         reference = np.broadcast_to(np.asarray(ref, dtype=float), (N,)).tolist() if np.ndim(ref) == 0 else list(ref)
         header = {"v": VERSION, "run": "r", "src": "controller", "k": self.k, "t": 0, "tw": 0}
         command = Command(**header, mode=mode, ref=reference, **{**fields, **changes})  # type: ignore[arg-type]
-        self.gate.admit(command, self.k, self.now, self.q)
+        self.gate.admit(Order.of(command), self.k, self.now, self.q)
 
     def tick(self, wall: float | None = None) -> Array:
         """One tick, `wall` s after the last; the change of the motors' velocity in it."""

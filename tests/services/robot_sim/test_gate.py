@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from bus_schema import Refused
 from mobee.simulation.motors import MotorParameters
-from tests.services.robot_sim.gated import LIMITS, Gated, N
+from services.robot_sim.gate import Gate
+from services.robot_sim.order import Order
+from tests.services.robot_sim.gated import LIMITS, PART, ROBOT, WHERE, Gated, N
 
 VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]
 ROUNDING = 1 + 1e-9
@@ -318,3 +320,17 @@ def test_a_torque_that_drives_a_motor_into_its_limit_ends_in_a_hold_before_it(pa
     assert gated.q[0] <= LIMITS.upper[0] + 1e-6
     assert abs(gated.velocity[0]) < 0.01
     assert gated.q[0] > LIMITS.upper[0] - 0.2  # not long before it either
+
+
+def test_in_lockstep_an_age_is_counted_in_ticks_however_long_these_are() -> None:
+    gate = Gate(PART, LIMITS, 0.05, ttl_ticks=3)
+    epoch = gate.take("controller", "c1")
+    gate.arm(epoch)
+
+    def order(seq: int, re_k: int) -> Order:
+        return Order("controller", epoch, seq, re_k, "velocity", np.zeros(N), 100)
+
+    gate.admit(order(0, 7), 10, 0, ROBOT.home[WHERE])  # 150 ms ago
+    with pytest.raises(Refused, match="4 ticks ago, limit 3") as caught:
+        gate.admit(order(1, 6), 10, 0, ROBOT.home[WHERE])
+    assert caught.value.reason == "age"

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from bus_schema import keys
+from bus_schema.chain import Answer, Commands, Order
 from bus_schema.messages import Clock, Command, Event, State, StepDone
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee import load_robot
@@ -28,6 +29,7 @@ class Bench:
     events: list[Event]
     answers: Any
     commands: Any
+    all_commands: Any
     epoch: int = 0
 
     @property
@@ -75,10 +77,11 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         states, events = made.record(keys.state("torso"), State, "torso"), made.record(keys.event("robot_sim"), Event)
         answers = made.bus.publisher(keys.done("controller"), StepDone, STEP)
         commands = made.bus.publisher(keys.command("torso"), Command, LATEST)
+        all_commands = made.bus.publisher(keys.COMMANDS, Commands, STEP)
         made.token("launcher", "l1")
         flags = ("--backend", "kinematic", "--rate", "50", "--mode", "lock", "--participants", "controller", "--encoder-noise", "0.0")
         made.start("services.robot_sim", "robot_sim", *flags)
-        yield Bench(made, clocks, states, events, answers, commands)
+        yield Bench(made, clocks, states, events, answers, commands, all_commands)
 
 
 @pytest.fixture
@@ -120,6 +123,30 @@ def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> No
         bench.step()
     assert bench.newest(9).q[0] > bench.newest(2).q[0]
     assert bench.newest(9).t == round(9 * TICK * 1e9)
+
+
+def test_commands_to_several_parts_answer_the_tick_along_with_what_they_order(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    k = bench.k
+    ref = [0.0] * len(ROBOT.motors)
+    ref[ROBOT.part("torso").start] = 0.1
+    bench.rig.bus.run = bench.clocks[-1].run
+    orders = {"torso": Order(bench.epoch, "velocity")}
+    bench.all_commands.put(re_k=k, parts=orders, ref=ref, ttl=1000, answer=Answer(True, [], []))
+    wait_for(lambda: bench.k == k + 1, "the next tick")
+    assert (bench.newest(k + 1).cmd_age, bench.newest(k + 1).mode) == (1, "velocity")
+
+
+def test_commands_to_a_part_that_is_not_there_are_refused_whole(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    bench.rig.bus.run = bench.clocks[-1].run
+    orders = {"torso": Order(bench.epoch, "velocity"), "tail": Order(1, "velocity")}
+    bench.all_commands.put(re_k=bench.k, parts=orders, ref=[0.0] * len(ROBOT.motors), ttl=1000, answer=None)
+    bench.step()
+    assert bench.newest(bench.k).mode == "hold"
+    assert bench.rig.stat("robot_sim").rejected["part"] == 1
 
 
 def test_a_command_is_in_force_for_three_ticks_however_long_they_take(bench: Bench) -> None:

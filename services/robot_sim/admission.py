@@ -1,0 +1,83 @@
+"""What an order must be to reach a part's motors, whoever gives it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bus_schema import Refused
+from mobee.robot.robot import Array
+from services.robot_sim.limits import Limits
+from services.robot_sim.order import Order
+
+MAX_AGE = 0.1  # s between the tick an order answers and the tick it arrives in, in free mode
+MAX_TTL = 1000  # ms
+MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
+START = math.radians(2.0)  # rad between the measured position and the first position ordered
+STEP = 2.0  # times the distance that full speed covers, by which a position reference may move
+
+_EXACT = 1.0 + 1e-9  # a limit that went through the wire is still the limit
+
+
+class Admission:
+    """The checks of one part; each raises Refused with its reason."""
+
+    def __init__(self, part: str, limits: Limits, dt: float, max_ticks: int | None) -> None:
+        """`max_ticks`: how many ticks ago the one may be that an order answers; None: as many as begin in MAX_AGE."""
+        self._part, self._dt, self._max_ticks = part, dt, max_ticks
+        self._velocity, self._torque = limits.velocity * _EXACT, limits.torque * _EXACT
+        self._lower, self._upper = limits.lower - MARGIN, limits.upper + MARGIN
+        self._stride = STEP * limits.velocity * dt  # rad a tick
+        self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
+
+    def check(self, order: Order, k: int) -> None:
+        """Numbers and time of an order that arrives in tick k."""
+        reference = order.reference
+        if reference.shape != self._lower.shape:
+            raise Refused("length", f"{self._part}: {reference.size} numbers for {self._lower.size} motors")
+        if not self._is_within(order.mode, reference):  # so it is with NaN too
+            self._refuse(order.mode, reference)
+        if order.re_k > k:
+            raise Refused("future", f"{self._part}: answers tick {order.re_k}, it is {k}")
+        self._check_age(k - order.re_k)
+        if not 0 < order.ttl <= MAX_TTL:  # 0 must not mean "for ever"
+            raise Refused("ttl", f"{self._part}: ttl {order.ttl} ms, valid: 1 to {MAX_TTL}")
+
+    def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
+        """The way from the position ordered `ticks` ago; None: from the measured q.  All (n,) rad."""
+        if before is None:
+            before, allowed = q, np.full(len(q), START)
+        else:
+            allowed = self._stride * min(max(ticks, 1), self._most_strides)
+        step = np.abs(reference - before)
+        if (step > allowed).any():
+            raise Refused("step", f"{self._part}: a jump of {step.max():.3f} rad, allowed {allowed[int(np.argmax(step - allowed))]:.3f}")
+
+    def _check_age(self, ticks: int) -> None:
+        if self._max_ticks is not None:
+            if ticks > self._max_ticks:
+                raise Refused("age", f"{self._part}: answers a tick {ticks} ticks ago, limit {self._max_ticks}")
+        elif ticks * self._dt > MAX_AGE:
+            raise Refused("age", f"{self._part}: answers a tick {ticks * self._dt * 1e3:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
+
+    def _is_within(self, mode: str, reference: Array) -> bool:
+        if mode == "velocity":
+            return bool((np.abs(reference) <= self._velocity).all())
+        if mode == "position":
+            return bool(((reference >= self._lower) & (reference <= self._upper)).all())
+        if mode == "torque":
+            return bool((np.abs(reference) <= self._torque).all())
+        return bool(np.isfinite(reference).all())
+
+    def _refuse(self, mode: str, reference: Array) -> None:
+        """Say what is wrong."""
+        if not np.isfinite(reference).all():
+            raise Refused("value", f"{self._part}: NaN or infinity")
+        if mode == "position":
+            beyond, unit = np.maximum(reference - self._upper, self._lower - reference).max() + MARGIN, "rad beyond a limit"
+        elif mode == "velocity":
+            beyond, unit = (np.abs(reference) - self._velocity / _EXACT).max(), "rad/s beyond the limit"
+        else:
+            beyond, unit = (np.abs(reference) - self._torque / _EXACT).max(), "N m beyond the limit"
+        raise Refused(mode, f"{self._part}: {beyond:.3f} {unit}")
