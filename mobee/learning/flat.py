@@ -23,7 +23,8 @@ def flat(space: Space) -> Array:
     centred = (space.samples - space.samples.mean(axis=0)) / np.maximum(np.ptp(space.samples, axis=0), 1e-12)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     drawn = centred @ axes[:2].T
-    return np.pad(drawn, ((0, 0), (0, 2 - drawn.shape[1]))) * np.sqrt(len(space))
+    plane: Array = np.pad(drawn, ((0, 0), (0, 2 - drawn.shape[1]))) * np.sqrt(len(space))
+    return plane
 
 
 def _nested(sizes: list[int]) -> Array:
