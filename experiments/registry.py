@@ -12,6 +12,7 @@ from mobee.errors import UnknownName
 EXPERIMENTS = {
     "accuracy": "experiments.accuracy",
     "babbling": "experiments.babbling",
+    "change": "experiments.change",
     "chapter7": "experiments.chapter7",
     "clauses": "experiments.clauses",
     "connectivity": "experiments.connectivity",

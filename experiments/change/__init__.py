@@ -1,0 +1,98 @@
+"""Change: what does the curious agent do when its actions suddenly end elsewhere?
+
+Claim: when actions that had always ended in one state suddenly end in another, they become very interesting, their value shoots up, the
+agent tries them out a few times and so mends its model.  Ours: one that forgets old counts should mend it sooner.
+Source: thesis 7.2.6 (there the simulator's instabilities were the cause, and few runs were looked at).  Published number: none.
+Run time: 5 minutes on 2 cores.
+
+The left arm on the lattice of rank 3.  After 3000 transitions a ball of 6 cm enters where the hand is in the middle state, or the
+friction of the elbow doubles, from 4 deg/s, with which it arrives, to 8, with which it sticks; 3000 more follow, from home.  With
+friction no action ever looks settled, for the controller goes on asking the motor: actions end after 8 s.  Which actions changed is
+measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.change.figure import draw
+from experiments.change.findings import CLAIMS, findings
+from experiments.change.runs import BEFORE, CONDITIONS, EVERY
+from experiments.change.worlds import CHANGES, groups, measure_outcomes, plant_of
+from experiments.learning.model_error import l1
+from experiments.learning.published import arm_space
+from experiments.learning.trial import explore
+from experiments.learning.truth import Truth, truth_of
+from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from mobee import CuriousAgent
+
+NAME = "change"
+CLAIM = "actions that suddenly end elsewhere become interesting, and are tried until the model is right again; sooner with forgetting"
+SOURCE = "thesis 7.2.6"
+__all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
+
+TRIES = 4  # of each action in a walk
+QUICK = 0.3  # of the transitions
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    sweep_arguments(parser)
+
+
+def cells(arguments: argparse.Namespace) -> list[Cell]:
+    """Every change with every agent and every seed; the short version makes a third of the transitions."""
+    share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
+    seeds = range(arguments.seed, arguments.seed + arguments.seeds)
+    return [
+        Cell(
+            f"{name}{change}-{explorer}-f{forgetting:g}-s{seed}",
+            seed,
+            {"change": change, "explorer": explorer, "forgetting": forgetting, "transitions": round(share * BEFORE)},
+        )
+        for change, (explorer, forgetting), seed in product(CHANGES, CONDITIONS, seeds)
+    ]
+
+
+def work(cell: Cell) -> dict[str, Any]:
+    """Explore before and after the change; transitions (T, 3), and every so often error and value of what changed and of what did not."""
+    chosen, space = cell.settings, arm_space()
+    truths = _truths(chosen["change"])
+    changed, same = groups(*truths)
+    agent = CuriousAgent(
+        space, plant_of(chosen["change"], False, cell.seed), chosen["explorer"], cell.seed, forgetting=chosen["forgetting"]
+    )
+    seen, series = [], []
+    for is_after in (False, True):
+        if is_after:
+            agent.plant = plant_of(chosen["change"], True, cell.seed + 1)
+            agent.interrupt()
+        for _ in range(chosen["transitions"] // EVERY):
+            seen.append(explore(agent, EVERY))
+            error, value = l1(agent.model.debiased(), truths[is_after]), agent.plan()[1]
+            series.append([float(np.mean(numbers[which])) for numbers in (error, value) for which in (changed, same)])
+    return {"seen": np.concatenate(seen).astype(np.uint16), "series": np.array(series), "changed": changed, "same": same}
+
+
+@cache
+def _truths(change: str) -> tuple[Truth, Truth]:
+    """Before and after; the same in every process, which needs it but once."""
+    before, after = (truth_of(arm_space(), measure_outcomes(change, is_after, TRIES, 0)) for is_after in (False, True))
+    return before, after
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Do what is left of the sweep."""
+    run_cells(work, cells(arguments), folder, arguments)
+    return findings(load_cells(folder))
+
+
+def figure(folder: Path) -> Path:
+    """Tries, value and error of what changed, over time."""
+    return draw(load_cells(folder), folder / "change.png")
