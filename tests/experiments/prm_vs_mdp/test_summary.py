@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import pytest
+
+from experiments.prm_vs_mdp import _claims, add_arguments, cells, figure
+from experiments.prm_vs_mdp.summary import BLOCK, summarise
+from experiments.sweep import Cell, load_cells
+from experiments.sweep.cell_files import write_cell
+from mobee.errors import InvalidValue
+
+HARD = np.tile([True, False], BLOCK)
+
+
+def rival(name, share, seconds):
+    success = np.arange(2 * BLOCK) < share * 2 * BLOCK
+    numbers = {"success": success, "seconds": np.full(2 * BLOCK, seconds), "actions": np.full(2 * BLOCK, 3), "repairs": np.zeros(2 * BLOCK)}
+    return {f"{name}|{measure}": values for measure, values in numbers.items()} | {f"{name}|price": np.array(7.0)}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Three seeds: planned once succeeds in a half, repaired in all but 2 %, the MDP always."""
+    for seed in range(3):
+        both = rival("OMPL, planned once", 0.5, 60.0) | rival("OMPL, remembers", 1.0, 20.0)
+        write_cell(tmp_path, Cell(f"roadmaps-both-s{seed}", seed, {"belief": "both"}), {"hard": HARD, **both}, 1.0)
+        write_cell(
+            tmp_path, Cell(f"mdp-s{seed}", seed, {"learned": 4000}), {"hard": HARD, **rival("MDP, 4000 learned", 1.0, 18.0 + seed)}, 1.0
+        )
+    return tmp_path
+
+
+def test_a_row_is_a_rival_under_a_belief_with_all_its_seeds(folder):
+    summary = summarise(load_cells(folder).values())
+    once = summary.row("OMPL, planned once", "both")
+    assert (once.success.mean, once.hard.mean, once.seconds.mean, once.price) == (0.5, 0.5, 60.0, 7.0)
+    learned = summary.row("MDP, 4000 learned", "")
+    assert learned.seconds.low == 18.0 and learned.seconds.high == 20.0 and learned.curve.shape == (2, 3)
+    with pytest.raises(InvalidValue, match="resume"):
+        summary.row("straight", "")
+
+
+def test_planning_once_fails_and_a_graph_that_is_repaired_does_not(folder):
+    first, second = _claims(summarise(load_cells(folder).values()))
+    assert (first.verdict, second.verdict) == ("confirmed", "refuted")
+    assert "0.50" in first.ours and "7.0 h" in second.ours
+
+
+def test_the_figure_is_drawn_from_what_is_there(folder, tmp_path):
+    pytest.importorskip("matplotlib")
+    assert figure(folder).stat().st_size > 10_000
+    with pytest.raises(InvalidValue, match="no finished cells"):
+        figure(tmp_path / "none")
+
+
+def test_a_quick_run_asks_less_of_the_same_rivals():
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    given = (["--seeds", "2"], ["--seeds", "2", "--quick"])
+    whole, quick = (cells(argparse.Namespace(**vars(parser.parse_args(one)), seed=5)) for one in given)
+    assert [cell.name for cell in whole] == [cell.name for cell in quick] and len({cell.name for cell in whole}) == len(whole) == 18
+    assert {cell.seed for cell in whole} == {5, 6}
+    assert all(a.settings != b.settings for a, b in zip(whole, quick, strict=True))
