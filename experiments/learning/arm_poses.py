@@ -1,4 +1,4 @@
-"""Poses of the four joints that learn, in the whole robot, and in which of them the reactive layer would be silent."""
+"""Poses of the four joints that learn, in the whole robot, and which of them are clear of contacts and cables."""
 
 from __future__ import annotations
 
@@ -27,9 +27,12 @@ def arm_clauses() -> list[Clause]:
 
 
 @cache
-def clause_width() -> float:
-    """Where the published law begins to push away from a clause, in units of a.q + b."""
-    return Gains.published_2014().constraint_width
+def least_margin() -> float:
+    """How far a clause must be for a pose to count as clear, in units of a.q + b: half the zone in which the published law pushes.
+
+    There the push moves a resting arm by some three degrees, a quarter of the way out of a cell of the rank 3 lattice.
+    """
+    return Gains.published_2014().constraint_width / 2.0
 
 
 def whole(q: Array) -> Array:
@@ -40,11 +43,11 @@ def whole(q: Array) -> Array:
     return poses
 
 
-def silent(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
-    """In which of the poses (P, 4) rad neither a field nor one of the clauses exerts a force, by the published law."""
+def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
+    """In which of the poses (P, 4) rad no field touches anything and all of the clauses are far enough."""
     poses = whole(q)
     good = np.ones(len(poses), dtype=bool)
     good[model.evaluate(poses).table.pose] = False
     for clause in clauses:
-        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= clause_width()
+        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= least_margin()
     return good

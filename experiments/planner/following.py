@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.control.ride import place
-from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, silent, whole
+from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, clear, whole
 from experiments.planner.table import DOWN, UP, TablePlant
 from experiments.prm_vs_mdp.rivals import Rival
 from mobee import Lattice
@@ -60,9 +60,9 @@ class Frozen:
 
 
 def zone(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
-    """In which states' samples (S,) some force acts with the table at that height: contacts, or the cables."""
+    """Which states' samples (S,) are not clear of contacts and cables with the table at that height."""
     plant.set_top(top)
-    return ~silent(plant.inner.model, space.samples, arm_clauses())
+    return ~clear(plant.inner.model, space.samples, arm_clauses())
 
 
 def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries:
@@ -74,9 +74,9 @@ def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries
     for start, goal in (pairs[i] for i in rng.permutation(len(pairs))):
         way = space.samples[start] + WAY[:, None] * (space.samples[goal] - space.samples[start])
         plant.set_top(UP)
-        in_the_way = not silent(plant.inner.model, way, ()).all()
+        in_the_way = not clear(plant.inner.model, way, ()).all()
         plant.set_top(DOWN)
-        if in_the_way and silent(plant.inner.model, way, arm_clauses()).all():
+        if in_the_way and clear(plant.inner.model, way, arm_clauses()).all():
             chosen.append((start, goal))
             if len(chosen) == count:
                 break

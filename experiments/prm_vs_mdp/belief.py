@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.arm_poses import arm_clauses, columns, silent
+from experiments.learning.arm_poses import arm_clauses, clear, columns
 from experiments.learning.published import robot
 from experiments.prm_vs_mdp.scene import Scene, world_of
 from mobee import Gains, Model
@@ -18,7 +18,7 @@ STEP = 0.02  # of a joint's range, between two poses of a motion that are looked
 
 
 class Belief:
-    """Sound is a pose of the arm in which, as far as is believed, the reactive layer would exert no force.
+    """Sound is a pose of the arm that is, as far as is believed, clear of contacts and cables.
 
     Args:
         model: the robot in the world, as believed.
@@ -39,7 +39,7 @@ class Belief:
     def sound(self, q: Array) -> NDArray[np.bool_]:
         """Which of the poses (P, 4) rad are."""
         self.looks += len(q)
-        return silent(self._model, q + self._turns, self._clauses)
+        return clear(self._model, q + self._turns, self._clauses)
 
     def is_sound_motion(self, start: Array, end: Array) -> bool:
         """Whether all of the straight way between two poses (4,) rad is; where it starts does not count, for there the robot is."""

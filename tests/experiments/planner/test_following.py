@@ -57,7 +57,7 @@ def test_states_on_the_way_count_without_start_and_end():
 
 def test_a_roadmap_that_knows_no_table_fails_at_it_and_recovers_when_repaired(space):
     plant = TablePlant(0)
-    trial = Trial(space, queries(plant, space, 12, seed=0), np.zeros(len(space), dtype=bool), 0)
+    trial = Trial.of_seed(plant, space, 60, seed=0)
     rivals = roadmaps(plant, space)
     once, repairs = (trial.in_all_worlds(rivals[name]) for name in ("planned once", "repairs"))
     assert once["down"]["success"] == repairs["down"]["success"] == 1.0 and once["down"]["touched"] == 0.0
