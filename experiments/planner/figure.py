@@ -33,10 +33,10 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
         values = done[ways[way][0]].values
         draw_arrows(axes, space, values["outcomes"], values["probabilities"])
         axes.set_title(title, fontsize=10)
-    success, touched, recovering, plans = below.subplots(1, 4)
+    success, met, recovering, plans = below.subplots(1, 4)
     _moving(success, done, "success", "share of queries that succeed")
     success.legend(fontsize=7)
-    _moving(touched, done, "touched", "share of actions that end at the table")
+    _moving(met, done, "met", "share of queries that meet the table")
     _entering(recovering, done, "success", "share of queries that succeed")
     _entering(plans, done, "actions", "actions a query")
     drawing.savefig(path, dpi=110)

@@ -33,6 +33,8 @@ class Followed:
     """A query, LIMIT where it did not arrive."""
     touched: float
     """Share of actions that ended in the table's field."""
+    met: float
+    """Share of queries in which one did: who is stuck at the table counts once."""
     ways: tuple[tuple[int, ...], ...]
     """The states of each query, from start to end."""
 
@@ -86,14 +88,14 @@ def queries(plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries
 def follow(space: Lattice, rival: Rival, wanted: Queries, tops: Sequence[float], seed: int) -> Followed:
     """Send someone from rest at one state's sample to another state, each time with the table's top at its height [m]."""
     plant = TablePlant(seed + 900)
-    touched = 0
+    touched = met = 0
     ways: list[tuple[int, ...]] = []
     for (start, goal), top in zip(wanted, tops, strict=True):
         plant.set_top(top)
         place(plant.inner, whole(space.samples[start]))
         rival.begin(goal)
         here = plant.measure(PART)[:JOINTS]
-        states = [space.state_of(here)]
+        states, before = [space.state_of(here)], touched
         while states[-1] != goal and len(states) <= LIMIT and (aim := rival.aim(here)) is not None:
             target = space.target(goal)
             target[:JOINTS] = aim
@@ -103,10 +105,11 @@ def follow(space: Lattice, rival: Rival, wanted: Queries, tops: Sequence[float],
             states.append(space.state_of(here))
             touched += "table" in outcome.touched
         ways.append(tuple(states))
+        met += touched > before
     arrived = np.array([way[-1] == goal for way, (_, goal) in zip(ways, wanted, strict=True)])
     needed = np.array([len(way) - 1 for way in ways])
     mean = float(np.where(arrived, needed, LIMIT).mean())
-    return Followed(float(arrived.mean()), mean, touched / max(int(needed.sum()), 1), tuple(ways))
+    return Followed(float(arrived.mean()), mean, touched / max(int(needed.sum()), 1), met / len(ways), tuple(ways))
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, wanted: Queries, ways: Sequence[tuple[int, ...]]) -> tuple[float, float]:

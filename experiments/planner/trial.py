@@ -61,4 +61,4 @@ def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
 
 
 def _means(followed: Followed) -> dict[str, float]:
-    return {"success": followed.success, "actions": followed.actions, "touched": followed.touched}
+    return {"success": followed.success, "actions": followed.actions, "touched": followed.touched, "met": followed.met}

@@ -10,7 +10,15 @@ AFTER = [0, 1000]
 
 
 def means(success, touched=0.2):
-    return {"success": success, "actions": 5.0 - 2.0 * success, "touched": touched, "promised": 0.9, "kept": 0.9, "through": 0.3}
+    return {
+        "success": success,
+        "actions": 5.0 - 2.0 * success,
+        "touched": touched,
+        "met": touched,
+        "promised": 0.9,
+        "kept": 0.9,
+        "through": 0.3,
+    }
 
 
 def in_worlds(success, touched):

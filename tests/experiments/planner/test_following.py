@@ -44,7 +44,7 @@ def test_a_plan_without_obstacle_is_kept_and_its_way_is_counted(space):
     beliefs = TransitionModel(space).debiased()
     wanted = [(0, int(space.goal(0, 0)))]
     followed = follow(space, Frozen(space, beliefs), wanted, [DOWN], seed=0)
-    assert (followed.success, followed.actions, followed.touched, followed.ways) == (1.0, 1.0, 0.0, (wanted[0],))
+    assert (followed.success, followed.actions, followed.touched, followed.met, followed.ways) == (1.0, 1.0, 0.0, 0.0, (wanted[0],))
     promised, kept = promises(space, beliefs, wanted, followed.ways)
     assert promised == pytest.approx(0.75) and kept == 1.0  # an untried action is believed to succeed with 0.3 of 0.4
 
