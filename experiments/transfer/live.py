@@ -13,7 +13,7 @@ ROBOTS = {  # settings of robot_sim; PyBullet has physics of its own, its motors
     "pybullet": {"backend": "pybullet", "motors": "published"},
     "kinematic": {"backend": "kinematic", "motors": "identified"},
 }
-_ACTION = 6.0  # s of robot time, a little more than one takes
+_ACTION = 5.2  # s of robot time, a little more than one takes on average
 _PIECE = 200  # transitions a part of one launch, after which progress is told
 _TRIES = 3  # launches without a single new transition
 
