@@ -39,7 +39,7 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     _moving(met, done, "met", "share of queries that meet the table")
     _entering(recovering, done, "success", "share of queries that succeed")
     _entering(plans, done, "actions", "actions a query")
-    drawing.savefig(path, dpi=110)
+    drawing.savefig(path, dpi=80)
     return path
 
 
