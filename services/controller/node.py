@@ -8,7 +8,7 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.chain import Answer, Commands, Order, Tick
-from bus_schema.messages import EStop, Mode, Motion
+from bus_schema.messages import EStop, Mode
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
@@ -22,15 +22,14 @@ from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.controller.action import Action, Owner, busy_owners
+from services.controller.action import Action, busy_owners
 from services.controller.config import Config
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
+from services.controller.telling import Telling
 
 BAD_INPUT = 2  # exit code: the same again would not help
 OLDEST = 3  # ticks: with forces older than that the robot holds
-SOMETIMES = 10  # ticks: so often a part under way tells of its motion in lockstep
-NEWS = 0.01  # s of real time: so often every part tells of its motion in free mode, and of a change at once
 STALE = 100_000_000  # ns: a part whose state is older than that is not under control
 
 
@@ -51,10 +50,9 @@ class ControllerNode:
         self._last_k = -1
         bus = service.bus
         self._commands = bus.publisher(keys.COMMANDS, Commands, bus.control)
-        self._motions = {part: bus.publisher(keys.motion(part), Motion, bus.control) for part in robot.parts}
+        self._telling = Telling(bus, robot, self._law, self._actions)
         self._step_to_answer: tuple[int, bool] | None = None  # lockstep: tick, whether nothing was lacking
         self._participant = Participant(service)
-        self._told: dict[str, tuple[str, Owner | None]] = {}  # of each part's last motion message
         self._drives.answered = self._answer
         self._jitter = Percentiles()  # ms, of the time between two steps
         self._mark()
@@ -126,11 +124,11 @@ class ControllerNode:
         self._supervise(tick, fresh)
         orders, reference = self._control(tick, fresh) if tick.k > 0 else ({}, self._q)
         if tick.mode == "lock":
-            self._tell_motion(tick)  # who hears that it is its turn must have heard where its action stands
+            self._telling.tell(tick, self._q, self._forces)  # who hears that it is its turn must have heard where its action stands
             self._close(tick, fresh, orders, reference)
         else:
             self._command(tick.k, orders, reference)
-            self._tell_motion(tick)
+            self._telling.tell(tick, self._q, self._forces)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
         """What becomes of each part in this tick."""
@@ -215,40 +213,6 @@ class ControllerNode:
     def _command(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
         if orders:
             self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._config.ttl, answer=answer)
-
-    def _tell_motion(self, tick: Tick) -> None:
-        """Where the actions stand, of those of which that is not known."""
-        parts = [part for part in self._actions if not self._goes_without_saying(part, tick)]
-        if not parts:
-            return
-        touched = self._forces.touched if self._forces is not None else {}
-        velocity, acceleration, attractor = self._law.velocity, self._law.acceleration, self._law.attractor
-        for part in parts:
-            action, where = self._actions[part], self._where[part]
-            self._motions[part].put(
-                k=tick.k,
-                t=tick.t,
-                action_id=action.id,
-                epoch=action.owner.epoch if action.owner is not None else 0,
-                status=action.status,
-                since_k=action.since_k,
-                start_k=action.start_k,
-                q=self._q[where].tolist(),
-                dq=velocity[where].tolist(),
-                ddq=acceleration[where].tolist(),
-                goal=attractor[where].tolist(),
-                touched=touched.get(part, []),
-            )
-
-    def _goes_without_saying(self, part: str, tick: Tick) -> bool:
-        """Whether the part is under way as it was, or in free mode goes on in any way, which is told only now and then."""
-        action, k = self._actions[part], tick.k
-        known, self._told[part] = self._told.get(part), (action.id, action.owner)
-        if known != self._told[part] or action.since_k >= k:
-            return False
-        if tick.mode == "lock":
-            return action.status == "moving" and k % SOMETIMES > 0
-        return k % max(1, round(1e9 * NEWS * tick.rate / tick.dt)) > 0
 
     def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)

@@ -1,0 +1,126 @@
+"""What reaches a service: streams and the ticks, handed to its main thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import zenoh
+import zenoh.ext
+from zenoh.handlers import Callback
+
+from bus_schema import keys
+from bus_schema.chain import Tick
+from bus_schema.messages import Clock, Message, Turn
+from services.common.bus import NO_RUN, Bus
+from services.common.delivery import LATEST, STEP
+from services.common.inbox import CROWDED, Inbox, Newest
+
+_M = TypeVar("_M", bound=Message)
+_T = TypeVar("_T", Clock, Tick, Turn)
+
+
+class Listener:
+    """The streams that one process reads; all handlers run in the main thread."""
+
+    def __init__(self, bus: Bus, inbox: Inbox, locked: bool, direct: bool) -> None:
+        """`locked`: in lockstep; `direct`: Zenoh's own thread puts into the inbox."""
+        self.bus, self.inbox, self.locked, self._direct = bus, inbox, locked, direct
+        self.keeps_step = False  # a Participant of lockstep says otherwise
+        self.dawdle: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
+        bus.control = STEP if locked else LATEST
+        self._kept: list[Any] = []  # tokens die with their handles
+        self._on_run: list[Callable[[], None]] = []
+
+    def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
+        """Have the newest message of a stream handled; older ones waiting are overwritten."""
+        self._subscribe(key, self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
+
+    def on_each(
+        self,
+        key: str,
+        cls: type[_M],
+        handler: Callable[[_M], None],
+        *,
+        part: str | None = None,
+        history: bool = False,
+        any_run: bool = False,
+        crowd: int = CROWDED,
+        later: bool = False,
+    ) -> None:
+        """Have every message of a stream handled, with `history` also those from before this service came.
+
+        `crowd`: how many may be waiting for the main thread before this stream's messages are dropped.  `later`: they wait for
+        a message of another stream, before which they are handled.
+        """
+
+        def enqueue(sample: zenoh.Sample) -> None:
+            offer = self.inbox.offer_later if later else self.inbox.offer
+            offer(lambda: self._deliver(cls, sample, handler, part, any_run), crowd)
+
+        if history:
+            settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+            self._kept.append(zenoh.ext.declare_advanced_subscriber(self.bus.session, key, enqueue, history=settings))
+        else:
+            self._subscribe(key, enqueue)
+
+    def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
+        """The newest sample only; one after the other for who keeps step, since a slot would mix up the order of two streams."""
+        slot = Newest(self.inbox, handle)
+
+        def offer(sample: zenoh.Sample) -> None:
+            if self.keeps_step:
+                self.inbox.put(lambda: handle(sample))
+            else:
+                slot.offer(sample)
+
+        return offer
+
+    def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
+        """Each subscriber has a thread of its own, which costs time and in lockstep would mix up what one service put on two keys."""
+        self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self._direct else offer))
+
+    def on_clock(self, handler: Callable[[Clock], None]) -> None:
+        """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
+        self._on_time(keys.CLOCK, Clock, handler)
+
+    def on_tick(self, handler: Callable[[Tick], None]) -> None:
+        """As on_clock, for who computes on the body: every tick comes with the newest state of every part."""
+
+        def whole(tick: Tick) -> None:
+            if tick.parts.keys() == self.bus.part_sizes.keys():
+                handler(tick)
+            else:
+                self.bus.reject("part", f"Tick of {', '.join(tick.parts)}: this robot has {', '.join(self.bus.part_sizes)}")
+
+        self._on_time(keys.TICK, Tick, whole)
+
+    def on_turn(self, handler: Callable[[Turn], None]) -> None:
+        """Lockstep, instead of `on_clock`: have only those ticks handled that wait for this service."""
+        self._on_time(keys.turn(self.bus.who), Turn, handler)
+
+    def _on_time(self, key: str, cls: type[_T], handler: Callable[[_T], None]) -> None:
+        def tick(sample: zenoh.Sample) -> None:
+            time = self.bus.receive(cls, sample, any_run=True)
+            if time is None:
+                return
+            self.dawdle()
+            self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
+            if time.run != self.bus.run:
+                known, self.bus.run = self.bus.run, time.run
+                if known != NO_RUN:
+                    self.bus.event("warning", "new_run", f"robot_sim started run {time.run} after {known}")
+                for announce in self._on_run:
+                    announce()
+            handler(time)
+
+        self._subscribe(key, self._newest(tick))
+
+    def on_run(self, handler: Callable[[], None]) -> None:
+        """Have it called at the first tick of every run."""
+        self._on_run.append(handler)
+
+    def _deliver(self, cls: type[_M], sample: zenoh.Sample, handler: Callable[[_M], None], part: str | None, any_run: bool = False) -> None:
+        message = self.bus.receive(cls, sample, part, any_run=any_run)
+        if message is not None:
+            handler(message)
