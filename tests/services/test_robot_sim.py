@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus_schema import encode, encoding_of, keys
+from bus_schema import VERSION, encode, encoding_of, keys
 from bus_schema.chain import Commands, Order, Tick
 from bus_schema.messages import Clock, Command, EStop, Event, Message, State, Truth
 from bus_schema.rpc import Done, Driven, Empty, PartMeta, Place, Request, Take, Taken, WithEpoch
@@ -313,7 +313,7 @@ def test_wrong_commands_are_refused_counted_by_reason_and_move_nothing(bench: Be
 def test_a_replayed_command_is_refused(bench: Bench) -> None:
     epoch = bench.arm("left_arm")
     k = bench.clocks[-1].k
-    header = {"v": 1, "run": bench.rig.bus.run, "src": "x", "seq": 10**6, "k": k, "t": 0, "tw": 0}
+    header = {"v": VERSION, "run": bench.rig.bus.run, "src": "x", "seq": 10**6, "k": k, "t": 0, "tw": 0}
     payload = encode(Command(**header, epoch=epoch, re_k=k, mode="velocity", ref=elbow(0.0), ttl=100))  # type: ignore[arg-type]
     counted = bench.rejected("seq")
     for _ in range(2):
@@ -331,7 +331,7 @@ def test_random_bytes_on_every_key_move_nothing_and_kill_nothing(bench: Bench, r
     calls += [(keys.service_rpc("robot_sim", verb), Empty) for verb in ("stat", "mark", "config", "shutdown")]
     calls += [(keys.ESTOP_RESET, Empty), (keys.meta("torso"), Empty)]
     run, before = bench.clocks[-1].run, {part: bench.next_state(part).q for part in ROBOT.parts}
-    header = {"v": 1, "run": run, "src": "x", "seq": 5, "k": 1, "t": 1, "tw": 1}
+    header = {"v": VERSION, "run": run, "src": "x", "seq": 5, "k": 1, "t": 1, "tw": 1}
     good = encode(Command(**header, epoch=epoch, re_k=10**9, mode="velocity", ref=elbow(1.0), ttl=100))  # type: ignore[arg-type]
     refused = sum(bench.rig.stat("robot_sim").rejected.values())
     for number in range(2000):

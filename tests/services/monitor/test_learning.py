@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bus_schema import VERSION
 from bus_schema.messages import Learned, Surprise
 from mobee import Lattice, TransitionModel, load_robot
 from mobee.learning.flat import flat
@@ -33,7 +34,7 @@ class Notebook:
 
 
 def told(model: TransitionModel, **changes: Any) -> Learned:
-    header = {"v": 1, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
+    header = {"v": VERSION, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
     numbers = {"tries": model.tries.astype("<u4").tobytes(), "reward": model.reward.astype("<f4").tobytes()}
     fields = {"agent": "left_arm", "n": 3, "s": 0, "space": json.dumps(SPACE.settings), "value": numbers["reward"]}
     return Learned(**(header | numbers | fields | {"surprises": surprises(model)} | changes))
