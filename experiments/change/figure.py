@@ -33,7 +33,8 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
                 _curves(row, mine, style, f"{condition[0].replace('_', ' ')}, forgetting {condition[1]:g}")
         for axes, title in zip(row, COLUMNS, strict=True):
             axes.axvline(EVERY * _looks_before(runs, change), color="k", linewidth=0.6)
-            axes.set(title=f"{TITLES[change]}: {title}", xlabel="transitions", ylim=(0.0, None))
+            axes.set_title(f"{TITLES[change]}: {title}", fontsize=9)
+            axes.set(xlabel="transitions", ylim=(0.0, None))
         row[0].legend(fontsize=7)
     drawing.savefig(path, dpi=150)
     return path
