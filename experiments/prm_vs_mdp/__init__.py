@@ -23,6 +23,7 @@ from experiments.learning.published import arm_plant
 from experiments.prm_vs_mdp.belief import BELIEFS, believed
 from experiments.prm_vs_mdp.figure import draw
 from experiments.prm_vs_mdp.graphs import KINDS, NEIGHBOURS, make_roadmap, with_goals
+from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.prm_vs_mdp.queries import answer
 from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Rival, Straight
 from experiments.prm_vs_mdp.scene import Scene, make_scene, space, world_of
@@ -93,7 +94,8 @@ def _rivals(cell: Cell, scene: Scene, lattice: Lattice) -> Iterator[tuple[str, R
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Work off all cells; returns the table and the claims."""
+    """Work off all cells; returns the table and the claims.  Raises OmplMissing before anything is begun."""
+    require_ompl()
     run_cells(work, cells(arguments), folder, arguments)
     summary = summarise(load_cells(folder).values())
     return {"claims": [claim.record() for claim in _claims(summary)], "rivals": summary.table()}

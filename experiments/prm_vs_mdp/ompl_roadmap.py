@@ -16,12 +16,18 @@ class OmplMissing(MobeeError):
     """Raised when a roadmap of OMPL is asked for and OMPL is not installed."""
 
 
-def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
-    """Grow a PRM over the arm's four joints, in fractions of their ranges; raises OmplMissing."""
+def require_ompl() -> tuple[Any, Any, Any]:
+    """OMPL's modules base, geometric and util; raises OmplMissing."""
     try:
         from ompl import base, geometric, util
     except ImportError:
         raise OmplMissing("this experiment needs OMPL, which is not installed: pip install '.[planning]' in MoBeE's folder") from None
+    return base, geometric, util
+
+
+def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
+    """Grow a PRM over the arm's four joints, in fractions of their ranges; raises OmplMissing."""
+    base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_ERROR)
     rng = np.random.default_rng([seed, 300])
     space = base.RealVectorStateSpace(len(belief.span))

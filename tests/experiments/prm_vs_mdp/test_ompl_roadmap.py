@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import argparse
 import sys
 
 import numpy as np
 import pytest
 
+from experiments.prm_vs_mdp import run
 from experiments.prm_vs_mdp.belief import believed
 from experiments.prm_vs_mdp.ompl_roadmap import OmplMissing, ompl_roadmap
 from experiments.prm_vs_mdp.scene import BALLS, Scene
@@ -26,7 +28,8 @@ def test_a_roadmap_follows_from_its_seed_and_holds_only_sound_poses_and_motions(
             assert belief.is_sound_motion(first.vertices[vertex], first.vertices[other_vertex])
 
 
-def test_without_ompl_it_says_how_to_get_it(monkeypatch):
+def test_without_ompl_it_says_how_to_get_it_before_anything_is_begun(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "ompl", None)
     with pytest.raises(OmplMissing, match=r"planning"):
-        ompl_roadmap(believed(SCENE, "true"), 30, 5, 0)
+        run(argparse.Namespace(), tmp_path)
+    assert not list(tmp_path.iterdir())
