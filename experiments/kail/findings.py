@@ -12,7 +12,7 @@ from experiments.claims import Claim
 from experiments.kail.on_paper import told_apart
 from experiments.kail.spaces import space_of
 from experiments.learning.constraint_actions import constraint_actions, relative_tries
-from experiments.learning.counted import exists_in, failures_of, tries_of
+from experiments.learning.outcomes import exists_in, failures_of, tries_of
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array, Ints

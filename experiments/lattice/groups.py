@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.learning.counted import exists_in, failures_of, visits_of
+from experiments.learning.outcomes import exists_in, failures_of, visits_of
 from experiments.learning.published import arm_space
 from experiments.sweep import CellResult
 from mobee import Lattice

@@ -21,15 +21,19 @@ def tries_of(space: Lattice, seen: Ints) -> Ints:
     return tries
 
 
+def failures_of(space: Lattice, seen: Ints) -> Ints:
+    """How often each action did not end in its goal, (S, A)."""
+    return tries_of(space, seen[seen[:, 2] != goals_of(space, seen)])
+
+
 def failure_shares(space: Lattice, seen: Ints) -> Array:
     """Which share of an action's tries ended elsewhere than in its goal, (S, A); nan where there was none."""
-    failed = tries_of(space, seen[seen[:, 2] != goals_of(space, seen)])
     with np.errstate(invalid="ignore"):
-        shares: Array = failed / tries_of(space, seen)
+        shares: Array = failures_of(space, seen) / tries_of(space, seen)
     return shares
 
 
-def arrivals(space: Lattice, seen: Ints) -> Ints:
+def visits_of(space: Lattice, seen: Ints) -> Ints:
     """How often each state was reached, (S,)."""
     return np.bincount(seen[:, 2], minlength=len(space))
 
@@ -44,3 +48,8 @@ def ends_of(space: Lattice, seen: Ints, source: int, goal: int) -> dict[int, int
 def outcome_counts(space: Lattice, seen: Ints) -> Ints:
     """In how many different states each action was seen to end, (S, A)."""
     return tries_of(space, np.unique(seen, axis=0))
+
+
+def exists_in(space: Lattice) -> Array:
+    """Which entries of (S, A) are actions."""
+    return np.asarray(space.goals >= 0)

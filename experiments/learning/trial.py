@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from mobee import CuriousAgent, OfflinePlant, Plant, Space
+from mobee.errors import MobeeError
 from mobee.robot.robot import Ints
+from mobee.store import Transition
 
 
 def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
@@ -22,13 +24,19 @@ def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
     return space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
 
 
+def newest(agent: CuriousAgent) -> Transition:
+    """What the agent observed last; raises MobeeError if it has observed nothing."""
+    if agent.last is None:
+        raise MobeeError(f"the agent of {agent.part} has observed nothing yet: let it make a step first.")
+    return agent.last
+
+
 def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], bool] = lambda agent: False) -> Ints:
     """Observe up to that many transitions, fewer when the agent knows `enough`; returns (T, 3): state, action, state reached."""
     seen: list[tuple[int, int, int]] = []
     while len(seen) < most and not enough(agent):
         agent.step()
-        last = agent.last
-        assert last is not None
+        last = newest(agent)
         seen.append((last.s, last.a, last.s_next))
     return np.array(seen, dtype=np.int64).reshape(-1, 3)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.learning.outcomes import arrivals, ends_of, failure_shares, goals_of, outcome_counts
+from experiments.learning.outcomes import ends_of, failure_shares, goals_of, outcome_counts, visits_of
 from experiments.learning.published import RANK4, STRETCHED, arm_space
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
@@ -56,7 +56,7 @@ class Run:
     @cached_property
     def visits(self) -> Ints:
         """Of each state, (256,)."""
-        return arrivals(self.space, self.seen)
+        return visits_of(self.space, self.seen)
 
     @property
     def unreached(self) -> tuple[int, ...]:

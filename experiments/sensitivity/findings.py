@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.learning.outcomes import arrivals, ends_of, outcome_counts
+from experiments.learning.outcomes import ends_of, outcome_counts, visits_of
 from experiments.learning.published import RANK3, RANK4, arm_space
 from experiments.rank4.findings import ASIDE, HARDLY, NEVER
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS
@@ -84,7 +84,7 @@ def rows_of(found: Mapping[str, CellResult]) -> dict[str, Row]:
 def _row(runs: Sequence[Mapping[str, Any]]) -> Row:
     spaces = {name: arm_space(levels) for name, levels in LEVELS.items()}
     four, three = ([run[name].astype(np.intp) for run in runs] for name in ("rank4", "rank3"))
-    visits = np.array([arrivals(spaces["rank4"], seen) for seen in four])
+    visits = np.array([visits_of(spaces["rank4"], seen) for seen in four])
     eight = (*NEVER, *HARDLY)
     where: Counter[int] = Counter()
     for seen in four:

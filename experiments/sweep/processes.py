@@ -72,7 +72,8 @@ class _Worker:
     def take(self) -> Done:
         """The cell that has ended."""
         cell, self.cell = self.cell, None
-        assert cell is not None
+        if cell is None:
+            raise RuntimeError("no cell is under way in this process")
         try:
             done: Done = self.answers.recv()
             return done

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.learning.trial import newest
 from mobee import CuriousAgent, OfflinePlant
 from mobee.robot.robot import Array
 
@@ -43,8 +44,7 @@ def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transi
         for part, outcome in plant.advance():
             agent, log = by_part[part], logs[part]
             agent.observe(outcome)
-            last = agent.last
-            assert last is not None
+            last = newest(agent)
             log.seen.append((last.s, last.a, last.s_next))
             log.settled.append(outcome.settled)
             log.durations.append(outcome.duration)

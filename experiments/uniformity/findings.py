@@ -9,7 +9,7 @@ from typing import Any
 
 from experiments.claims import Claim
 from experiments.learning.constraint_actions import constraint_actions, relative_tries
-from experiments.learning.counted import exists_in, failures_of, tries_of, visits_of
+from experiments.learning.outcomes import exists_in, failures_of, tries_of, visits_of
 from experiments.learning.published import ARM_NEIGHBOURS, arm_space
 from experiments.learning.spread import gini, relative_spread
 from experiments.statistics import interquartile_mean, interval, ratio, ratio_interval

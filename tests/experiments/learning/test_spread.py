@@ -5,19 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.learning.counted import exists_in, failures_of, tries_of, visits_of
-from experiments.learning.published import HYPERCUBE, arm_space
 from experiments.learning.spread import gini, relative_spread
-
-
-def test_tries_failures_and_visits_are_those_of_the_record():
-    space = arm_space(HYPERCUBE)
-    goal = int(space.goals[3, 1])
-    seen = np.array([[3, 1, goal], [3, 1, 3], [3, 0, 3]], dtype=np.uint16)
-    assert tries_of(space, seen)[3].tolist() == [1, 2, 0, 0]
-    assert failures_of(space, seen)[3].tolist() == [1, 1, 0, 0]
-    assert visits_of(space, seen)[[3, goal]].tolist() == [2, 1]
-    assert exists_in(space).sum() == space.state_actions
 
 
 @given(st.lists(st.integers(0, 50), min_size=2, max_size=30).filter(any))
