@@ -67,6 +67,14 @@ def ratio_interval(
     return interval(both, lambda drawn: statistic(drawn[: len(first)]) / statistic(drawn[len(first) :]), labels, seed, resamples)
 
 
+def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
+    """Whether an interval (low, high) lies within the bounds, or beside them; None where it holds one of them and so does not decide."""
+    low, high = span
+    if low >= least and high <= most:
+        return True
+    return False if high < least or low > most else None
+
+
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
     """How likely a run of the first group is above one of the second, a tie counting half (Mann-Whitney's U / nm)."""
     mine, theirs = _checked(first), _checked(second)

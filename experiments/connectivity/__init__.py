@@ -61,8 +61,9 @@ def work(cell: Cell) -> dict[str, Any]:
     tasks = Tasks.drawn(space, cell.settings["tasks"], cell.seed)
     reached, actions = [], []
     for budget in cell.settings["budgets"]:
-        if covered is None and len(explore(agent, budget - agent.transitions, once)) and agent.transitions < budget:
-            covered = agent.transitions
+        if covered is None:
+            explore(agent, budget - agent.transitions, once)
+            covered = agent.transitions if agent.model.tries[space.goals >= 0].all() else None
         explore(agent, budget - agent.transitions)
         trial = arm_plant(cell.seed + 1000)
         found = [attempt(agent.model, trial, start, goal, MOST_ACTIONS) for start, goal in tasks.pairs]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
@@ -100,12 +100,12 @@ def _claims(published: Mapping[tuple[str, str], list[dict[str, Any]]]) -> list[C
         curious, least = times[world, "curious"], times[world, "least_tried"]
         low, high = ratio_interval(curious, least)
         text = _number(ratio(curious, least), low, high) + (", better than published" if high < ABOUT_HALF[0] else "")
-        claims.append(claim.measured(text, low <= ABOUT_HALF[1] and high >= ABOUT_HALF[0]))
+        claims.append(claim.measured(text, decides((low, high), *ABOUT_HALF)))
     claims += [_best(times, published), _novel(published), _aggressive(published)]
     for world, claim in FLOOR.items():
         shares = times[world, "curious"] / [one["floor"] for one in published[world, "curious"]]
         low, high = interval(shares)
-        claims.append(claim.measured(_number(interquartile_mean(shares), low, high, digits=3), _at_most(FLOORS[world], [(low, high)])))
+        claims.append(claim.measured(_number(interquartile_mean(shares), low, high, digits=3), decides((low, high), most=FLOORS[world])))
     return [*claims, _depletes(times)]
 
 
@@ -147,9 +147,8 @@ def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
 
 def _at_most(bound: float, intervals: list[tuple[float, float]]) -> bool | None:
     """Whether all are below the bound, or one is above it; None where an interval does not decide."""
-    if all(high <= bound for _, high in intervals):
-        return True
-    return False if any(low > bound for low, _ in intervals) else None
+    each = [decides(span, most=bound) for span in intervals]
+    return False if False in each else None if None in each else True
 
 
 def _number(value: float, low: float, high: float, digits: int = 2) -> str:

@@ -6,8 +6,8 @@ forces and the threshold at which an action is called settled decide about it, d
 Source: thesis 7.2.5, 7.3 (the findings); the study is ours.  Published number: none.  Run time: 6 minutes on 2 cores.
 
 The left arm, curious, 5000 actions on rank 4 (20-80 %) and 3000 on rank 3 (25-75 %), one number changed at a time; the published
-value is in brackets.  Carried: the four never reached, the other four at most 4 times each on average, no other state unreached, 90 % of the
-tries turned aside end one level up; the rank 3 entries fail in half of their tries, 21->24 in no more than 10 %.
+value is in brackets.  Carried: the four never reached, the other four at most 4 times each on average, no other state unreached,
+90 % of the tries turned aside end one level up; the rank 3 entries fail in half of their tries, 21->24 in no more than 10 %.
 """
 
 from __future__ import annotations

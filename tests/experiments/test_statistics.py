@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.statistics import interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
 from mobee.errors import InvalidValue
 
 numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40)
@@ -74,3 +74,23 @@ def test_values_without_a_mean_are_refused(values):
 def test_each_value_needs_a_stratum():
     with pytest.raises(InvalidValue, match="one label for each of the 2 values"):
         interval([1.0, 2.0], strata=["a"])
+
+
+@pytest.mark.parametrize(
+    ("span", "verdict"),
+    [
+        ((0.4, 0.5), True),
+        ((0.45, 0.6), True),
+        ((0.3, 0.5), None),
+        ((0.5, 0.7), None),
+        ((0.3, 0.9), None),
+        ((0.1, 0.3), False),
+        ((0.7, 0.9), False),
+    ],
+)
+def test_an_interval_decides_where_it_holds_no_bound(span, verdict):
+    assert decides(span, 0.4, 0.6) is verdict
+
+
+def test_one_bound_is_enough_to_decide():
+    assert decides((1.1, 1.2), most=1.0) is False and decides((0.8, 1.2), least=1.0) is None and decides((1.0, 1.2), least=1.0) is True
