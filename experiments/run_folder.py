@@ -55,6 +55,12 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
     return options
 
 
+def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
+    """Write down with what options a run goes on, where they are not those it was begun with."""
+    if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
+        write(folder / CONFIG, {"experiment": name, "options": dict(options)})
+
+
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
     """Keep other processes away from a run meanwhile; raises InvalidValue if one is at it, OSError if config.json cannot be opened."""

@@ -14,7 +14,7 @@ from experiments.claims import Claim
 from experiments.claims_table import claims_text, found_in, newest_runs, recorded, rows, write_page
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import RESULTS, discard_unused, given_run, held, new_run, newest_run, options_of, write
+from experiments.run_folder import RESULTS, discard_unused, given_run, held, keep_options, new_run, newest_run, options_of, write
 from experiments.sweep import CellsFailed
 from mobee.errors import InvalidValue, MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
@@ -98,6 +98,8 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     options.resume, seed = run, begun.get("seed")
     if options.seed != seed:
         raise InvalidValue(f"{run} has seed {seed}, not {options.seed}, and keeps it. Begin a new run without --resume.")
+    if getattr(options, "quick", False) and not begun.get("quick"):
+        raise InvalidValue(f"{run} was begun without --quick; what both find must not be mixed. Begin a new run without --resume.")
     return options
 
 
@@ -112,6 +114,8 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
         folder = options.resume or new_run(options.runs, experiment.NAME, own)
         with held(folder):
+            if options.resume:
+                keep_options(folder, experiment.NAME, own)
             results = _results(experiment, options, folder)
             write(folder / RESULTS, results)
     except OSError as error:

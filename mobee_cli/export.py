@@ -11,10 +11,11 @@ from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
 from mobee_cli.transition_tables import write_csv, write_parquet
 
-_NOTES = """Columns: source (file in the run), agent, n (1, 2, ... of this agent), s, a, s_next (state,
-action, state reached), reward (nats), settled, duration (s), q (rad, all motors of the part),
-touched (names of objects), time (s since 1970). Cells of a sweep keep the first six. A Parquet
-file holds all settings in its metadata, as JSON under "mobee"."""
+_NOTES = """Columns: source (file in the run), agent, n (1, 2, ... of this agent), s, a,
+s_next (state, action, state reached), reward (nats), settled, duration (s),
+q (rad, all motors of the part), touched (names of objects), time (s since
+1970). Cells of a sweep keep the first six. A Parquet file holds all settings in
+its metadata, as JSON under "mobee"."""
 _IN_THE_RUN = Path()
 
 

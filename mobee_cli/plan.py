@@ -15,9 +15,10 @@ from mobee.robot.load import load_robot
 from mobee.store import STORE
 from mobee_cli.errors import BAD_INPUT, UserError
 
-_NOTES = """A place is the number of a state, or the angles in rad of the joints that the agent knows (or of
-all motors of its part): the state that holds this pose. Plans trust what was observed, over a
-weak belief that untried actions work (docs/learning.md)."""
+_NOTES = """A place is the number of a state, or the angles in rad of the joints that the
+agent knows (or of all motors of its part): the state that holds this pose.
+Plans trust what was observed, over a weak belief that untried actions work
+(docs/learning.md)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

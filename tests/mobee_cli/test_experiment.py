@@ -76,6 +76,15 @@ def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
     assert results["run"] == folder
     assert set(results) == {"run", "complete", "katana"}
     assert results["katana"]["objects_reached"] == 3
+    assert json.loads((Path(folder) / "config.json").read_text())["options"]["objects"] == 3
+
+
+def test_a_short_run_is_not_mixed_with_a_whole_one(tmp_path, capsys):
+    folder = tmp_path / "20260101-000000-lattice"
+    folder.mkdir()
+    (folder / "config.json").write_text(json.dumps({"experiment": "lattice", "options": {"seed": 0, "seeds": 1, "quick": False}}))
+    assert main(["experiment", "run", "lattice", "--resume", str(folder), "--quick"]) == 2
+    assert "was begun without --quick" in capsys.readouterr().err
 
 
 def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):
