@@ -40,6 +40,7 @@ CLAIMS = (
 )
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
+WELL = 0.95  # success, also where going straight fails, of what "works well"
 MUCH = 1.25  # times as long: then a roadmap that succeeds is still insufficient
 
 
@@ -107,7 +108,7 @@ def _claims(summary: Summary) -> list[Claim]:
     first = CLAIMS[0].measured(
         f"with cables, 1 cm and 3 degrees hidden, success {once.success}, {once.hard} where going straight fails;"
         f" the MDP after 4000 transitions {learned.success}, {learned.hard}",
-        once.success.high < learned.success.low,
+        True if once.hard.high < learned.hard.low else False if once.hard.low >= WELL else None,
     )
     second = CLAIMS[1].measured(
         f"a PRM that takes out what fails, and remembers it, succeeds in {remembers.success} and takes {remembers.seconds} s a query;"

@@ -36,16 +36,16 @@ class Belief:
         self.looks = 0
         """How many poses were looked at."""
 
-    def sound(self, q: Array) -> NDArray[np.bool_]:
-        """Which of the poses (P, 4) rad are."""
+    def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
+        """Which of the poses (P, 4) rad are; `cables`: whether they count."""
         self.looks += len(q)
-        return clear(self._model, q + self._turns, self._clauses)
+        return clear(self._model, q + self._turns, self._clauses if cables else ())
 
-    def is_sound_motion(self, start: Array, end: Array) -> bool:
+    def is_sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
         """Whether all of the straight way between two poses (4,) rad is; where it starts does not count, for there the robot is."""
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
-        return bool(self.sound(start + shares * (end - start)).all())
+        return bool(self.sound(start + shares * (end - start), cables).all())
 
 
 def believed(scene: Scene, kind: str) -> Belief:

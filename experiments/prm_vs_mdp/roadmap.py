@@ -39,7 +39,7 @@ class Roadmap:
         return pose
 
     def add(self, pose: Array, neighbours: int) -> int:
-        """Add a vertex and its sound motions from and to the nearest ones, or all of them if none is; returns its number."""
+        """Add a vertex and its motions to and from the nearest ones that are `reachable`; returns its number."""
         joined = self.reachable(pose, neighbours)
         self.vertices = np.concatenate([self.vertices, pose[None]])
         self._costs.append({})
@@ -52,9 +52,13 @@ class Roadmap:
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Those of the nearest vertices to which the straight motion is sound; all of them if it is to none."""
+        """Those of the nearest vertices to which the straight motion is sound; if it is to none, is free of contacts; else all."""
         near = self.nearest(pose, neighbours)
-        return [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v])] or near
+        for cables in (True, False):  # a pose that is asked for may be held by the cables and be reached all the same
+            found = [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v], cables)]
+            if found:
+                return found
+        return near
 
     def way(self, starts: dict[int, float], goal: int, blocked: Collection[Edge]) -> list[int] | None:
         """The cheapest vertices to pass, from one of the starts (with what it costs to get there) to the goal; None if there is no way."""

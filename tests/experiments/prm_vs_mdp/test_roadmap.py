@@ -13,7 +13,7 @@ class Plane:
 
     span = np.ones(4)
 
-    def is_sound_motion(self, start, end):
+    def is_sound_motion(self, start, end, cables=True):
         return (start[0] - 0.5) * (end[0] - 0.5) > 0.0
 
 
@@ -63,3 +63,15 @@ def test_a_vertex_is_joined_by_sound_motions_only_and_by_all_if_there_are_none(s
     assert square.way({here: 0.0}, 3, ()) == [here, 3]
     beyond = square.add(pose(0.9, 1.0), 2)
     assert square.way({beyond: 0.0}, 3, {edge(beyond, 3)}) == [beyond, here, 3]
+
+
+class Held(Plane):
+    """As the plane, but all of it is too near to the cables."""
+
+    def is_sound_motion(self, start, end, cables=True):
+        return not cables and super().is_sound_motion(start, end)
+
+
+def test_a_pose_held_by_the_cables_is_joined_where_nothing_touches():
+    roadmap = Roadmap(np.array([pose(0.4), pose(0.6)]), [], Held())
+    assert roadmap.reachable(pose(0.45), 2) == [0]
