@@ -45,6 +45,12 @@ def interval(
     return float(low), float(high)
 
 
+def told(values: ArrayLike, digits: int = 2) -> str:
+    """The interquartile mean and its 95 % interval, for people."""
+    low, high = interval(values)
+    return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+
+
 def _drawn(places: list[Ints], count: int, rng: np.random.Generator) -> Ints:
     chosen = np.empty(count, dtype=np.intp)
     for mine in places:

@@ -66,9 +66,9 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
     steps = "1 action" if len(plan.actions) == 1 else f"{len(plan.actions)} actions"
     lines = [f"{known}: from state {plan.path[0]} to {plan.path[-1]} by {steps}, all as expected with probability {plan.success:.2f}."]
     for state, action, following, chance in zip(plan.path, plan.actions, plan.path[1:], plan.probabilities, strict=False):
-        goal, tries = learned.space.goal(state, action), learned.model.tries[state, action]
+        goal, tries = learned.space.goal(state, action), int(learned.model.tries[state, action])
         aimed = "" if goal == following else f" by aiming at {goal}"
-        lines.append(f"  {state:>4} -> {following:<4} probability {chance:.2f}, tried {tries} times{aimed}")
+        lines.append(f"  {state:>4} -> {following:<4} probability {chance:.2f}, tried {_times(tries)}{aimed}")
     lines.append(f"Planning anew after each action, {plan.steps:.1f} actions on average.")
     if plan.distrusted or plan.avoided:
         lines.append(f"If every action worked, {plan.shortest} would do. Expected to fail (probability of success):")
@@ -77,6 +77,10 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
         avoided = ", ".join(f"{state} ({chance:.2f})" for state, chance in plan.avoided.items())
         lines.append(f"Avoided (probability of getting through): {avoided}.")
     return lines
+
+
+def _times(count: int) -> str:
+    return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
 def _as_json(learned: Learned, plan: Plan) -> dict[str, Any]:

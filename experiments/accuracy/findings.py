@@ -10,7 +10,7 @@ import numpy as np
 from experiments.accuracy.worlds import WORLDS, space_of, truths
 from experiments.claims import Claim
 from experiments.learning.model_error import CERTAIN, l1, most_likely
-from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
 from experiments.sweep import CellResult
 from mobee import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
@@ -94,7 +94,7 @@ def _claims(last: Mapping[tuple[str, str], Array]) -> list[Claim]:
     claims = []
     for world, claim in OVERALL.items():
         mine = column(world, "curious", DEBIASED)
-        claims.append(claim if mine is None else claim.measured(_said(mine), decides(interval(mine), most=MOST)))
+        claims.append(claim if mine is None else claim.measured(told(mine, 4), decides(interval(mine), most=MOST)))
     for (world, explorer), claim in STOCHASTIC.items():
         times = BETTER if explorer == "curious" else AIM
         claims.append(_ratio(claim, column(world, "least_tried", DEBIASED_STOCHASTIC), column(world, explorer, DEBIASED_STOCHASTIC), times))
@@ -109,8 +109,3 @@ def _ratio(claim: Claim, above: Array | None, below: Array | None, times: float)
     low, high = ratio_interval(above, below)
     said = f"{ratio(above, below):.2f} x [{low:.2f}, {high:.2f}] ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
     return claim.measured(said, decides((low, high), times))
-
-
-def _said(values: Array) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.4f} [{low:.4f}, {high:.4f}]"

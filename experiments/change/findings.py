@@ -10,7 +10,7 @@ import numpy as np
 from experiments.change.runs import BEFORE, CONDITIONS, EVERY, RELEARNED, Key, Run, runs_of
 from experiments.change.worlds import CHANGES
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
 
 VALUE = Claim("thesis 7.2.6", "the value of actions that suddenly end elsewhere shoots up: over that before", "shot up")
@@ -52,11 +52,6 @@ def _censored(run: Run) -> float:
     return float(min(run.relearned, EVERY * (len(run.series) - run.looks_before)))
 
 
-def _said(values: Sequence[float], digits: int = 2) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
-
-
 def _claims(runs: Mapping[Key, list[Run]]) -> list[Claim]:
     return [
         _of_changes(VALUE, runs, lambda run: run.value_jump, lambda low, high: low > 1.0),
@@ -69,7 +64,7 @@ def _claims(runs: Mapping[Key, list[Run]]) -> list[Claim]:
 
 def _of_changes(claim: Claim, runs: Mapping[Key, list[Run]], number: Number, holds: Callable[[float, float], bool]) -> Claim:
     values = {change: [number(run) for run in runs[change, "curious", 1.0]] for change in CHANGES}
-    text = ", ".join(f"{change} {_said(mine)}" for change, mine in values.items())
+    text = ", ".join(f"{change} {told(mine)}" for change, mine in values.items())
     return claim.measured(text, all(holds(*interval(mine)) for mine in values.values()))
 
 
@@ -77,7 +72,7 @@ def _against_least_tried(runs: Mapping[Key, list[Run]]) -> Claim:
     parts, holds = [], True
     for change in CHANGES:
         ours, theirs = ([run.eagerness for run in runs[change, explorer, 1.0]] for explorer in ("curious", "least_tried"))
-        parts.append(f"{change}: {_said(ours)}, least tried {_said(theirs)}")
+        parts.append(f"{change}: {told(ours)}, least tried {told(theirs)}")
         holds = holds and interval(ours)[0] > max(1.0, interval(theirs)[1])
     return TRIED.measured("; ".join(parts), holds)
 
@@ -88,7 +83,7 @@ def _sooner(claim: Claim, runs: Mapping[Key, list[Run]], explorer: str, forgetti
         forgot, kept = runs[change, explorer, forgetting], runs[change, explorer, 1.0]
         values = [[_censored(run) for run in mine] for mine in (forgot, kept)]
         never = [sum(np.isinf(run.relearned) for run in mine) for mine in (forgot, kept)]
-        said = [f"{_said(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True)]
+        said = [f"{told(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True)]
         parts.append(f"{change}: {said[0]}, without forgetting {said[1]}")
         holds = holds and interval(values[0])[1] < interval(values[1])[0]
     return claim.measured("; ".join(parts), holds)

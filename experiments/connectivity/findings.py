@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.statistics import decides, interquartile_mean, interval, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, ratio_interval, told
 from experiments.sweep import CellResult
 
 GRAPHS: tuple[int | str, ...] = (4, 6, 8, 12, 16, 24, 32, "equidistant")
@@ -85,10 +85,10 @@ def _claims(grouped: Groups) -> list[Claim]:
     return [
         _sooner(times, middle, len(grouped[PUBLISHED])),
         DENSER.measured(
-            ", ".join(f"{graph}: {_said(shares[graph])}, direct {_said(ways[graph])}" for graph in fewer),
+            ", ".join(f"{graph}: {told(shares[graph])}, direct {told(ways[graph])}" for graph in fewer),
             bool(enough),
         ),
-        LENGTH.measured(", ".join(f"{graph}: {_said(values)}" for graph, values in lengths.items()), None),
+        LENGTH.measured(", ".join(f"{graph}: {told(values)}" for graph, values in lengths.items()), None),
     ]
 
 
@@ -101,8 +101,3 @@ def _sooner(times: Mapping[int, list[int]], middle: Mapping[int, float], seeds: 
     fewest, *_, most = times.values()
     ordered = list(middle.values())
     return SOONER.measured(text, decides(ratio_interval(fewest, most), most=1.0) if ordered == sorted(ordered) else False)
-
-
-def _said(values: list[float]) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"

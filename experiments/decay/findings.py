@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval, ratio_interval
+from experiments.statistics import interquartile_mean, interval, ratio_interval, told
 from experiments.sweep import CellResult
 
 EXPLORERS = ("curious", "least_tried", "random")
@@ -70,8 +68,4 @@ def _claims(grouped: Groups) -> list[Claim]:
 
 
 def _each(values: Mapping[str, list[float]], digits: int) -> str:
-    parts = []
-    for explorer in EXPLORERS:
-        low, high = interval(np.array(values[explorer]))
-        parts.append(f"{explorer} {interquartile_mean(values[explorer]):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]")
-    return ", ".join(parts)
+    return ", ".join(f"{explorer} {told(values[explorer], digits)}" for explorer in EXPLORERS)

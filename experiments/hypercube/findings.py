@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
@@ -86,9 +86,8 @@ def _actions(grouped: Groups) -> Claim:
     parts, ends = [], []
     for discount, values in grouped.items():
         actions = [one["transitions"] for one in values]
-        low, high = interval(actions)
-        parts.append(f"{interquartile_mean(actions):.0f} [{low:.0f}, {high:.0f}] at discount {discount:g}")
-        ends.append(high)
+        parts.append(f"{told(actions, 0)} at discount {discount:g}")
+        ends.append(interval(actions)[1])
     return ACTIONS.measured("; ".join(parts), all(high <= 1.05 * PUBLISHED for high in ends))
 
 
@@ -96,8 +95,7 @@ def _uniform(grouped: Groups) -> Claim:
     early = [dispersion(one["early_tries"]) for values in grouped.values() for one in values]
     end = [dispersion(one["tries"]) for values in grouped.values() for one in values]
     spans = [interval(early), interval(end)]
-    said = [f"{interquartile_mean(v):.2f} [{s[0]:.2f}, {s[1]:.2f}]" for v, s in zip((early, end), spans, strict=True)]
-    text = f"variance of tries over a uniform choice's: {said[0]} after {EARLY}, {said[1]} at the end"
+    text = f"variance of tries over a uniform choice's: {told(early)} after {EARLY}, {told(end)} at the end"
     return UNIFORM.measured(text, ALIKE[0] <= spans[0][0] and spans[0][1] <= ALIKE[1] and spans[1][1] < spans[0][0])
 
 

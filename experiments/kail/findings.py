@@ -13,7 +13,7 @@ from experiments.kail.on_paper import told_apart
 from experiments.kail.spaces import space_of
 from experiments.learning.constraint_actions import constraint_actions, relative_tries
 from experiments.learning.outcomes import exists_in, failures_of, tries_of
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array, Ints
 
@@ -102,10 +102,11 @@ def _claims(grouped: Groups) -> list[Claim]:
         _apart(FIRST, "failing"),
         _apart(SECOND, "uncertain"),
         SPIKES.measured(
-            f"tries over those of the others: {_said(dearer['kail'])}, plain KL {_said(dearer['kl'])}", kail_low > max(kl_high, 1.0)
+            f"tries over those of the others: {told(dearer['kail'])}, plain KL {told(dearer['kl'])}",
+            kail_low > max(kl_high, 1.0),
         ),
-        SIZE.measured(_said(ratios["kl"]), kl_ratio[0] > 1.5),
-        COMPARABLE.measured(_said(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
+        SIZE.measured(told(ratios["kl"]), kl_ratio[0] > 1.5),
+        COMPARABLE.measured(told(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
     ]
 
 
@@ -123,8 +124,3 @@ def _sizes(grouped: Groups, divergence: str) -> list[float]:
     """What the torso's first tries pay over what the arm's do, of each seed."""
     torso, arm = (grouped[part, divergence] for part in ("torso", "left_arm"))
     return [float(one.paid[:EARLY].mean() / other.paid[:EARLY].mean()) for one, other in zip(torso, arm, strict=False)]
-
-
-def _said(values: list[float]) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"

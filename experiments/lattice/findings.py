@@ -10,7 +10,7 @@ from scipy.stats import spearmanr
 
 from experiments.claims import Claim
 from experiments.lattice.groups import ENTERING, FAILING, HARD, Key, Run, groups
-from experiments.statistics import decides, interquartile_mean, interval, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, ratio_interval, told
 from experiments.sweep import CellResult
 
 DISCOUNTS = (0.5, 0.9, 0.99)
@@ -98,11 +98,6 @@ def _mean(runs: list[Run], number: Callable[[Run], float]) -> float:
     return interquartile_mean([number(run) for run in runs])
 
 
-def _said(values: list[float], digits: int = 2) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
-
-
 def _actions(grouped: Groups, initial: str) -> list[float]:
     return [float(run.transitions) for discount in DISCOUNTS for run in grouped[initial, discount]]
 
@@ -110,7 +105,7 @@ def _actions(grouped: Groups, initial: str) -> list[float]:
 def _number(grouped: Groups, initial: str) -> Claim:
     parts = []
     for discount in DISCOUNTS:
-        parts.append(f"{_said([float(run.transitions) for run in grouped[initial, discount]], 0)} at discount {discount:g}")
+        parts.append(f"{told([float(run.transitions) for run in grouped[initial, discount]], 0)} at discount {discount:g}")
     strata = [discount for discount in DISCOUNTS for _ in grouped[initial, discount]]
     span = interval(_actions(grouped, initial), strata=strata)
     least, most = PUBLISHED[initial] * (1.0 - TOLERANCE), PUBLISHED[initial] * (1.0 + TOLERANCE)
@@ -129,7 +124,7 @@ def _least_visited(every: list[Run]) -> Claim:
     rest = [float(run.visits[list(HARD)].mean() / run.visits.mean()) for run in every]
     text = (
         f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a run; "
-        f"visits over the mean of all states {_said(rest)}"
+        f"visits over the mean of all states {told(rest)}"
     )
     return LEAST_VISITED.measured(text, set(together) == set(HARD))
 
@@ -139,7 +134,7 @@ def _share(claim: Claim, every: list[Run], pairs: tuple[tuple[int, int], ...], h
     for pair in pairs:
         shares = [run.share_failed([pair]) for run in every]
         low, high = interval(shares)
-        parts.append(f"{pair[0]}->{pair[1]} {_said(shares)}")
+        parts.append(f"{pair[0]}->{pair[1]} {told(shares)}")
         verdicts.append(holds(low, high))
     return claim.measured("fail " + ", ".join(parts), all(verdicts))
 
@@ -149,7 +144,7 @@ def _by_discount(claim: Claim, grouped: Groups, pairs: Any, stands_out: Callable
     parts, found = [], []
     for discount in DISCOUNTS:
         values = [run.relative_tries(pairs or run.out_of_hard) for run in grouped["50-50", discount]]
-        parts.append(f"{_said(values)} at discount {discount:g}")
+        parts.append(f"{told(values)} at discount {discount:g}")
         found.append(values)
     means = [interquartile_mean(values) for values in found]
     holds = stands_out(*interval(found[0])) and means == sorted(means)
@@ -161,23 +156,23 @@ def _peaks(grouped: Groups) -> Claim:
     parts, verdicts = [], []
     for discount in DISCOUNTS:
         values = [run.relative_tries(FAILING) for run in grouped["60-40", discount]]
-        parts.append(f"{_said(values)} at discount {discount:g}")
+        parts.append(f"{told(values)} at discount {discount:g}")
         verdicts.append(interval(values)[0] > 1.0)
     even = [run.relative_tries(FAILING) for discount in DISCOUNTS for run in grouped["50-50", discount]]
-    return PEAKS.measured("tries over the mean of all: " + ", ".join(parts) + f"; 50-50: {_said(even)}", all(verdicts))
+    return PEAKS.measured("tries over the mean of all: " + ", ".join(parts) + f"; 50-50: {told(even)}", all(verdicts))
 
 
 def _degree(every: list[Run]) -> Claim:
     goals = every[0].space.goals
     degree = np.bincount(goals[goals >= 0], minlength=len(goals))
     correlations = [float(spearmanr(degree, run.visits).statistic) for run in every]
-    return DEGREE.measured(f"rank correlation {_said(correlations)}", interval(correlations)[0] > 0.5)
+    return DEGREE.measured(f"rank correlation {told(correlations)}", interval(correlations)[0] > 0.5)
 
 
 def _uniform(every: list[Run]) -> Claim:
     tries = [float(run.tries[run.exists].std() / run.tries[run.exists].mean()) for run in every]
     visits = [float(run.visits.std() / run.visits.mean()) for run in every]
-    text = f"standard deviation over mean: tries {_said(tries)}, visits {_said(visits)}"
+    text = f"standard deviation over mean: tries {told(tries)}, visits {told(visits)}"
     return UNIFORM.measured(text, decides(ratio_interval(tries, visits), most=1.0))
 
 
@@ -186,5 +181,5 @@ def _stochastic(every: list[Run]) -> Claim:
     for run in every:
         share = run.failures[run.exists] / run.tries[run.exists]
         counts.append(float(((share > SOMETIMES[0]) & (share < SOMETIMES[1])).sum()))
-    text = f"{_said(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
+    text = f"{told(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
     return STOCHASTIC.measured(text, interval(counts)[0] >= 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interval, told
 from experiments.sweep import CellResult
 from mobee import TransitionModel
 from mobee.robot.robot import Array
@@ -55,7 +55,11 @@ def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
     who = [("plans", "still", "MDP, trained without the table"), ("plans", "moving", "MDP, trained while it moved")]
     who += [(mode, "roadmap", f"roadmap, {mode}") for mode in ROADMAPS]
     tried = [
-        {"who": name, "table": test, **{m: spread(tested(done, way, test, m, mode)) for m in (OF_ALL if way == "roadmap" else MEASURES)}}
+        {
+            "who": name,
+            "table": test,
+            **{m: told(tested(done, way, test, m, mode)) for m in (OF_ALL if way == "roadmap" else MEASURES)},
+        }
         for mode, way, name in who
         for test in ("down", "moving", "up")
     ]
@@ -63,7 +67,7 @@ def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
     for forgetting in ENTERS:
         after, rows = entering(done, forgetting)
         entered += [
-            {"forgetting": forgetting, "transitions since": n, **{m: spread(rows[m][:, i]) for m in MEASURES}} for i, n in enumerate(after)
+            {"forgetting": forgetting, "transitions since": n, **{m: told(rows[m][:, i]) for m in MEASURES}} for i, n in enumerate(after)
         ]
     return {"carried out": tried, "since the table entered": entered}
 
@@ -81,19 +85,11 @@ def entering(done: Mapping[str, CellResult], forgetting: float) -> tuple[list[in
     return list(found[0].values["after"]), rows
 
 
-def spread(values: Array) -> str:
-    """The interquartile mean with its interval."""
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"
-
-
 def _fates_claim(done: Mapping[str, CellResult]) -> Claim:
     counts = [r.values["fates"] for r in done.values() if r.cell.settings["way"] == "still"]
     share = np.array([c["goal"] / c["tried"] for c in counts])
     elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
-    text = (
-        f"{spread(share)} of those tried {TRIES} times reach their goal, {spread(elsewhere)} lead elsewhere, {spread(sometimes)} sometimes"
-    )
+    text = f"{told(share)} of those tried {TRIES} times reach their goal, {told(elsewhere)} lead elsewhere, {told(sometimes)} sometimes"
     return CLAIMS[0].measured(text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0)
 
 
@@ -102,8 +98,8 @@ def _enters_claim(done: Mapping[str, CellResult]) -> Claim:
     gain = rows["success"][:, -1] - rows["success"][:, 0]
     fewer = rows["actions"][:, 0] - rows["actions"][:, -1]
     text = (
-        f"success {spread(rows['success'][:, 0])} when it enters, {spread(rows['success'][:, -1])} {after[-1]} transitions later;"
-        f" actions a query {spread(rows['actions'][:, 0])} and {spread(rows['actions'][:, -1])}"
+        f"success {told(rows['success'][:, 0])} when it enters, {told(rows['success'][:, -1])} {after[-1]} transitions later;"
+        f" actions a query {told(rows['actions'][:, 0])} and {told(rows['actions'][:, -1])}"
     )
     return CLAIMS[1].measured(text, interval(gain)[0] > 0.0 and interval(fewer)[0] > 0.0)
 
@@ -111,8 +107,8 @@ def _enters_claim(done: Mapping[str, CellResult]) -> Claim:
 def _roadmap_claim(done: Mapping[str, CellResult]) -> Claim:
     once, repairs = (tested(done, "roadmap", "moving", "success", mode) for mode in ("planned once", "repairs"))
     text = (
-        f"success with the moving table: planned once {spread(once)}, repaired when a motion fails {spread(repairs)};"
-        f" the MDP trained while it moved {spread(tested(done, 'moving', 'moving', 'success'))}"
+        f"success with the moving table: planned once {told(once)}, repaired when a motion fails {told(repairs)};"
+        f" the MDP trained while it moved {told(tested(done, 'moving', 'moving', 'success'))}"
     )
     low, high = interval(repairs)
     return CLAIMS[2].measured(text, False if low > OPERABLE else True if high < OPERABLE else None)
@@ -124,6 +120,6 @@ def _moving_claims(done: Mapping[str, CellResult]) -> list[Claim]:
     for claim, measure, what in ((CLAIMS[3], "actions", "actions a query"), (CLAIMS[4], "met", "share of queries that meet it")):
         moving, still = (tested(done, way, "moving", measure) for way in ("moving", "still"))
         low, high = interval(still - moving)
-        text = f"{what} with the moving table: {spread(moving)}, trained without it {spread(still)}; less by {spread(still - moving)}"
+        text = f"{what} with the moving table: {told(moving)}, trained without it {told(still)}; less by {told(still - moving)}"
         found.append(claim.measured(text, True if low > 0.0 else False if high < 0.0 else None))
     return found

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.claims import Claim
 from experiments.learning.outcomes import ends_of, failure_shares, goals_of, outcome_counts, visits_of
 from experiments.learning.published import RANK4, STRETCHED, arm_space
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
 from mobee import Lattice
 from mobee.robot.robot import Array, Ints
@@ -154,7 +154,7 @@ def _claims(runs: Mapping[str, list[Run]]) -> list[Claim]:
         _rare(small),
         _turned(small),
         RANDOM.measured(
-            f"{_said([run.uncertain for run in small], 0)} actions (stretched {_said([run.uncertain for run in stretched], 0)}) "
+            f"{told([run.uncertain for run in small], 0)} actions (stretched {told([run.uncertain for run in stretched], 0)}) "
             "fail in 10 to 90 % of their tries",
             interval([run.uncertain for run in small])[0] >= 1.0,
         ),
@@ -163,15 +163,10 @@ def _claims(runs: Mapping[str, list[Run]]) -> list[Claim]:
     ]
 
 
-def _said(values: Sequence[float], digits: int = 1) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
-
-
 def _rare(small: list[Run]) -> Claim:
     visits = np.array([run.visits[list(HARDLY)] for run in small])
     others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in small)
-    text = f"{_said(visits.ravel().tolist())} times each, at most {visits.max()}; every other state at least {others} times"
+    text = f"{told(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
     return RARE.measured(text, bool(visits.max() <= MOST_VISITS))
 
 
@@ -181,7 +176,7 @@ def _turned(small: list[Run]) -> Claim:
         ends = [ends_of(run.space, run.seen, source, goal) for run in small]
         aside = [found.get(end, 0) for found in ends]
         others = [sum(found.values()) - found.get(end, 0) for found in ends]
-        parts.append(f"{source}->{goal}: {_said(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
+        parts.append(f"{source}->{goal}: {told(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
         holds = holds and min(aside) >= LEAST_ASIDE and max(others) <= HANDFUL
     return TURNED.measured("; ".join(parts), holds)
 
@@ -189,16 +184,16 @@ def _turned(small: list[Run]) -> Claim:
 def _stretch(small: list[Run], stretched: list[Run]) -> Claim:
     few, many = [len(run.unreached) for run in small], [len(run.unreached) for run in stretched]
     always = sorted(set.intersection(*(set(run.unreached) for run in stretched)))
-    text = f"{_said(many, 0)} against {_said(few, 0)}; in every run {' '.join(map(str, always))}"
+    text = f"{told(many, 0)} against {told(few, 0)}; in every run {' '.join(map(str, always))}"
     return STRETCH.measured(text, interval(many)[0] > 2.0 * interval(few)[1])
 
 
 def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
     shares = {name: [float((run.touching >= 0).mean()) for run in runs] for name, runs in (("20-80 %", small), ("stretched", stretched))}
-    text = ", ".join(f"{name}: {_said([100.0 * share for share in mine])} % of the actions" for name, mine in shares.items())
+    text = ", ".join(f"{name}: {told([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
     few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
     reached = [float(run.succeeded[run.touching >= 0].mean()) for run in stretched if (run.touching >= 0).any()]
-    said = f"stretched: {_said([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+    said = f"stretched: {told([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
     return [
         CONTACTS.measured(text, min(few[0], many[0]) > MANY),
         MORE.measured(text, many[0] > 2.0 * few[1]),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
 from experiments.table.dependence import LEARNERS, SCORES, judged
 from experiments.table.interest import agreement, autocorrelation, by_goal, of_arms, share_of_top
@@ -123,11 +123,6 @@ def detector(runs: dict[Key, list[Run]]) -> dict[str, dict[str, float]]:
     return table
 
 
-def _said(values: Sequence[float], digits: int = 2) -> str:
-    low_end, high_end = interval(values)
-    return f"{interquartile_mean(values):.{digits}f} [{low_end:.{digits}f}, {high_end:.{digits}f}]"
-
-
 def _claims(runs: Runs) -> list[Claim]:
     curious, ghost = runs["tree", "curious", "table"], runs["tree", "curious", "ghost"]
     return [
@@ -141,7 +136,7 @@ def _claims(runs: Runs) -> list[Claim]:
         FEW.measured(_most(curious), max(int(outcome_numbers(run).max()) for run in curious) <= HANDFUL),
         _detects(runs),
         TIME.measured(
-            f"{_said([run.hours / 24.0 for run in curious])} days; computed in {_said([run.result.seconds for run in curious], 0)} s",
+            f"{told([run.hours / 24.0 for run in curious])} days; computed in {told([run.result.seconds for run in curious], 0)} s",
             DAYS[0] <= _mean(curious, lambda run: run.hours / 24.0) <= DAYS[1],
         ),
     ]
@@ -150,7 +145,7 @@ def _claims(runs: Runs) -> list[Claim]:
 def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: float = -np.inf) -> Claim:
     """The curious agents at the table stand out from all the controls, and are above `least`."""
     values = {key[1:]: [number(run) for run in mine] for key, mine in runs.items() if key[0] == "tree"}
-    text = ", ".join(f"{explorer} at the {world} {_said(mine, digits)}" for (explorer, world), mine in values.items())
+    text = ", ".join(f"{explorer} at the {world} {told(mine, digits)}" for (explorer, world), mine in values.items())
     ours = interval(values["curious", "table"])[0]
     controls = (interval(mine)[1] for key, mine in values.items() if key != ("curious", "table"))
     return claim.measured(text, ours > max(least, *controls))
@@ -158,14 +153,14 @@ def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: f
 
 def _similar(runs: Runs) -> Claim:
     found = {e: [agreement(by_goal(of_arms(*pair))) for pair in with_ghosts(runs, "tree", e)] for e in EXPLORERS}
-    text = ", ".join(f"{explorer} {_said(values)}" for explorer, values in found.items())
+    text = ", ".join(f"{explorer} {told(values)}" for explorer, values in found.items())
     ours = interval(found["curious"])[0]
     return SIMILAR_ARMS.measured(text, ours > SIMILAR and all(ours > interval(found[e])[1] for e in EXPLORERS[1:]))
 
 
 def _cycles(curious: list[Run], ghost: list[Run]) -> Claim:
     ours, theirs = ([float(autocorrelation(run.touch_rate, 1)[1]) for run in runs] for runs in (curious, ghost))
-    text = f"at lag 1 {_said(ours)}, at the ghost {_said(theirs)}"
+    text = f"at lag 1 {told(ours)}, at the ghost {told(theirs)}"
     return CYCLES.measured(text, interval(ours)[0] > max(0.0, interval(theirs)[1]))
 
 
@@ -183,9 +178,7 @@ def _detects(runs: Runs) -> Claim:
             return DETECTOR.measured("needs two seeds", None)
         values = {explorer: [one.at_all for one in mine] for explorer, mine in hits.items()}
         chance = interquartile_mean([one.chance for one in hits["curious"]])
-        parts.append(
-            f"{learner}: " + ", ".join(f"{explorer} {_said(mine)}" for explorer, mine in values.items()) + f", chance {chance:.2f}"
-        )
+        parts.append(f"{learner}: " + ", ".join(f"{explorer} {told(mine)}" for explorer, mine in values.items()) + f", chance {chance:.2f}")
         least = interval(values["curious"])[0]
         holds = holds and least > 2.0 * chance and all(least > interval(values[explorer])[1] for explorer in EXPLORERS[1:])
     return DETECTOR.measured("; ".join(parts), holds)

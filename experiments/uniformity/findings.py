@@ -12,7 +12,7 @@ from experiments.learning.constraint_actions import constraint_actions, relative
 from experiments.learning.outcomes import exists_in, failures_of, tries_of, visits_of
 from experiments.learning.published import ARM_NEIGHBOURS, arm_space
 from experiments.learning.spread import gini, relative_spread
-from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
 from experiments.sweep import CellResult
 from mobee import Lattice
 from mobee.robot.robot import Array, Ints
@@ -102,12 +102,12 @@ def _claims(grouped: Groups) -> list[Claim]:
     tries = {e: [gini(run.tries) for run in grouped["nearest", e]] for e in EXPLORERS}
     even = {e: [gini(run.tries) for run in grouped["equidistant", e]] for e in EXPLORERS}
     spikes = {e: _spikes(grouped, "nearest", e) for e in EXPLORERS}
-    others = "; ".join(f"{e} {_said(spikes[e])}" for e in EXPLORERS[1:])
+    others = "; ".join(f"{e} {told(spikes[e])}" for e in EXPLORERS[1:])
     none = all(interval(spikes[e])[1] < 1.5 for e in EXPLORERS[1:]) if at_constraints(grouped, "nearest").any() else None
     return [
         VISITS.measured(f"standard deviation over mean: {_each(visits)}", _lowest(visits)),
         TRIES.measured(f"Gini coefficient: {_each(tries)}", _lowest(tries)),
-        SPIKES.measured(_said(spikes["curious"]), interval(spikes["curious"])[0] > 1.5),
+        SPIKES.measured(told(spikes["curious"]), interval(spikes["curious"])[0] > 1.5),
         NONE.measured(others, none),
         SAME.measured(f"Gini coefficient: {_each(even)}", decides(ratio_interval(even["least_tried"], even["curious"]), most=AS_EVEN)),
     ]
@@ -119,9 +119,4 @@ def _lowest(values: Mapping[str, list[float]]) -> bool:
 
 
 def _each(values: Mapping[str, list[float]]) -> str:
-    return ", ".join(f"{explorer} {_said(values[explorer])}" for explorer in EXPLORERS)
-
-
-def _said(values: list[float]) -> str:
-    low, high = interval(values)
-    return f"{interquartile_mean(values):.2f} [{low:.2f}, {high:.2f}]"
+    return ", ".join(f"{explorer} {told(values[explorer])}" for explorer in EXPLORERS)

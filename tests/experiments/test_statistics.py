@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
+from experiments.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval, told
 from mobee.errors import InvalidValue
 
 numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40)
@@ -94,3 +94,8 @@ def test_an_interval_decides_where_it_holds_no_bound(span, verdict):
 
 def test_one_bound_is_enough_to_decide():
     assert decides((1.1, 1.2), most=1.0) is False and decides((0.8, 1.2), least=1.0) is None and decides((1.0, 1.2), least=1.0) is True
+
+
+def test_a_mean_is_told_with_its_interval():
+    assert told([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
+    assert told([321, 320, 320, 320], 0).startswith("320 [320, ")
