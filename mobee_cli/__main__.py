@@ -75,7 +75,7 @@ def _run(verb: str, arguments: list[str]) -> int:
 
 def _usage() -> str:
     verbs = "\n".join(f"  {verb:<11}{text}" for verb, text in VERBS.items())
-    notes = "`mobee <verb> --help` tells more.  Exit codes: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."
+    notes = "`mobee <verb> --help` tells more.\nExit codes: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."
     return f"usage: mobee <verb> [options]\n\n{verbs}\n\n{notes}"
 
 

@@ -54,7 +54,7 @@ def _censored(run: Run) -> float:
 
 def _claims(runs: Mapping[Key, list[Run]]) -> list[Claim]:
     return [
-        _of_changes(VALUE, runs, lambda run: run.value_jump, lambda low, high: low > 1.0),
+        _value(runs),
         _against_least_tried(runs),
         _of_changes(MENDED, runs, lambda run: float(run.errors[-1]), lambda low, high: high <= RELEARNED),
         _sooner(SOONER, runs, "curious", 0.95),
@@ -66,6 +66,15 @@ def _of_changes(claim: Claim, runs: Mapping[Key, list[Run]], number: Number, hol
     values = {change: [number(run) for run in runs[change, "curious", 1.0]] for change in CHANGES}
     text = ", ".join(f"{change} {told(mine)}" for change, mine in values.items())
     return claim.measured(text, all(holds(*interval(mine)) for mine in values.values()))
+
+
+def _value(runs: Mapping[Key, list[Run]]) -> Claim:
+    parts, holds = [], True
+    for change in CHANGES:
+        jumps, before = zip(*((run.value_jump, run.value_jump_before) for run in runs[change, "curious", 1.0]), strict=True)
+        parts.append(f"{change} {told(jumps)}, as long before {told(before)}")
+        holds = holds and interval(jumps)[0] > max(1.0, interval(before)[1])
+    return VALUE.measured("; ".join(parts), holds)
 
 
 def _against_least_tried(runs: Mapping[Key, list[Run]]) -> Claim:

@@ -56,8 +56,16 @@ class Run:
     @property
     def value_jump(self) -> float:
         """The highest value of what changed soon after, over that just before."""
+        return self._jump(self.looks_before)
+
+    @property
+    def value_jump_before(self) -> float:
+        """The same where nothing has changed: over the last transitions before."""
+        return self._jump(self.looks_before - SOON // EVERY)
+
+    def _jump(self, look: int) -> float:
         values = self.series[:, 2]
-        return float(values[self.looks_before : self.looks_before + SOON // EVERY].max() / values[self.looks_before - 1])
+        return float(values[look : look + SOON // EVERY].max() / values[look - 1])
 
     @property
     def errors(self) -> Array:

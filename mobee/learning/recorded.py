@@ -21,6 +21,8 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     now is not the one on record (the robot's limits, or this program, are others).
     """
     kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space}
+    if not isinstance(settings, Mapping):
+        raise InvalidValue(f"{settings!r} is no record of a space: give Space.settings.")
     kind = settings.get("kind", "lattice")
     if kind not in kinds or not {"robot", "digest", "joints"} <= settings.keys():
         raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is none of a space: give Space.settings.")

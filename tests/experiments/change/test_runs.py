@@ -6,7 +6,7 @@ import pytest
 from experiments.change.runs import EVERY, SOON, Run
 from experiments.learning.published import arm_space
 
-LOOKS = 2 * SOON // EVERY  # half of them before the change
+LOOKS = 4 * SOON // EVERY  # half of them before the change
 
 
 def a_run(errors):
@@ -25,7 +25,7 @@ def test_tries_are_over_the_mean_of_all_actions():
     run = a_run(np.ones(LOOKS // 2))
     assert run.eagerness_before == 0.0
     assert run.eagerness == pytest.approx(arm_space().state_actions)
-    assert run.value_jump == pytest.approx(3.0)
+    assert run.value_jump == pytest.approx(3.0) and run.value_jump_before == pytest.approx(1.0)
 
 
 def test_half_of_the_error_is_gone_or_never_is():
