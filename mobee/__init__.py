@@ -7,6 +7,7 @@ from mobee.learning.agent import CuriousAgent
 from mobee.learning.lattice import Lattice
 from mobee.learning.parallel import run
 from mobee.learning.planner import Plan, Planner
+from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
@@ -55,6 +56,7 @@ __all__ = [
     "join_robots",
     "load_robot",
     "load_world",
+    "policy_iteration",
     "reach_path",
     "run",
     "run_batch",
