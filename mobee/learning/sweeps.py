@@ -13,7 +13,7 @@ UInts = NDArray[np.uint64]  # as an index it never counts from the end, which co
 BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of sweeps
 _ROUNDING = 4.0 * 2.0**-52  # of a value: changes as small as this may cycle for ever
 _EVALUATED = 60  # improvements that are followed by an evaluation; those after them are plain sweeps, which converge from anywhere
-_EVALUATIONS = 5  # sweeps of one evaluation at most
+_EVALUATIONS = 3  # sweeps of one evaluation at most
 _ALIKE = 0.5  # changes whose spread is less than this share of the largest
 
 
@@ -22,39 +22,38 @@ def _pack(
     probabilities: Array,
     outcomes: Ints,
     reward: Array,
+    values: Array,
     discount: float,
-    first: Ints,
     ends: Ints,
     weights: Array,
     following: UInts,
-    rewards: Array,
-    actions: Ints,
+    found: Array,
 ) -> int:
-    """One row for each action that exists, without empty bins.
+    """The bins that are not empty, action by action, and the first sweep on the way.
 
-    State s has the rows first[s] .. first[s + 1], a row the bins ends[row] .. ends[row + 1]; `weights` are the discounted
-    probabilities.  Returns the number of rows, or what is wrong.
+    Row s A + a has the bins ends[row] .. ends[row + 1], none if there is no such action; `weights` are the discounted
+    probabilities.  Returns 0, or what is wrong.
     """
-    rows, used, ends[0] = 0, 0, 0
+    row, used, ends[0] = 0, 0, 0
     for s in range(outcomes.shape[0]):
-        first[s] = rows
         for a in range(outcomes.shape[1]):
-            if reward[s, a] == -np.inf:
-                continue
-            for b in range(outcomes.shape[2]):
+            value = 0.0
+            for b in range(outcomes.shape[2] if reward[s, a] != -np.inf else 0):
                 if probabilities[s, a, b] != 0.0:
                     if not 0 <= outcomes[s, a, b] < outcomes.shape[0]:
                         return BAD_OUTCOME
                     weights[used], following[used] = discount * probabilities[s, a, b], outcomes[s, a, b]
+                    value += weights[used] * values[following[used]]
                     used += 1
-            if used > ends[rows]:
-                if not np.isfinite(reward[s, a]):
-                    return BAD_REWARD
-                rewards[rows], actions[rows] = reward[s, a], a
-                rows += 1
-                ends[rows] = used
-    first[outcomes.shape[0]] = rows
-    return rows
+            if used == ends[row]:
+                found[s, a] = -np.inf
+            elif np.isfinite(reward[s, a]):
+                found[s, a] = value + reward[s, a]
+            else:
+                return BAD_REWARD
+            row += 1
+            ends[row] = used
+    return 0
 
 
 @inner_exact
@@ -119,37 +118,42 @@ def solve(
     no action: its value is -inf.  A state without actions keeps its value.  Returns the number of sweeps over all actions, or
     what is wrong.
     """
-    states, most = len(values), reward.size
+    states, actions = reward.shape
     for s in range(states):
         if not np.isfinite(values[s]):
             return BAD_START
-    first, ends = np.empty(states + 1, dtype=np.int64), np.empty(most + 1, dtype=np.int64)
-    weights, following = np.empty(outcomes.size), np.empty(outcomes.size, dtype=np.uint64)
-    rewards, actions = np.empty(most), np.empty(most, dtype=np.int64)
-    rows = _pack(probabilities, outcomes, reward, discount, first, ends, weights, following, rewards, actions)
-    if rows < 0:
-        return rows
+    ends, weights, following = np.empty(reward.size + 1, dtype=np.int64), np.empty(outcomes.size), np.empty(outcomes.size, dtype=np.uint64)
+    wrong = _pack(probabilities, outcomes, reward, values, discount, ends, weights, following, found)
+    if wrong:
+        return wrong
+    rewards, rows = reward.reshape(reward.size), found.reshape(reward.size)
     limit, largest = tolerance, 0.0
-    for row in range(rows):
-        largest = max(largest, abs(rewards[row]))
-    if relative and largest > 0.0:
+    for row in range(reward.size if relative else 0):
+        if ends[row + 1] > ends[row]:
+            largest = max(largest, abs(rewards[row]))
+    if largest > 0.0:
         limit *= largest
-    new, chosen, before, sweeps = values.copy(), np.empty(states, dtype=np.int64), np.empty(rows), 0
-    for s in range(states):
-        before[first[s] : first[s + 1]] = values[s]
+    new, chosen, sweeps = values.copy(), np.empty(states, dtype=np.int64), 0
     while True:
         change, largest, k = 0.0, 0.0, 0
         for s in range(states):
             best, at = -np.inf, -1
-            for row in range(first[s], first[s + 1]):
-                value, end = 0.0, ends[row + 1]
-                while k < end:
-                    value += weights[k] * values[following[k]]
-                    k += 1
-                value += rewards[row]
-                if not evaluate and abs(value - before[row]) > change:
-                    change = abs(value - before[row])
-                before[row] = value
+            for row in range(s * actions, (s + 1) * actions):
+                end = ends[row + 1]
+                if end == ends[row]:
+                    continue
+                value = rows[row]
+                if sweeps == 0:  # found while it was packed
+                    before = values[s]
+                else:
+                    before, value = value, 0.0
+                    while k < end:
+                        value += weights[k] * values[following[k]]
+                        k += 1
+                    value += rewards[row]
+                    rows[row] = value
+                if not evaluate and abs(value - before) > change:
+                    change = abs(value - before)
                 if value > best:
                     best, at = value, row
             chosen[s] = at
@@ -159,11 +163,6 @@ def solve(
                     change = abs(best - values[s])
         values[:], sweeps = new, sweeps + 1
         if change < limit or change <= _ROUNDING * largest:
-            break
+            return sweeps
         if evaluate and sweeps <= _EVALUATED:
             _evaluate(chosen, ends, weights, following, rewards, values, new, discount, 0.5 * (1.0 - discount) * limit)
-    found[:] = -np.inf
-    for s in range(states):
-        for row in range(first[s], first[s + 1]):
-            found[s, actions[row]] = before[row]
-    return sweeps
