@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.rounds import one_core, rates
-from experiments.bench.vi import ALGORITHM_7, COLD, DISCOUNT, SCIPY, WARM, contestants
+from experiments.bench.vi import ALGORITHM_7, COLD, DISCOUNT, OBSERVING, SCIPY, WARM, contestants
 from experiments.bench.vi_peers import QUANTECON
 from experiments.bench.vi_workload import at_work, of_size
 from experiments.matplotlib_figure import new_figure
@@ -30,7 +30,7 @@ _STYLES = {
 def measure(quick: bool) -> dict[str, Any]:
     """Medians in us a plan: {"states": {S: {name: us}}, "discount": {g: {name: us}}}; raises QuanteconMissing."""
     curves: dict[str, Any] = {"states": {}, "discount": {}}
-    known = at_work(1000, 5)
+    known = at_work(1000, 50)
     points: list[tuple[str, float]] = [("discount", at) for at in DISCOUNTS]
     points += [("states", at) for at in (QUICK_STATES if quick else STATES)]
     with one_core(), Progress() as progress:
@@ -39,8 +39,9 @@ def measure(quick: bool) -> dict[str, Any]:
             states = int(at) if curve == "states" else 0
             work, discount = (of_size(states), DISCOUNT) if states else (known, at)
             solvers = contestants(work, discount, repeats=max(1, 2000 // max(states, 100)))
-            found = rates({name: solvers[name] for name in _STYLES}, 3 if states <= 10_000 else 1)
+            found = rates({name: solvers[name] for name in (*_STYLES, OBSERVING)}, 3 if states <= 10_000 else 1)
             curves[curve][at] = {name: float(np.median(1e6 / values)) for name, values in found.items()}
+            curves[curve][at][WARM] -= curves[curve][at].pop(OBSERVING)
     return curves
 
 
@@ -65,5 +66,5 @@ def draw(figure: Any, curves: dict[str, Any], path: Path) -> None:
     right.minorticks_off()
     right.set_xticks(list(horizon), [f"{at:.3g}" for at in horizon])
     left.set_ylabel("processor time a plan [ms]")
-    left.legend(fontsize="small", loc="upper left")
+    right.legend(fontsize="small", loc="upper left")
     figure.savefig(path, dpi=150)

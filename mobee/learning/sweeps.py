@@ -13,7 +13,7 @@ UInts = NDArray[np.uint64]  # as an index it never counts from the end, which co
 BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of sweeps
 _ROUNDING = 4.0 * 2.0**-52  # of a value: changes as small as this may cycle for ever
 _EVALUATED = 60  # improvements that are followed by an evaluation; those after them are plain sweeps, which converge from anywhere
-_EVALUATIONS = 3  # sweeps of one evaluation at most
+_EVALUATIONS = 5  # sweeps of one evaluation at most
 _ALIKE = 0.5  # changes whose spread is less than this share of the largest
 
 
