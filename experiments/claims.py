@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from mobee.errors import UnknownName
 
 Verdict = Literal["confirmed", "refuted", "open"]
+LEAST_SEEDS = 5  # for a verdict: a bootstrap of fewer values is too narrow, of one it has no width
 
 
 @dataclass(frozen=True)
@@ -35,3 +37,17 @@ class Claim:
     def record(self) -> dict[str, str]:
         """As a dict for JSON."""
         return asdict(self)
+
+
+def open_with_few_seeds(results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Results of an experiment with its claims open, where its runs have too few `seeds` for a verdict; the numbers stay."""
+    seeds = options.get("seeds")
+    if seeds is None or seeds >= LEAST_SEEDS or "claims" not in results:
+        return dict(results)
+    return {**results, "claims": [_undecided(Claim(**claim), seeds).record() for claim in results["claims"]]}
+
+
+def _undecided(claim: Claim, seeds: int) -> Claim:
+    if claim.verdict == "open":
+        return claim
+    return claim.measured(f"{claim.ours} ({seeds} {'seed' if seeds == 1 else 'seeds'}, too few for a verdict)", None)

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.claims import Claim
-from experiments.claims_table import claims_text, found_in, newest_runs, recorded, rows, write_page
+from experiments.claims import Claim, open_with_few_seeds
+from experiments.claims_table import better, claims_text, finished_runs, found_in, recorded, rows, write_page
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
 from experiments.run_folder import RESULTS, discard_unused, given_run, held, keep_options, new_run, newest_run, options_of, write
@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "The table of claims: what was published, what was found here. Without RUN and --write: as experiments/README.md has it."
     telling = actions.add_parser("claims", help="what holds", description=text)
     telling.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, whose numbers are put in")
-    telling.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the newest runs")
-    telling.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest are looked for (default: runs)")
+    telling.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from those with the most seeds")
+    telling.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where those are looked for (default: runs)")
     telling.add_argument("--json", action="store_true", help="print as JSON")
 
 
@@ -137,7 +137,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 
 def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     try:
-        return experiment.run(options, folder)
+        return open_with_few_seeds(experiment.run(options, folder), vars(options))
     except MobeeError:
         if options.resume is None:
             discard_unused(folder)
@@ -145,8 +145,10 @@ def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) 
 
 
 def _claims(arguments: argparse.Namespace) -> int:
-    folders = arguments.folders or (newest_runs(arguments.runs) if arguments.write else [])
-    record = {**recorded(), **found_in(folders)}
+    if arguments.folders or not arguments.write:
+        record = {**recorded(), **found_in(arguments.folders)}
+    else:
+        record = better(recorded(), found_in(finished_runs(arguments.runs)))
     if arguments.write:
         write_page(record)
     table = rows(record)

@@ -5,7 +5,7 @@ section 3.  Published number: the robot took over two days for the longest of th
 Run time: 30 minutes on 2 cores.
 
 Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
-that fails does not stop the others.  Then `mobee experiment claims` reads what was found.
+that fails does not stop the others, and says why in failed.txt.  With more --seeds a --resume goes on with what is finished too.  Then `mobee experiment claims` reads what was found.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+import traceback
 from pathlib import Path
 from typing import Any
 
+from experiments.claims import open_with_few_seeds
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.options import positive_whole
 from experiments.registry import CHAPTER7, EXPERIMENTS, load_experiment
@@ -28,7 +30,7 @@ CLAIM = "all experiments in model learning can be repeated by one command"
 SOURCE = "thesis chapter 7, paper section 3"
 
 _COMMON = ("seeds", "jobs", "engine", "quick")  # options that are handed on
-_TIMES = "seconds.json"
+_TIMES, _FAILURE = "seconds.json", "failed.txt"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,18 +74,27 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
     place, start = folder / name, time.monotonic()
     place.mkdir(exist_ok=True)
     try:
-        if not (place / RESULTS).exists():
-            options = options_of_part(name, arguments)
-            write(place / CONFIG, {"experiment": name, "options": vars(options)})
+        options = options_of_part(name, arguments)
+        if not _is_finished(place, options):
+            (place / RESULTS).unlink(missing_ok=True)  # of fewer seeds
+            own = dict(vars(options))
+            write(place / CONFIG, {"experiment": name, "options": own})
             vars(options).update(runs=folder, resume=place, json=False)  # as the command has them
-            write(place / RESULTS, load_experiment(name).run(options, place))
+            write(place / RESULTS, open_with_few_seeds(load_experiment(name).run(options, place), own))
         drawn = _drawn(name, place)
-    except MobeeError as error:
-        return {"minutes": _spent(place, start), "failed": str(error)}
+        (place / _FAILURE).unlink(missing_ok=True)
+    except Exception as error:  # of the experiment's own code: it is reported, and the others go on
+        (place / _FAILURE).write_text(traceback.format_exc())
+        return {"minutes": _spent(place, start), "failed": str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"}
     finally:
         spent = _spent(place, start)
         write(place / _TIMES, {"seconds": 60.0 * spent})
     return {"minutes": spent, "figure": drawn}
+
+
+def _is_finished(place: Path, options: argparse.Namespace) -> bool:
+    """Whether there are results, of as many seeds as are asked for."""
+    return (place / RESULTS).exists() and getattr(options, "seeds", 0) <= read(place / CONFIG)["options"].get("seeds", 0)
 
 
 def _drawn(name: str, place: Path) -> str:

@@ -4,7 +4,7 @@ import pytest
 
 from experiments import claims_table
 from experiments.claims import Claim
-from experiments.claims_table import claims_text, found_in, newest_runs, page, recorded, rows, stated
+from experiments.claims_table import better, claims_text, finished_runs, found_in, page, recorded, rows, stated
 from experiments.registry import CHAPTER7, EXPERIMENTS, load_experiment
 from experiments.run_folder import new_run, write
 from mobee.errors import InvalidValue
@@ -57,13 +57,25 @@ def test_the_parts_of_a_chapter_count_and_a_later_run_more(tmp_path, claim):
     assert found_in([chapter])["coverage"]["seeds"] == 6
     run = finished(tmp_path, "coverage", [claim.measured("new", True)])
     assert found_in([chapter, run])["coverage"]["claims"][0]["ours"] == "new"
-    assert set(newest_runs(tmp_path)) == {chapter, run}
+    assert set(finished_runs(tmp_path)) == {chapter, run}
+
+
+def test_of_several_runs_the_one_with_most_seeds_counts_then_the_newest(tmp_path, claim):
+    folders = [finished(tmp_path, "coverage", [claim.measured(f"of {n}", True)], seeds=n) for n in (6, 10, 10, 5)]
+    before, found = found_in(folders[:1]), found_in(folders)
+    assert found["coverage"]["seeds"] == 10 and found == found_in(folders[2:3])
+    assert better(before, found) == better(found, before) == found
+
+
+def test_runs_of_few_seeds_are_open_on_the_page(tmp_path, claim):
+    record = found_in([finished(tmp_path, "coverage", [claim.measured("0.4", True)], seeds=4)])
+    assert "| 0.4 (4 seeds, too few for a verdict) | **open** | coverage, 4 seeds |" in page(record)
 
 
 def test_short_and_unfinished_runs_are_not_taken_by_themselves(tmp_path, claim):
     finished(tmp_path, "coverage", [claim], quick=True)
     new_run(tmp_path, "hypercube", {})
-    assert newest_runs(tmp_path) == []
+    assert finished_runs(tmp_path) == []
 
 
 def test_a_run_without_results_is_refused(tmp_path):

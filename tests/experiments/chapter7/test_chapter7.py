@@ -8,10 +8,13 @@ from types import SimpleNamespace
 import pytest
 
 from experiments import chapter7
+from experiments.claims import Claim
 from experiments.registry import CHAPTER7, EXPERIMENTS
 from experiments.run_folder import new_run
 from experiments.sweep import sweep_arguments
 from mobee.errors import MobeeError, UnknownName
+
+CLAIM = Claim("thesis 7", "a toy works", "it does")
 
 
 def options(*given: str) -> argparse.Namespace:
@@ -30,8 +33,8 @@ def toys(monkeypatch):
         def toy(arguments, folder):
             calls.append((name, arguments.seeds, arguments.seed, arguments.quick))
             if name in broken:
-                raise MobeeError(f"{name} is broken")
-            return {"answer": 42}
+                raise broken[name]
+            return {"answer": 42, "claims": [CLAIM.measured("0.3", True).record()]}
 
         return toy
 
@@ -39,7 +42,7 @@ def toys(monkeypatch):
         (folder / "toy.png").touch()
         return folder / "toy.png"
 
-    broken: set[str] = set()
+    broken: dict[str, Exception] = {}
     monkeypatch.setattr(chapter7, "_there_are", lambda: ["hypercube", "coverage"])
     for name in ("hypercube", "coverage"):
         toy = SimpleNamespace(NAME=name, add_arguments=sweep_arguments, run=run(name), figure=figure)
@@ -59,7 +62,7 @@ def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys)
     results = chapter7.run(options("--seed", "3"), folder)
     assert toys.calls == [("hypercube", 10, 3, False), ("coverage", 10, 3, False)]
     assert results["passed"] and results["parts"]["coverage"]["figure"] == "coverage/toy.png"
-    assert json.loads((folder / "hypercube" / "results.json").read_text()) == {"answer": 42}
+    assert json.loads((folder / "hypercube" / "results.json").read_text())["answer"] == 42
     config = json.loads((folder / "hypercube" / "config.json").read_text())
     assert config == {"experiment": "hypercube", "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3}}
 
@@ -69,21 +72,40 @@ def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
     assert toys.calls == [("coverage", 2, 0, True)]
 
 
-def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys):
+@pytest.mark.parametrize(
+    ("error", "told"), [(MobeeError("the toy is broken"), "the toy is broken"), (ValueError("of its own code"), "ValueError: of its own code")]
+)
+def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, told):
     folder = new_run(tmp_path, "chapter7", {})
-    toys.broken.add("hypercube")
+    toys.broken["hypercube"] = error
     results = chapter7.run(options(), folder)
-    assert not results["passed"] and results["parts"]["hypercube"]["failed"] == "hypercube is broken"
+    assert not results["passed"] and results["parts"]["hypercube"]["failed"] == told
+    assert str(error) in (folder / "hypercube" / "failed.txt").read_text()
     toys.broken.clear()
     assert chapter7.run(options(), folder)["passed"]
     assert [name for name, *_ in toys.calls] == ["hypercube", "coverage", "hypercube"]
+    assert not (folder / "hypercube" / "failed.txt").exists()
+
+
+def test_a_part_goes_on_when_more_seeds_are_asked_for_and_not_when_fewer_are(tmp_path, toys):
+    folder = new_run(tmp_path, "chapter7", {})
+    for seeds in ("2", "6", "3"):
+        chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
+    assert [seeds for _, seeds, *_ in toys.calls] == [2, 6]
+
+
+@pytest.mark.parametrize(("seeds", "verdict"), [("4", "open"), ("5", "confirmed")])
+def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
+    folder = new_run(tmp_path, "chapter7", {})
+    chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
+    assert json.loads((folder / "coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
 
 
 def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkeypatch):
     clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
     monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
     folder = new_run(tmp_path, "chapter7", {})
-    toys.broken.add("hypercube")
+    toys.broken["hypercube"] = MobeeError("broken")
     chapter7.run(options("--only", "hypercube"), folder)
     toys.broken.clear()
     assert chapter7.run(options("--only", "hypercube"), folder)["minutes"] == pytest.approx(3.0)
