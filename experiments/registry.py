@@ -24,6 +24,7 @@ EXPERIMENTS = {
     "identify": "experiments.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
+    "live-table": "experiments.live_table",
     "planner": "experiments.planner",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",

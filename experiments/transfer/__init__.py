@@ -140,7 +140,7 @@ def _bound(values: Sequence[float]) -> float:
 
 
 def _tasks(arguments: argparse.Namespace) -> list[str]:
-    return list(TASKS) if arguments.table else ["arms"]
+    return ["arms", "table"] if arguments.table else ["arms"]
 
 
 def _transitions(arguments: argparse.Namespace) -> int:

@@ -14,7 +14,7 @@ ROBOTS = {  # settings of robot_sim; PyBullet has physics of its own, its motors
     "kinematic": {"backend": "kinematic", "motors": "identified"},
 }
 _ACTION = 5.2  # s of robot time, a little more than one takes on average
-_PIECE = 200  # transitions a part of one launch, after which progress is told
+_PIECE = 200  # transitions a part of one launch
 _TRIES = 3  # launches without a single new transition
 
 _SCENARIO = """# Written by the experiment `transfer`.
@@ -45,16 +45,16 @@ transitions = {transitions}
 """
 
 
-def learn(task: str, robot: str, seed: int, transitions: int, folder: Path, told: Callable[[int], None]) -> None:
+def learn(task: str, robot: str, seed: int, transitions: int, folder: Path, told: Callable[[int], None], piece: int = _PIECE) -> None:
     """Let every part of a task make that many transitions on one of the ROBOTS; goes on where an earlier call was broken off.
 
-    `told`: called with the number that the slowest part has.  Raises LaunchFailed.
+    `told`: called with the number that the slowest part has, before each launch of `piece` transitions a part.  Raises LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     idle = 0
     while (made := _made(folder, task)) < transitions:
         told(made)
-        goal = min(transitions, made + _PIECE)
+        goal = min(transitions, made + piece)
         scenario = folder / "scenario.toml"
         scenario.write_text(_scenario(task, robot, seed, made, goal, folder.resolve()))
         summary_of(str(scenario), ticks=round(_ACTION * RATE * (goal - made)), runs=folder / "launches")

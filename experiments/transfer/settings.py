@@ -35,6 +35,7 @@ class Task:
 TASKS = {
     "arms": Task(str(Path(__file__).with_name("empty.xml")), {"left_arm": 4, "right_arm": 4}),
     "table": Task("table", {"torso": 4, "left_arm": 4, "right_arm": 4}),
+    "published": Task("table", {"torso": 8, "left_arm": 16, "right_arm": 16}),
 }
 
 
