@@ -5,7 +5,8 @@ section 3.  Published number: the robot took over two days for the longest of th
 Run time: 30 minutes on 2 cores.
 
 Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
-that fails does not stop the others, and says why in failed.txt.  With more --seeds a --resume goes on with what is finished too.  Then `mobee experiment claims` reads what was found.
+that fails, whatever it raises, does not stop the others, and leaves failed.txt.  With --resume and more --seeds those that have
+results go on too.  Then `mobee experiment claims` reads what was found.
 """
 
 from __future__ import annotations
@@ -85,7 +86,8 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
         (place / _FAILURE).unlink(missing_ok=True)
     except Exception as error:  # of the experiment's own code: it is reported, and the others go on
         (place / _FAILURE).write_text(traceback.format_exc())
-        return {"minutes": _spent(place, start), "failed": str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"}
+        told = str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"
+        return {"minutes": _spent(place, start), "failed": told}
     finally:
         spent = _spent(place, start)
         write(place / _TIMES, {"seconds": 60.0 * spent})

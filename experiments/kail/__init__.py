@@ -6,7 +6,7 @@ neither problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to
 
 On paper: the rewards of a sound, a failing and an uncertain action, try by try.  On the robot: the left arm, 81 states with 16
 neighbours and its constraints, for 4000 transitions, and the torso, 27 states with 8 neighbours, for 900; both
-divergences.  Failing actions are those that fail in more than half of all runs' tries.
+divergences, all runs on one graph.  Failing actions are those that fail in more than half of the tries of all runs but the judged one.
 """
 
 from __future__ import annotations

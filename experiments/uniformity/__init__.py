@@ -5,8 +5,8 @@ random and least-tried exploration, but for spikes at the actions that run into 
 Source: paper 3.1, fig. 5 (one run of the real robot an explorer).  No numbers are published.  Run time: 2 minutes on 2 cores.
 
 The left arm with its cable constraints and self-contacts; 81 states with actions to their 16 nearest neighbours (ties drawn once, with
-one seed), and for comparison to their equidistant ones.  Actions at constraints are those that fail in more than half of all
-explorers' tries together.
+one seed: all runs share that graph, and the numbers may be its own), and for comparison to their equidistant ones.  Actions at
+constraints are those that fail in more than half of all explorers' tries together, those of the run that is judged left out.
 """
 
 from __future__ import annotations

@@ -73,7 +73,8 @@ def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
 
 
 @pytest.mark.parametrize(
-    ("error", "told"), [(MobeeError("the toy is broken"), "the toy is broken"), (ValueError("of its own code"), "ValueError: of its own code")]
+    ("error", "told"),
+    [(MobeeError("the toy is broken"), "the toy is broken"), (ValueError("of its own code"), "ValueError: of its own code")],
 )
 def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, told):
     folder = new_run(tmp_path, "chapter7", {})
