@@ -29,6 +29,16 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+# Files that take long, longest first: whole systems, then those that start many processes.
+LONG = ("tests/system/", "tests/mobee/engine/test_load.py", "tests/examples/", "tests/services/", "tests/mobee_cli/", "tests/experiments/")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With several processes, long files come first: none works on one alone at the end."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: next((rank for rank, start in enumerate(LONG) if item.nodeid.startswith(start)), len(LONG)))
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """What was left out, and what ./test found before pytest, just above the closing line."""

@@ -22,6 +22,7 @@ from mobee.store import Transition, TransitionStore
 TICK = 0.02  # s
 ACTION = 2.2  # s of robot time between two ends of actions, at most: for the number of ticks
 EXACT = 1e-9  # rad
+PATIENCE = "shared.patience=20"  # s on the wall for a tick, as others may have the cores
 AGENTS = {"torso": 8, "left_arm": 16, "right_arm": 16}  # part and neighbours, as published
 JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
 
@@ -43,7 +44,7 @@ class Agreement:
 
 def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transition]], dict[str, Any]]:
     """What the live agents observed in so many ticks, by part, and the summary of their run, which stays in the folder."""
-    summary = summary_of("lockstep", [f"shared.seed={seed}"], ticks=ticks, runs=folder)
+    summary = summary_of("lockstep", [f"shared.seed={seed}", PATIENCE], ticks=ticks, runs=folder)
     file = Path(summary["run"]) / "transitions.sqlite"
     return {part: TransitionStore(file, part).load() for part in AGENTS}, summary
 

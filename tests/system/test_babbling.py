@@ -11,7 +11,7 @@ import pytest
 
 from tests.services.harness import ROOT
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.untimed]
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from mobee.store import Transition, TransitionStore
 from tests.services.harness import ROOT
 from tests.system.learner import curious_agent, digest
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.untimed]
 
 KILLS = int(os.environ.get("MOBEE_KILLS", "10"))
 AT_START = 0.2  # share of the kills while the agent starts; the others come while it learns

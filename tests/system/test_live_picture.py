@@ -20,7 +20,7 @@ pytestmark = pytest.mark.system
 
 @pytest.mark.skipif(find_chromium() is None, reason="live picture: no Chromium")
 def test_the_page_shows_a_robot_that_moves(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "experiments.figures.live", "--shots", "2", "--gap", "10", "--warm-up", "5", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "experiments.figures.live", "--shots", "2", "--gap", "5", "--warm-up", "3", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=280)
     assert done.returncode == 0, done.stderr[-3000:]
     before, after = (cv2.imread(str(tmp_path / f"live-{shot}.png"))[SCENE].astype(int) for shot in (1, 2))

@@ -16,6 +16,7 @@ def test_without_ray_it_is_said_what_to_install(tmp_path, monkeypatch):
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_cells_are_worked_off_on_ray_and_what_fails_or_dies_is_named(tmp_path):
     pytest.importorskip("ray")
     with pytest.raises(CellsFailed, match=r"toy-s1: ValueError: the toy is broken\n  toy-s2: its process died|toy-s2: its process died"):
