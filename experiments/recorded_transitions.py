@@ -45,7 +45,7 @@ def records(folder: Path) -> Iterator[Record]:
 
 def _of_stores(folder: Path) -> Iterator[Record]:
     for file in sorted(folder.rglob("*.sqlite")):
-        with TransitionStore(file, "") as store:
+        with TransitionStore(file, "", read_only=True) as store:
             for agent in store.agents():
                 made = store.load(agent)
                 names = ("n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched")

@@ -38,8 +38,11 @@ def load_learned(file: str | Path, part: str | None = None, robot: Robot | None 
         MobeeError, UnknownName: no such file or agent, nothing to learn from, or a robot that is not the one on record.
     """
     if not Path(file).is_file():
-        raise MobeeError(f"{file}: there is no such file; transitions are kept in the file transitions.sqlite of a run.")
-    with TransitionStore(file, part or "") as store:
+        raise MobeeError(
+            f"{file}: there is no such file; runs of `mobee launch` keep their transitions so. Experiments keep cells, without a model to "
+            "plan with; `mobee export` reads both."
+        )
+    with TransitionStore(file, part or "", read_only=True) as store:
         agents = store.agents()
         if not agents:
             raise MobeeError(f"{file} holds no transitions yet.")

@@ -134,6 +134,42 @@ def test_when_each_was_committed_is_on_record(tmp_path):
     assert len(times) == 3 and begin <= times[0] <= times[1] <= times[2] <= time.time()
 
 
+def test_the_name_of_nobody_is_a_name(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        store.bind({"seed": 1})
+        store.append(transition(1))
+        assert store.load("") == store.times("") == [] and store.settings("") == {}
+        assert len(store.load()) == len(store.times()) == len(store.settings()) == 1
+
+
+def test_a_file_is_read_without_a_trace_also_while_it_is_written(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, "torso") as writer:
+        writer.append(transition(1))
+        with TransitionStore(path, "torso", read_only=True) as reader:
+            assert reader.load() == [transition(1)]
+            writer.append(transition(2))
+            assert reader.load() == [transition(1), transition(2)]
+            with pytest.raises(MobeeError, match="it may not be written"):
+                reader.append(transition(2))
+    content = path.read_bytes()
+    with TransitionStore(path, "torso", read_only=True) as reader:
+        assert len(reader.load()) == 2
+        assert [entry.name for entry in tmp_path.iterdir()] == ["run.sqlite"]
+    assert path.read_bytes() == content
+
+
+def test_an_empty_or_missing_file_cannot_be_read_and_stays_as_it_is(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with pytest.raises(MobeeError, match="cannot be opened"):
+        TransitionStore(path, "torso", read_only=True)
+    assert not path.exists()
+    path.touch()
+    with pytest.raises(MobeeError, match="no transitions yet: it is empty"):
+        TransitionStore(path, "torso", read_only=True)
+    assert path.stat().st_size == 0
+
+
 def test_a_number_out_of_order_is_refused(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.append(transition(1))
@@ -210,7 +246,7 @@ def test_a_missing_folder_is_named(tmp_path):
 
 
 def test_a_file_locked_by_another_process_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("mobee.store.BUSY_TIMEOUT", 0.2)
+    monkeypatch.setattr("mobee.database.BUSY_TIMEOUT", 0.2)
     path = tmp_path / "run.sqlite"
     with TransitionStore(path, "torso") as store:
         other = sqlite3.connect(path, isolation_level=None)

@@ -1,0 +1,120 @@
+"""The SQLite file of a run: opened, marked as ours, and its errors told in one line (DESIGN section 8)."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mobee.errors import MobeeError
+
+SCHEMA = 1
+APPLICATION_ID = 0x4D6F4265  # "MoBe": marks the file as ours
+BUSY_TIMEOUT = 10.0  # s; another agent's commit takes milliseconds
+TABLES = """
+CREATE TABLE meta (agent TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (agent, key));
+CREATE TABLE transitions (
+    agent TEXT NOT NULL, n INTEGER NOT NULL, s INTEGER NOT NULL, a INTEGER NOT NULL, s_next INTEGER NOT NULL, reward REAL NOT NULL,
+    settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
+"""
+REMEDIES = {
+    "SQLITE_FULL": "the disk is full; make room and start again, all that was committed is safe",
+    "SQLITE_IOERR": "the disk refused the write (full, over quota or failing); all that was committed is safe",
+    "SQLITE_BUSY": f"another process kept it locked for {BUSY_TIMEOUT:g} s; find and end it",
+    "SQLITE_READONLY": "it may not be written; check its permissions and those of its folder",
+    "SQLITE_CANTOPEN": "it cannot be opened; check that its folder exists and may be written",
+    "SQLITE_NOTADB": "it is not a database; give another path",
+    "SQLITE_CORRUPT": "it is damaged; restore it from a copy",
+    "SQLITE_CONSTRAINT": "another process writes transitions of the same agent; run one process an agent",
+}
+
+
+def opened(path: Path, read_only: bool) -> sqlite3.Connection:
+    """The file, with the tables made if it is new; a file of another program or schema is refused and left as it is.
+
+    `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too.
+    Every error is a MobeeError of one line.
+    """
+    with explained(path):
+        database = sqlite3.connect(
+            _address(path) if read_only else path, timeout=BUSY_TIMEOUT, isolation_level=None, check_same_thread=False, uri=read_only
+        )
+        try:
+            if read_only:
+                if not _is_ours(path, database):
+                    raise MobeeError(f"{path} holds no transitions yet: it is empty.")
+            else:
+                _prepare(path, database)
+        except BaseException:
+            database.close()
+            raise
+    return database
+
+
+@contextmanager
+def transaction(database: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing, and nobody else writes meanwhile."""
+    database.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        database.execute("COMMIT")
+    finally:
+        if database.in_transaction:  # a full disk has already rolled back
+            database.execute("ROLLBACK")
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Turn SQLite's errors into one line that names the file and the remedy."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        name = getattr(error, "sqlite_errorname", "")
+        remedy = next((text for key, text in REMEDIES.items() if name.startswith(key)), "")
+        raise MobeeError(f"{path}: {remedy or 'SQLite failed'} ({error}).") from error
+
+
+def _address(path: Path) -> str:
+    """To read from: a file without a log beside it as it is, for SQLite would make a log, and an archive may not be written."""
+    log = path.with_name(path.name + "-wal")
+    mode = "mode=ro" if log.exists() and log.stat().st_size else "mode=ro&immutable=1"
+    return f"{path.absolute().as_uri()}?{mode}"
+
+
+def _prepare(path: Path, database: sqlite3.Connection) -> None:
+    database.execute("PRAGMA synchronous = FULL")
+    with transaction(database):  # agents that start together must not make the tables twice
+        if not _is_ours(path, database):
+            for statement in TABLES.split(";")[:-1]:
+                database.execute(statement)
+            database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            database.execute(f"PRAGMA user_version = {SCHEMA}")
+    _write_ahead(database)
+
+
+def _is_ours(path: Path, database: sqlite3.Connection) -> bool:
+    """False for a new file; raises MobeeError for one of another program or schema."""
+    application, version = (database.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
+    tables = database.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    if not tables and not application and not version:
+        return False
+    if application != APPLICATION_ID:
+        raise MobeeError(f"{path}: a database of another program. Give another path.")
+    if version != SCHEMA:
+        raise MobeeError(f"{path}: written with schema {version}, this mobee reads {SCHEMA}. Use the version that wrote it.")
+    return True
+
+
+def _write_ahead(database: sqlite3.Connection) -> None:
+    """Switch to the write-ahead log; SQLite does not wait by itself when two processes do this at once."""
+    deadline = time.monotonic() + BUSY_TIMEOUT
+    while True:
+        try:
+            database.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if not error.sqlite_errorname.startswith("SQLITE_BUSY") or time.monotonic() > deadline:
+                raise
+            time.sleep(0.01)
