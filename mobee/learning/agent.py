@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
-from mobee.learning.draws import Draws
-from mobee.learning.exploit import External, Goal
-from mobee.learning.explorers import EXPLORERS, choose
-from mobee.learning.plans import Plans
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
+from mobee.learning.decider import Decider
+from mobee.learning.exploit import Goal
 from mobee.learning.space import Space
-from mobee.learning.transitions import TransitionModel
-from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome, Plant
 from mobee.robot.robot import Array
 from mobee.store import Transition, TransitionStore
 
-BELIEFS = ("counts", "debiased")
-PURSUING = ("curious",)  # explorers that plan for an external reward
 
-
-class CuriousAgent:
+class CuriousAgent(Decider):
     """Learns the transition model of one part by trying what it expects to learn most from.
 
     Everything it decides follows from its settings and the transitions so far, so an agent that is started again on
@@ -67,47 +58,15 @@ class CuriousAgent:
         goal: Goal | None = None,
         goal_weight: float | None = None,
     ) -> None:
-        for what, name, valid in (("explorer", explorer, EXPLORERS), ("beliefs", beliefs, BELIEFS)):
-            if name not in valid:
-                raise UnknownName(what, name, valid)
+        super().__init__(space, explorer, seed, discount, initial, divergence, forgetting, tolerance, relative, beliefs, goal, goal_weight)
         if plant.robot.motors != space.robot.motors:
             raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
-        self.space, self.plant, self.explorer = space, plant, explorer
-        self.seed, self.discount, self.store = seed, discount, store
-        self.part = space.part
-        self.model = TransitionModel(space, initial, divergence, forgetting)
-        self.beliefs: OutcomeModel = self.model.debiased() if beliefs == "debiased" else self.model
-        """What plans are made with."""
-        self.transitions = 0
-        """How many transitions this agent has observed, those of its store included."""
-        self.last: Transition | None = None
-        """The newest transition."""
-        self._believes = beliefs
-        self._external = _external(space, goal, goal_weight, explorer)
-        self._plans = Plans(discount, tolerance, relative)
-        self._score, self._draws = EXPLORERS[explorer], Draws(space.part)
+        self.plant, self.store = plant, store
         self._state: int | None = None
         self._pending: tuple[int, int] | None = None
         if store is not None:
             store.bind(self.settings)
-            self._replay(store)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """All that decides what the agent does, as plain JSON values."""
-        return {
-            "space": self.space.settings,
-            "explorer": self.explorer,
-            "seed": self.seed,
-            "discount": self.discount,
-            "initial": self.model.initial,
-            "divergence": self.model.divergence,
-            "forgetting": self.model.forgetting,
-            "tolerance": self._plans.tolerance,
-            "relative": self._plans.relative,
-            "beliefs": self._believes,
-            "goal": None if self._external is None else self._external.settings,
-        }
+            self._replay(store.load())
 
     @property
     def state(self) -> int:
@@ -116,22 +75,9 @@ class CuriousAgent:
             self._state = self._state_of(self.plant.measure(self.part))
         return self._state
 
-    def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """State and action values, shapes (S,) and (S, A), made once a transition (Algorithm 7).
-
-        `reward`: (S, A), else what the agent pursues: the intrinsic reward, or the goal's.  `beliefs`: else the agent's.
-        `key`: plans of one key start from the values of the one before.
-        """
-        plan = self._plans.made(key, reward, beliefs)
-        if plan is None:
-            pursued = self._pursued() if reward is None else reward
-            plan = self._plans.make(key, reward, beliefs, pursued, self.beliefs if beliefs is None else beliefs)
-        return plan
-
     def decide(self, state: int) -> int:
         """The action to take in a state."""
-        draws = self._draws.at(self.seed, self.transitions)
-        action = choose(self._score(self, state, draws), draws)
+        action = self._choose(state)
         self._pending = state, action
         return action
 
@@ -191,20 +137,6 @@ class CuriousAgent:
             except ActionInterrupted:
                 continue
 
-    def _learn(self, transition: Transition) -> None:
-        self.model.observe(transition.s, transition.a, transition.s_next)
-        self.transitions, self.last = transition.n, transition
-        self._plans.keep()
-
-    def _replay(self, store: TransitionStore) -> None:
-        """Learn from what is on record; each decision is made anew, so that plans start where they would have."""
-        for transition in store.load():
-            self._score(self, transition.s, self._draws.at(self.seed, self.transitions))
-            self._learn(transition)
-
-    def _pursued(self) -> Array:
-        return self.model.reward if self._external is None else self._external.combined(self.model.reward)
-
     def _decided(self) -> tuple[int, int]:
         if self._pending is None:
             raise MobeeError(f"the agent of {self.part} has no action under way: call decide(state) first.")
@@ -212,13 +144,3 @@ class CuriousAgent:
 
     def _state_of(self, q: Array) -> int:
         return self.space.state_of(q[self.space.columns])
-
-
-def _external(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
-    if goal is None:
-        if weight is not None:
-            raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
-        return None
-    if explorer not in PURSUING:
-        raise InvalidValue(f"the explorer {explorer!r} pursues no goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
-    return External(space, goal, weight)
