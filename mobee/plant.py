@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from mobee.robot.robot import Array, Robot
 
@@ -36,4 +36,14 @@ class Plant(Protocol):
 
         `target`: (n_part,) rad, all motors of the part.  Raises ActionInterrupted on hold, fault or a new run.
         """
+        ...
+
+
+@runtime_checkable
+class Described(Protocol):
+    """A plant that tells what it is; an agent keeps that with its record, and goes on only on such a plant."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides how actions end, but for chance, as plain JSON values."""
         ...

@@ -62,13 +62,14 @@ class TransitionStore:
                 return
         if missing := sorted(given.keys() - known.keys()):
             raise MobeeError(
-                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, whose agents "
-                "chose otherwise. `mobee plan` and `mobee export` read it; to learn on, use another file."
+                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, or on a plant "
+                "that does not say what it is. `mobee plan` and `mobee export` read it; to learn on, use another file."
             )
         for key in sorted(known):
-            if known.get(key) != given.get(key):
+            if known[key] != given.get(key):
+                then, now = _differing(json.loads(known[key]), json.loads(given.get(key, "null")))
                 raise MobeeError(
-                    f"{self.path}: {self.agent} has {key} = {known.get(key)} on record, now {given.get(key)}. "
+                    f"{self.path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
                     "A run goes on only with the settings it began with: use those, or another file."
                 )
 
@@ -141,3 +142,11 @@ class TransitionStore:
 
     def _named(self, agent: str | None) -> str:
         return self.agent if agent is None else agent
+
+
+def _differing(then: Any, now: Any) -> tuple[Any, Any]:
+    """What differs of two values: of two mappings that have the same keys only the entries that are not equal."""
+    if not (isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys()):
+        return then, now
+    pairs = {key: _differing(then[key], now[key]) for key in sorted(then) if then[key] != now[key]}
+    return {key: pair[0] for key, pair in pairs.items()}, {key: pair[1] for key, pair in pairs.items()}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.decider import Decider
 from mobee.learning.exploit import Goal
 from mobee.learning.space import Space
-from mobee.plant import Outcome, Plant
+from mobee.plant import Described, Outcome, Plant
 from mobee.robot.robot import Array
 from mobee.store import Transition, TransitionStore
 
@@ -37,7 +39,7 @@ class CuriousAgent(Decider):
     Raises:
         UnknownName: no such explorer, initialisation, divergence or beliefs.
         InvalidValue: a plant of another robot, a goal that the space does not have, or that the explorer ignores.
-        MobeeError: the store holds transitions of this agent that were made under other settings.
+        MobeeError: the store holds transitions of this agent that were made under other settings, or through another plant.
     """
 
     def __init__(
@@ -67,6 +69,11 @@ class CuriousAgent(Decider):
         if store is not None:
             store.bind(self.settings)
             self._replay(store.load())
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides what the agent does, as plain JSON values; the plant's too, where it can tell them."""
+        return super().settings | ({"plant": self.plant.settings} if isinstance(self.plant, Described) else {})
 
     @property
     def state(self) -> int:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from itertools import product
 from math import erf, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,6 +65,12 @@ class TabularPlant:
     def probabilities(self) -> Array:
         """Their probabilities, shape (S, A, B), all 0 where there is no action (read only)."""
         return read_only(self._probabilities)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """A digest of the table, as plain JSON values."""
+        reached = np.where(self._probabilities > 0.0, self._outcomes, NO_ACTION).astype("<i8")
+        return {"table": hashlib.sha256(reached.tobytes() + np.round(self._probabilities, 9).tobytes()).hexdigest()[:16]}
 
     def measure(self, part: str) -> Array:
         """The sample of the state the part is in, shape (n_part,), in [rad]."""

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mobee.collision.touch import touched_by
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
 from mobee.control.layout import SETTLED
 from mobee.control.modality import Modality
-from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array
+from mobee.simulation.active import living
+from mobee.simulation.described import described
 from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
@@ -80,6 +80,8 @@ class OfflinePlant:
         self.model, self.robot, self.dt = model, model.robot, dt
         parameters = motors if motors is not None else MotorParameters()
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
+        self._options = {"gains": self.controller.gains, "motors": parameters, "dt": dt, "propagate": propagate, "modality": modality}
+        self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
         from mobee.simulation.runner import Runner  # machine code, which `import mobee` does not load
 
         self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
@@ -108,6 +110,12 @@ class OfflinePlant:
         if self._pose is None and self._ticks:
             self._pose = self.model.evaluate(self._q)
         return self._pose
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides how actions end, but for the seed, as plain JSON values; of the world as it is now."""
+        active = [name for name, alive in zip(self.robot.motors, self._alive, strict=True) if alive]
+        return described(self.robot, self.model.world, active=active, **self._options)
 
     @property
     def hash(self) -> str:
@@ -192,18 +200,3 @@ class OfflinePlant:
         first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
         duration = self.time - self.dt - float(self._tests[index, 0])
         return name, Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
-
-
-def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Which motors (n,) are meant by names and patterns of parts and motors; all by None."""
-    if active is None:
-        return np.ones(len(robot.motors), dtype=bool)
-    alive = np.zeros(len(robot.motors), dtype=bool)
-    for pattern in [active] if isinstance(active, str) else active:
-        found = [fnmatchcase(motor.name, pattern) or fnmatchcase(motor.part, pattern) for motor in robot.motor_table]
-        if not any(found):
-            raise UnknownName("part or motor", pattern, (*robot.parts, *robot.motors))
-        alive |= np.array(found)
-    if not alive.any():
-        raise InvalidValue(f"active={active!r}: at least one part or motor must live; None means all.")
-    return alive

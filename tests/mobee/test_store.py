@@ -115,6 +115,16 @@ def test_settings_are_kept_and_only_the_same_are_taken(tmp_path):
         store.bind({"seed": 4})
 
 
+def test_of_settings_that_hold_others_those_that_differ_are_told(tmp_path):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        store.bind({"plant": {"dt": 0.02, "gains": {"damping": 50.0, "stiffness": 50.0}}})
+        with pytest.raises(MobeeError) as error:
+            store.bind({"plant": {"dt": 0.02, "gains": {"damping": 50.0, "stiffness": 40.0}}})
+        assert 'plant = {"gains": {"stiffness": 50.0}} on record, now {"gains": {"stiffness": 40.0}}.' in str(error.value)
+        with pytest.raises(MobeeError, match="now null"):
+            store.bind({})
+
+
 def test_a_record_with_fewer_settings_is_not_gone_on_with_and_says_what_it_is_good_for(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.bind({"seed": 1})

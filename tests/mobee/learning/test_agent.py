@@ -8,6 +8,7 @@ from mobee.learning.agent import CuriousAgent
 from mobee.learning.divergence import kl_divergence
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
+from mobee.learning.tabular import TabularPlant, ideal
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
 from tests.mobee.learning.toys import TORSO, FickleDice, InstantPlant, Interrupting, arm, torso, toy_robot
@@ -188,6 +189,29 @@ def test_a_store_of_another_space_is_refused(tmp_path):
     CuriousAgent(arm(), InstantPlant(toy_robot()), store=TransitionStore(path, "left_arm")).run(1)
     with pytest.raises(MobeeError, match="left_arm has space = .* on record"):
         CuriousAgent(arm(tie_seed=1), InstantPlant(toy_robot()), store=TransitionStore(path, "left_arm"))
+
+
+def on_a_table(path, fails=False):
+    space = torso()
+    outcomes, probabilities = ideal(space)
+    plant = TabularPlant(space, np.zeros_like(outcomes) if fails else outcomes, probabilities)
+    return CuriousAgent(space, plant, store=TransitionStore(path, "torso"))
+
+
+def test_a_store_made_on_another_plant_is_refused(tmp_path):
+    path = tmp_path / "run.sqlite"
+    on_a_table(path).run(2)
+    assert on_a_table(path).transitions == 2
+    with pytest.raises(MobeeError, match=r"torso has plant = \{.table.: .*\} on record, now \{.table.: .*another file"):
+        on_a_table(path, fails=True)
+
+
+def test_a_record_that_does_not_say_on_which_plant_it_was_made_is_not_gone_on_with_where_that_is_known(tmp_path):
+    path = tmp_path / "run.sqlite"
+    CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(path, "torso")).run(2)
+    assert CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(path, "torso")).transitions == 2
+    with pytest.raises(MobeeError, match="torso has no plant on record.*does not say what it is.*mobee plan.*another file"):
+        on_a_table(path)
 
 
 def test_an_interrupted_action_is_not_observed_and_the_agent_measures_again(tmp_path):
