@@ -137,12 +137,14 @@ def _aggressive(published: Mapping[tuple[str, str], list[dict[str, Any]]]) -> Cl
 
 
 def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
-    pairs = [(times.get((world, "depleting")), times.get((world, "nearest_untried"))) for world in FLOORS]
-    shares = [(ratio(ours, theirs), *ratio_interval(ours, theirs)) for ours, theirs in pairs if ours is not None and theirs is not None]
-    if not shares:
-        return DEPLETES
-    text = ", ".join(f"{_number(*share, digits=3)} {world}" for share, world in zip(shares, FLOORS, strict=True))
-    return DEPLETES.measured(text, _at_most(1.0 + SLACK, [(low, high) for _, low, high in shares]))
+    parts, intervals = [], []
+    for world in FLOORS:
+        ours, theirs = times.get((world, "depleting")), times.get((world, "nearest_untried"))
+        if ours is None or theirs is None:  # not run in this world
+            return DEPLETES
+        intervals.append(ratio_interval(ours, theirs))
+        parts.append(f"{_number(ratio(ours, theirs), *intervals[-1], digits=3)} {world}")
+    return DEPLETES.measured(", ".join(parts), _at_most(1.0 + SLACK, intervals))
 
 
 def _at_most(bound: float, intervals: list[tuple[float, float]]) -> bool | None:

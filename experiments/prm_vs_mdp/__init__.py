@@ -7,6 +7,8 @@ Published: no numbers.  Run time: four minutes on 2 cores.
 The left arm of the published robot among four balls; 60 queries from rest to a cell of the rank 3 lattice, half of them not reached by
 going straight, at most 120 s each.  The roadmaps' belief about the robot lacks the shoulder's cables, or has the balls 1 cm and
 the joints 3 degrees off, or both; the MDP believes nothing and learns by curiosity before the queries, or from the queries alone.
+A roadmap falls short if, where going straight fails, it succeeds in less than 95 % and less often than the MDP.  The seeds draw balls,
+noise and queries; the lattice's graph is the same for all.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.prm_vs_mdp.queries import answer
 from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Rival, Straight
 from experiments.prm_vs_mdp.scene import Scene, make_scene, space, world_of
-from experiments.prm_vs_mdp.summary import Summary, summarise
+from experiments.prm_vs_mdp.summary import Row, Summary, summarise
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent, Lattice
 
@@ -41,7 +43,6 @@ CLAIMS = (
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
 WELL = 0.95  # success, also where going straight fails, of what "works well"
-MUCH = 1.25  # times as long: then a roadmap that succeeds is still insufficient
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -105,17 +106,26 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def _claims(summary: Summary) -> list[Claim]:
     once, learned = summary.row("OMPL, planned once", "both"), summary.row("MDP, 4000 learned", "")
     remembers = summary.row("OMPL, remembers", "both")
+    a_query = 3600.0 * learned.price / QUERIES
     first = CLAIMS[0].measured(
         f"with cables, 1 cm and 3 degrees hidden, success {once.success}, {once.hard} where going straight fails;"
         f" the MDP after 4000 transitions {learned.success}, {learned.hard}",
-        True if once.hard.high < learned.hard.low else False if once.hard.low >= WELL else None,
+        _falls_short(once, learned),
     )
     second = CLAIMS[1].measured(
-        f"a PRM that takes out what fails, and remembers it, succeeds in {remembers.success} and takes {remembers.seconds} s a query;"
-        f" the MDP {learned.success} and {learned.seconds} s, after {learned.price:.1f} h of learning",
-        remembers.success.high < learned.success.low or remembers.seconds.low > MUCH * learned.seconds.high,
+        f"a PRM that takes out what fails, and remembers it, succeeds in {remembers.success}, {remembers.hard} where going straight fails,"
+        f" and takes {remembers.seconds} s a query; the MDP {learned.success}, {learned.hard} and {learned.seconds} s, after"
+        f" {learned.price:.1f} h of learning, {a_query:.0f} s for each of {QUERIES} queries",
+        _falls_short(remembers, learned),
     )
     return [first, second]
+
+
+def _falls_short(roadmap: Row, learned: Row) -> bool | None:
+    """Whether the roadmap does not work well where going straight fails, and the MDP does better; False where it works well."""
+    if roadmap.hard.high < min(WELL, learned.hard.low):
+        return True
+    return False if roadmap.hard.low >= WELL else None
 
 
 def figure(folder: Path) -> Path:

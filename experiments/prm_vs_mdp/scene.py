@@ -11,6 +11,7 @@ from experiments.control.ride import place
 from experiments.learning.arm_poses import JOINTS, PART, columns, whole
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_plant, arm_space, robot
 from mobee import Lattice, Model, OfflinePlant, World, sphere
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints
 
 BALLS, RADIUS = 4, 0.03  # m
@@ -51,7 +52,7 @@ def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
 
 
 def make_scene(seed: int, queries: int) -> Scene:
-    """Balls where the hand can come, and queries of which every other one is not reached by going straight."""
+    """Balls where the hand can come, and queries of which every other one is not reached by going straight, or as many as are found."""
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)
     shifts = rng.normal(size=balls.shape)
@@ -94,6 +95,10 @@ def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> t
             easy = [query for query in tried if not query[2]]
             if min(len(hard), len(easy)) >= (count + 1) // 2:
                 break
+    if not hard or not easy:
+        raise InvalidValue(
+            f"scene {seed}: going straight reached {len(easy)} of {len(tried)} goals; leave this seed out, there is no choice."
+        )
     half = count // 2
     chosen = [*_some(rng, hard, count - half), *_some(rng, easy, half)]
     chosen = [chosen[i] for i in rng.permutation(len(chosen))]

@@ -93,7 +93,8 @@ def summarise(results: Iterable[CellResult]) -> Summary:
 
 def _row(rival: str, belief: str, found: dict[str, list[Array]]) -> Row:
     numbers = {name: Number.of(np.array([a.mean() for a in found[name]])) for name in ("success", "hard", "seconds", "actions", "repairs")}
-    seconds = np.array(found["seconds"])
-    blocks = [Number.of(seconds[:, first : first + BLOCK].mean(axis=1)) for first in range(0, seconds.shape[1], BLOCK)]
+    seconds = found["seconds"]  # of each seed; a scene may have fewer queries than were asked for
+    firsts = range(0, max(map(len, seconds)), BLOCK)
+    blocks = [Number.of(np.array([one[first : first + BLOCK].mean() for one in seconds if len(one) > first])) for first in firsts]
     curve = np.array([(b.mean, b.low, b.high) for b in blocks])
     return Row(rival, belief, **numbers, price=float(np.mean(found["price"])), curve=curve)

@@ -7,8 +7,9 @@ Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; o
 than two full days".  Run time: 15 minutes on 2 cores, as much again with --part.
 
 Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries
-alone say little, for a graph of 16 neighbours has favourites of its own: each explorer also runs with a ghost of the table,
-which exerts no force.  An arm action touches if at its end a field of the arm is within 2 cm of the table, or in the ghost.
+alone say little, for a graph of 16 neighbours has favourites of its own, and all runs share one: each explorer also runs with a
+ghost of the table, which exerts no force.  An arm action touches if at its end a field of the arm is within 2 cm of the table, or
+in the ghost.
 --part: contact forces end at the root of a part, as in the original program, so that the torso never feels the table.
 """
 

@@ -26,7 +26,10 @@ SCORES: dict[str, Callable[[Run, Run, str], Array]] = {
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Actions of a learner in one run, the most interesting first: which of them depend on other parts."""
+    """A learner's actions (parts, actions) in one run, the most interesting first: which of them depend on other parts.
+
+    The two arms of a run are no two runs: its numbers are means over the parts.
+    """
 
     hits: NDArray[np.bool_]
 
@@ -38,18 +41,18 @@ class Judged:
     @property
     def at_all(self) -> float:
         """Precision, which is recall too, when as many actions are called dependent as are."""
-        return float(self.hits[: int(self.hits.sum())].mean())
+        return float(self.hits[:, : int(self.hits[0].sum())].mean())
 
     @property
     def precision(self) -> Array:
         """Of calling the first k dependent, for every k."""
-        found: Array = np.cumsum(self.hits) / np.arange(1, len(self.hits) + 1)
+        found: Array = (np.cumsum(self.hits, axis=1) / np.arange(1, self.hits.shape[1] + 1)).mean(axis=0)
         return found
 
     @property
     def recall(self) -> Array:
         """Of the same."""
-        found: Array = np.cumsum(self.hits) / self.hits.sum()
+        found: Array = (np.cumsum(self.hits, axis=1) / self.hits.sum(axis=1, keepdims=True)).mean(axis=0)
         return found
 
 
@@ -67,11 +70,11 @@ def dependent(runs: dict[Key, list[Run]], parts: Sequence[str], but: int) -> NDA
 
 
 def judged(runs: dict[Key, list[Run]], explorer: str, learner: str, score: str) -> list[Judged]:
-    """Every run of an explorer, each part of the learner by itself; none where a run is the only one of its seed."""
+    """Every run of an explorer; none where there is no other seed, or no action depends on other parts in the other seeds' runs."""
     found = []
     for run, ghost in with_ghosts(runs, "tree", explorer):
         truth = dependent(runs, LEARNERS[learner], run.seed)
         if truth.any():
             ranked = (SCORES[score](run, ghost, part) for part in LEARNERS[learner])
-            found += [Judged(truth.ravel()[np.argsort(-values, axis=None, kind="stable")]) for values in ranked]
+            found.append(Judged(np.array([truth.ravel()[np.argsort(-values, axis=None, kind="stable")] for values in ranked])))
     return found

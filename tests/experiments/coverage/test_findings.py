@@ -49,6 +49,14 @@ def test_half_the_time_close_to_the_floor_confirms_the_claims():
     assert found["AC needs at most 1.0"[:20]] == "confirmed"
 
 
+def test_depletion_is_judged_in_both_worlds_or_not_at_all():
+    runs = published(1590, 3200)
+    runs |= {(world, name): runs[world, "curious"] for world in ("constrained", "free") for name in ("depleting", "nearest_untried")}
+    assert verdicts(_claims(runs))["curiosity that deple"] == "confirmed"
+    del runs["free", "nearest_untried"]
+    assert verdicts(_claims(runs))["curiosity that deple"] == "open"
+
+
 def test_other_numbers_refute_them():
     found = verdicts(_claims(published(3000, 3200)))
     assert found["AC has tried every ac"[:20]] == "refuted"

@@ -48,6 +48,25 @@ def test_planning_once_fails_and_a_graph_that_is_repaired_does_not(folder):
     assert "0.50" in first.ours and "7.0 h" in second.ours
 
 
+@pytest.mark.parametrize(("once", "mdp", "verdict"), [(0.9, 1.0, "confirmed"), (0.96, 1.0, "refuted"), (0.9, 0.8, "open")])
+def test_a_roadmap_falls_short_where_it_neither_works_well_nor_as_well_as_the_mdp(tmp_path, once, mdp, verdict):
+    for seed in range(2):
+        all_hard = np.ones(2 * BLOCK, dtype=bool)
+        both = rival("OMPL, planned once", once, 60.0) | rival("OMPL, remembers", once, 20.0)
+        write_cell(tmp_path, Cell(f"roadmaps-both-s{seed}", seed, {"belief": "both"}), {"hard": all_hard, **both}, 1.0)
+        learned = {"hard": all_hard, **rival("MDP, 4000 learned", mdp, 18.0)}
+        write_cell(tmp_path, Cell(f"mdp-s{seed}", seed, {"learned": 4000}), learned, 1.0)
+    claims = _claims(summarise(load_cells(tmp_path).values()))
+    assert [claim.verdict for claim in claims] == [verdict, verdict]
+
+
+def test_a_scene_with_fewer_queries_counts_as_far_as_it_goes(folder):
+    few = {key: values[:BLOCK] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
+    write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK], **few}, 1.0)
+    curve = summarise(load_cells(folder).values()).row("MDP, 4000 learned", "").curve
+    assert curve[:, 0].tolist() == [19.5, 19.0]
+
+
 def test_the_figure_is_drawn_from_what_is_there(folder, tmp_path):
     pytest.importorskip("matplotlib")
     assert figure(folder).stat().st_size > 10_000

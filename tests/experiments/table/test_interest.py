@@ -24,7 +24,14 @@ def test_arms_that_prefer_the_same_agree():
 
 
 def test_precision_and_recall_of_a_ranking():
-    judged = Judged(np.array([True, False, True, False]))
+    judged = Judged(np.array([[True, False, True, False]]))
     assert judged.precision.tolist() == pytest.approx([1.0, 0.5, 2 / 3, 0.5])
     assert judged.recall.tolist() == pytest.approx([0.5, 0.5, 1.0, 1.0])
     assert (judged.at_all, judged.chance) == (0.5, 0.5)
+
+
+def test_both_arms_of_a_run_are_one_value():
+    judged = Judged(np.array([[True, True, False, False], [False, True, False, True]]))
+    assert (judged.at_all, judged.chance) == (0.75, 0.5)
+    assert judged.precision.tolist() == pytest.approx([0.5, 0.75, 0.5, 0.5])
+    assert judged.recall.tolist() == pytest.approx([0.25, 0.75, 0.75, 1.0])

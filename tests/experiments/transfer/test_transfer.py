@@ -27,6 +27,17 @@ def test_the_bound_is_that_of_one_more_value():
     assert np.mean(below) == pytest.approx(0.95, abs=0.01)
 
 
+def test_offline_seeds_that_differ_widely_decide_nothing():
+    wide = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.05, 0.1))
+    assert _claim({"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})}).verdict == "open"
+    assert _claim({"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})}).verdict == "refuted"
+
+
+def test_where_nothing_was_compared_nothing_is_decided():
+    none = Distance(float("nan"), float("nan"), 0)
+    assert _claim({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"
+
+
 @pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
 def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
     offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
