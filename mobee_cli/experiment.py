@@ -17,7 +17,7 @@ from experiments.registry import EXPERIMENTS, Experiment, load_experiment
 from experiments.run_folder import RESULTS, discard_unused, given_run, held, keep_options, new_run, newest_run, options_of, write
 from experiments.sweep import CellsFailed
 from mobee.errors import InvalidValue, MobeeError
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, UserError
+from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
 from mobee_cli.results_text import results_text
 
 RUNS = Path("runs")
@@ -123,7 +123,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     except CellsFailed as error:
         raise UserError(f"{error}\nTry them again with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:
-        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
+        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.NAME} --resume {folder}`", INTERRUPTED) from None
     if options.json:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:

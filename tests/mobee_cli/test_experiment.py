@@ -154,7 +154,7 @@ def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
             time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=30.0)
-    assert process.returncode == 1
+    assert process.returncode == 130
     (folder,) = tmp_path.iterdir()
     assert f"--resume {folder}" in err
     assert len(err.splitlines()) == 1
