@@ -21,6 +21,8 @@ from mobee.errors import InvalidValue, MobeeError
 Engine = Callable[[Work, Sequence[Cell], int | None], Iterator[Done]]
 _ENGINES: dict[str, Engine] = {"processes": in_processes, "ray": on_ray}
 
+LISTED = 3  # failed cells that are named; the folder has all
+
 
 class CellsFailed(MobeeError):
     """Raised at the end of a sweep in which cells failed; the others are finished and on disk."""
@@ -34,7 +36,7 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
 
     Raises:
         InvalidValue: two cells have one name, or the folder holds a cell of that name with other settings.
-        CellsFailed: with their names; what went wrong is in `folder`/cells/<name>.failed.txt.
+        CellsFailed: with the names of the first; what went wrong is in `folder`/cells/<name>.failed.txt.
     """
     _require_distinct(cells)
     left = _missing(cells, folder)
@@ -49,7 +51,8 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
             time_left.finished(done.cell.cost, time.monotonic())
             progress.show(time_left.fraction, f"{number} of {len(cells)}, {time_left}" + (f", {len(failed)} failed" if failed else ""))
     if failed:
-        listed = "\n".join(f"  {name}: {reason}" for name, reason in failed.items())
+        listed = "\n".join(f"  {name}: {reason}" for name, reason in list(failed.items())[:LISTED])
+        listed += f"\n  and {len(failed) - LISTED} more" if len(failed) > LISTED else ""
         raise CellsFailed(
             f"{len(failed)} of {len(cells)} cells failed, the others are finished (see {folder}/cells/*.failed.txt):\n{listed}"
         )

@@ -54,6 +54,13 @@ def test_a_cell_that_fails_is_named_and_the_others_are_finished(tmp_path, jobs):
     assert "the toy is broken" in (tmp_path / "cells" / "toy-s1.failed.txt").read_text()
 
 
+def test_of_many_failed_cells_the_first_are_named(tmp_path):
+    with pytest.raises(CellsFailed) as error:
+        run_cells(useless, cells(5), tmp_path, inline(tmp_path))
+    first, *named, rest = str(error.value).splitlines()
+    assert first.startswith("5 of 5 cells failed") and len(named) == 3 and rest == "  and 2 more"
+
+
 def test_a_cell_whose_process_dies_is_named_and_the_others_are_finished(tmp_path):
     with pytest.raises(CellsFailed, match=r"toy-s0: its process died: killed by signal 9"):
         run_cells(work, cells(4, dies=0), tmp_path, options(str(tmp_path), "--jobs", "2"))
