@@ -11,12 +11,15 @@ from mobee.errors import MobeeError
 from mobee.learning.exploit import target_states
 from mobee.learning.learned import Learned, load_learned
 from mobee.learning.planner import DISCOUNT, Plan, Planner
+from mobee.learning.space import Space
 from mobee.robot.load import load_robot
 from mobee.store import STORE
 from mobee_cli.errors import BAD_INPUT, UserError
 
+SLACK = 0.01  # rad beyond the limits: poses are given rounded, and encoders are noisy
 _NOTES = """A place is the number of a state, or the angles in rad of the joints that the
-agent knows (or of all motors of its part): the state that holds this pose.
+agent knows (or of all motors of its part), within their limits: the state that
+holds this pose.
 Plans trust what was observed, over a weak belief that untried actions work
 (docs/learning.md)."""
 
@@ -40,23 +43,38 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         robot = load_robot(arguments.robot) if arguments.robot else None
         learned = load_learned(file, arguments.agent, robot)
-        goal = _state(learned, arguments.to)
-        start = learned.state if arguments.start is None else _state(learned, arguments.start)
+        poses: dict[str, int] = {}
+        goal = _state(learned, arguments.to, poses)
+        start = learned.state if arguments.start is None else _state(learned, arguments.start, poses)
         plan = Planner(learned.space, learned.model.debiased(), goal, arguments.discount).plan(start)
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
-    print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join(_lines(learned, plan)))
+    read = [f"{pose} rad is in state {state}." for pose, state in poses.items()]
+    print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join([*read, *_lines(learned, plan)]))
     return 0
 
 
-def _state(learned: Learned, place: list[str]) -> int:
+def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:
+    """The state meant by a place; one that is given as a pose is added to `poses`."""
     try:
         numbers = [float(word) for word in place]
     except ValueError:
         raise UserError(f"{' '.join(place)!r} is no place: give the number of a state, or angles in rad", BAD_INPUT) from None
     if len(place) == 1 and place[0].lstrip("+-").isdigit():
         return int(target_states(learned.space, int(place[0]))[0])
-    return learned.space.state_of(numbers)
+    state = learned.space.state_of(numbers)
+    _require_within(learned.space, numbers)
+    poses[" ".join(place)] = state
+    return state
+
+
+def _require_within(space: Space, pose: list[float]) -> None:
+    motors = space.joints if len(pose) == len(space.joints) else space.robot.part(space.part).motors
+    for name, angle in zip(motors, pose, strict=True):
+        low, high = space.robot.limits[space.robot.motor_index(name)]
+        if not low - SLACK <= angle <= high + SLACK:
+            hint = " Of several states give one." if all(number.is_integer() and number >= 0 for number in pose) else ""
+            raise UserError(f"{name} cannot be at {angle:g} rad: valid is {low:.3g} to {high:.3g}.{hint}", BAD_INPUT)
 
 
 def _lines(learned: Learned, plan: Plan) -> list[str]:

@@ -55,6 +55,13 @@ def test_the_weight_of_a_robot_is_told(tmp_path: Path) -> None:
     assert 10.0 < energy < 100.0  # J above the waist
 
 
+def test_what_was_learned_offline_is_planned_with(tmp_path: Path) -> None:
+    (flow,) = blocks("docs/learning.md", tmp_path)
+    run(tmp_path, "-c", flow)
+    planned = run(tmp_path, "-m", "mobee_cli", "plan", "--run", ".", "--from", "0", "--to", "26")
+    assert planned.startswith("torso, by 300 transitions: from state 0 to 26 by ")
+
+
 def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
     (flow,) = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]

@@ -61,6 +61,8 @@ def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys
     with TransitionStore(run / STORE, "torso") as store:
         assert plan["path"][0] == store.load()[-1].s_next
     assert plan["path"][-1] == 26
+    assert main(["plan", "--run", str(run), "--from", "0", "--to", *angles]) == 0
+    assert capsys.readouterr().out.startswith(f"{' '.join(angles)} rad is in state 26.\ntorso, by 600 transitions: from state 0 to 26")
     here = str(plan["path"][0])
     assert main(["plan", "--run", str(run / STORE), "--to", here]) == 0
     assert capsys.readouterr().out == f"torso, by 600 transitions: state {here} is the goal already.\n"
@@ -73,6 +75,8 @@ def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys
         (["--to", "0.1", "0.2"], "give the 3 joints (torso_yaw, torso_roll, torso_pitch)"),
         (["--to", "there"], "'there' is no place"),
         (["--to", "nan", "0", "0"], "not finite"),
+        (["--to", "0", "2", "0"], "torso_roll cannot be at 2 rad: valid is -0.524 to 0.524. Of several states give one."),
+        (["--to", "0", "0", "-0.5"], "torso_pitch cannot be at -0.5 rad"),
         (["--to", "3", "--agent", "tors"], "Did you mean 'torso'?"),
         (["--to", "3", "--robot", "icub_2014"], "of robot 'icub', given 'icub_2014'"),
         (["--to", "3", "--discount", "1"], "discount=1.0"),
@@ -87,7 +91,7 @@ def test_what_cannot_be_planned_is_said_in_a_line(run: Path, words: list[str], s
 
 def test_a_run_without_transitions_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "--run", str(tmp_path), "--to", "0"]) == 2
-    assert f"{tmp_path / STORE}: there is no such file" in capsys.readouterr().err
+    assert f"{tmp_path / STORE}: there is no such file; runs of `mobee launch`" in capsys.readouterr().err
     TransitionStore(tmp_path / STORE, "torso").close()
     assert main(["plan", "--run", str(tmp_path), "--to", "0"]) == 2
     assert "holds no transitions yet" in capsys.readouterr().err
