@@ -14,6 +14,8 @@ from services.common.delivery import NEWEST
 
 PERIOD = 0.5  # s of the clock on the wall between two messages: in lockstep transitions come faster than anybody looks
 
+MOST = 2000  # surprises in a message: more cannot be told apart in a picture
+
 
 class LearnedStream:
     """Puts `Learned` after a transition, unless the last one is too recent."""
@@ -43,8 +45,11 @@ class LearnedStream:
 
 
 def surprises(model: TransitionModel) -> list[Surprise]:
-    """The outcomes that were observed and are not the goals of their actions, with their shares of the tries."""
+    """The outcomes that were observed and are not the goals of their actions, with their shares of the tries; the likeliest of too many."""
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
     share = real / np.maximum(real.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
-    return [Surprise(int(s), int(a), int(model.outcomes[s, a, b]), float(share[s, a, b])) for s, a, b in np.argwhere(unexpected)]
+    found = np.argwhere(unexpected)
+    if len(found) > MOST:
+        found = found[np.sort(np.argsort(-share[unexpected], kind="stable")[:MOST])]
+    return [Surprise(int(s), int(a), int(model.outcomes[s, a, b]), float(share[s, a, b])) for s, a, b in found]

@@ -20,6 +20,7 @@ SOUND = (92, 98, 110, 110)  # an action that has always reached its goal
 THIN, THICK = 0.012, 0.06  # widths of arrows, in steps of the lattice
 DOT, BIG = 0.06, 0.16  # radii of states, likewise
 LIFT = 0.12  # how far an arrow's ends are from the centres of its states
+MOST = 65_536  # state-actions; of more nothing could be seen, and drawing them twice a second would take all of the monitor's time
 QUANTITIES = ("tries", "reward", "value")
 
 
@@ -41,7 +42,13 @@ class Learning:
         self._made_from: dict[str, str] = {}
 
     def log(self, part: str, told: Learned) -> None:
-        """The space, arrows, and bars of an agent; nothing if this robot cannot make its space, or the numbers do not fit it."""
+        """The space, arrows, and bars of an agent.
+
+        Nothing is drawn of a space that is too large, or that this robot cannot make, nor of numbers that do not fit it.
+        """
+        if len(told.tries) > 4 * MOST:
+            self._leave_out(part, told)
+            return
         drawn = self._space(part, told.space)
         if drawn is None:
             return
@@ -83,6 +90,13 @@ class Learning:
             else:
                 self._drawn[part] = Drawn(space, flat(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
         return self._drawn[part]
+
+    def _leave_out(self, part: str, told: Learned) -> None:
+        """Say, once, that a space is not drawn."""
+        if self._made_from.get(part) != told.space:
+            self._made_from[part], self._drawn[part] = told.space, None
+            text = f"{part}: what it learns is not drawn, its space has more than {MOST} state-actions"
+            self._stream.log("events", rr.TextLog(text, level="INFO"))
 
     def _log_states(self, path: str, drawn: Drawn, best: Array, here: int) -> None:
         """States, the larger the more valuable; the agent's own is white."""

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from bus_schema import VERSION
-from bus_schema.messages import Learned, Surprise
+from bus_schema.messages import Learned, Surprise, Transition
 from mobee import Lattice, TransitionModel, load_robot
 from mobee.learning.flat import flat
 from services.agents.learned import surprises
 
 rr = pytest.importorskip("rerun")
-from services.monitor.learning import Learning  # noqa: E402
+from services.monitor.learning import MOST, Learning  # noqa: E402
 from services.monitor.poses import Poses  # noqa: E402
 
 ROBOT = load_robot("icub")
@@ -33,11 +33,16 @@ class Notebook:
         self.logged[path] = what[-1]
 
 
+HEADER = {"v": VERSION, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
+STEP = Transition(
+    **HEADER, agent="left_arm", n=1, s=0, a=0, goal=1, s_next=1, reward=0.1, value=0.1, settled=True, duration=1.0, touched=[]
+)
+
+
 def told(model: TransitionModel, **changes: Any) -> Learned:
-    header = {"v": VERSION, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
     numbers = {"tries": model.tries.astype("<u4").tobytes(), "reward": model.reward.astype("<f4").tobytes()}
     fields = {"agent": "left_arm", "n": 3, "s": 0, "space": json.dumps(SPACE.settings), "value": numbers["reward"]}
-    return Learned(**(header | numbers | fields | {"surprises": surprises(model)} | changes))
+    return Learned(**(HEADER | numbers | fields | {"surprises": surprises(model)} | changes))
 
 
 def test_surprises_are_the_outcomes_that_are_no_goals_with_their_shares() -> None:
@@ -67,6 +72,26 @@ def test_what_does_not_fit_is_not_drawn_and_does_no_harm(wrong: dict[str, Any]) 
     Learning(notebook, ROBOT).log("left_arm", told(TransitionModel(SPACE), **wrong))
     arrows = notebook.logged.get("learning/left_arm/space/surprising")
     assert arrows is None or len(arrows.vectors) == 0
+
+
+def test_a_space_that_is_too_large_is_not_drawn_and_said_so_once() -> None:
+    notebook = Notebook()
+    learning = Learning(notebook, ROBOT)
+    huge = told(TransitionModel(SPACE), tries=bytes(4 * (MOST + 1)))
+    learning.log("left_arm", huge)
+    assert list(notebook.logged) == ["events"] and notebook.logged.pop("events").text
+    learning.log("left_arm", huge)
+    learning.log_step("left_arm", STEP)
+    assert not notebook.logged
+
+
+def test_of_too_many_surprises_the_likeliest_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.agents.learned.MOST", 2)
+    model = TransitionModel(SPACE)
+    for s, shares in ((3, 1), (15, 2), (20, 3)):
+        for outcome in [s] * shares + [SPACE.goal(s, 0)]:
+            model.observe(s, 0, outcome)
+    assert surprises(model) == [Surprise(15, 0, 15, pytest.approx(2 / 3)), Surprise(20, 0, 20, 0.75)]
 
 
 def test_poses_add_up() -> None:
