@@ -20,7 +20,8 @@ from mobee import Lattice, load_robot
 from mobee.learning.explorers import EXPLORERS
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Explorer
-from tests.services.harness import FakeController, Program, Rig, rig, wait_for
+from tests.services.fake_controller import FakeController
+from tests.services.harness import Program, Rig, rig, wait_for
 
 ROBOT = load_robot("icub")
 TORSO = Lattice(ROBOT, ROBOT.part("torso").motors, neighbours=8)

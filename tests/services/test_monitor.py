@@ -25,9 +25,9 @@ from mobee.robot.load import load_robot
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
-from services.monitor import palette  # noqa: E402
-from services.monitor.page import program  # noqa: E402
-from services.monitor.scene import Scene  # noqa: E402
+from services.monitor import palette  # noqa: E402  # only where Rerun is
+from services.monitor.page import program  # noqa: E402  # only where Rerun is
+from services.monitor.scene import Scene  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)

@@ -16,7 +16,7 @@ from services.common.eyes import eye_frame, frame_at_capture
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 pytest.importorskip("pybullet")
-from services.robot_sim.renderer_scene import BACKGROUND, Scene  # noqa: E402
+from services.robot_sim.renderer_scene import BACKGROUND, Scene  # noqa: E402  # only where PyBullet is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)

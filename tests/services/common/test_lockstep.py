@@ -39,7 +39,7 @@ class FakeService:
 class Bench:
     def __init__(self) -> None:
         self.service, self.told = FakeService(), []
-        self.barrier = Barrier(self.service, ("model", "controller", "agent"), lambda who, why: self.told.append((who, why)))  # type: ignore[arg-type]
+        self.barrier = Barrier(self.service, ("model", "controller", "agent"), lambda who, why: self.told.append((who, why)))
 
     def done(self, who: str, k: int, **fields: Any) -> None:
         header = {"v": VERSION, "run": "r", "src": who, "seq": 0, "k": k, "t": 0, "tw": 0}

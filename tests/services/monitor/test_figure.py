@@ -11,8 +11,8 @@ from mobee.robot.robot import Robot
 from tests.mobee.robot.check.arm import arm
 
 rr = pytest.importorskip("rerun")
-from services.monitor import palette  # noqa: E402
-from services.monitor.figure import Figure  # noqa: E402
+from services.monitor import palette  # noqa: E402  # only where Rerun is
+from services.monitor.figure import Figure  # noqa: E402  # only where Rerun is
 
 
 class Notebook:

@@ -15,8 +15,8 @@ from mobee.learning.flat import flat
 from services.agents.learned import surprises
 
 rr = pytest.importorskip("rerun")
-from services.monitor.learning import MOST, Learning  # noqa: E402
-from services.monitor.poses import Poses  # noqa: E402
+from services.monitor.learning import MOST, Learning  # noqa: E402  # only where Rerun is
+from services.monitor.poses import Poses  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]

@@ -50,7 +50,7 @@ class Gated:
         fields: dict[str, Any] = {"epoch": self.gate.epoch, "re_k": self.k, "ttl": 100, "seq": self.seq}
         reference = np.broadcast_to(np.asarray(ref, dtype=float), (N,)).tolist() if np.ndim(ref) == 0 else list(ref)
         header = {"v": VERSION, "run": "r", "src": "controller", "k": self.k, "t": 0, "tw": 0}
-        command = Command(**header, mode=mode, ref=reference, **{**fields, **changes})  # type: ignore[arg-type]
+        command = Command(**header, mode=mode, ref=reference, **{**fields, **changes})
         self.gate.admit(Order.of(command), self.k, self.now, self.q)
 
     def tick(self, wall: float | None = None) -> Array:

@@ -13,7 +13,7 @@ from services.robot_sim.pairs import load_solid_pairs
 
 pytest.importorskip("pybullet")
 from services.robot_sim.bullet import BulletBackend  # noqa: E402  # only where PyBullet is
-from services.robot_sim.bullet_scene import BulletScene  # noqa: E402
+from services.robot_sim.bullet_scene import BulletScene  # noqa: E402  # only where PyBullet is
 
 ROBOT = load_robot("icub")
 DT = 0.01

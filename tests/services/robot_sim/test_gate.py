@@ -19,7 +19,7 @@ ROUNDING = 1 + 1e-9
 
 def refusal(gated: Gated, *args: object, **changes: object) -> str:
     with pytest.raises(Refused) as caught:
-        gated.command(*args, **changes)  # type: ignore[arg-type]
+        gated.command(*args, **changes)
     return caught.value.reason
 
 

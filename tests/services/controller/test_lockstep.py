@@ -12,8 +12,8 @@ from bus_schema import keys
 from bus_schema.messages import Motion, StepDone
 from mobee.control import Settle
 from services.controller.action import Action, Owner, busy_owners
+from tests.services.controller.stage import PARTS, ROBOT, Stage, near, staged
 from tests.services.harness import Rig, rig, wait_for
-from tests.services.test_controller import PARTS, ROBOT, Stage, near, staged
 
 SILENCE = 0.3  # s in which something would have happened
 

@@ -1,0 +1,99 @@
+"""When parts are held, and how they come under control again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.messages import EStop, Event
+from tests.services.controller.stage import PARTS, ROBOT, Stage, near, refused
+from tests.services.harness import wait_for
+
+
+def test_between_an_emergency_stop_and_its_reset_nothing_is_armed(run: Stage) -> None:
+    """Also not by a robot_sim that died under the stop and has come back without knowing of it."""
+
+    def tell(stop: bool) -> None:
+        header = {"v": VERSION, "run": "another", "src": "test", "seq": 0, "k": 0, "t": 0, "tw": 0}
+        message = EStop(**header, set=stop, source="test", reason="test")
+        run.rig.session.put(keys.ESTOP, encode(message), encoding=encoding_of(EStop))
+
+    run.ticks(30)
+    tell(True)
+    run.ticks(30)
+    run.sim.new_run()
+    epochs = {part: gate.epoch for part, gate in run.sim.gates.items()}
+    run.ticks(100)
+    assert {part: gate.epoch for part, gate in run.sim.gates.items()} == epochs
+    assert {run.motion(part).status for part in ROBOT.parts} == {"held"}
+    tell(False)
+    run.play(lambda: all(run.motion(part).status == "idle" for part in ROBOT.parts), "all parts to be armed", ticks=1000)
+
+
+def test_a_part_that_the_gate_drops_is_held_and_armed_again_at_rest(run: Stage) -> None:
+    _, epoch = run.own("left_arm")
+    run.goal("left_arm", epoch, near("left_arm", 0.8), "dropped")
+    run.ticks(30)
+    before = run.sim.gates["left_arm"].epoch
+    run.sim.refuses_to_arm = {"left_arm"}
+    run.sim.hold("left_arm")
+    run.play(lambda: run.motion("left_arm").status == "held", "the hold", ticks=50)
+    assert run.motion("left_arm").action_id == "dropped"
+    refused("held", lambda: run.goal("left_arm", epoch, near("left_arm")))
+    assert {run.motion(p).status for p in ("torso", "right_arm")} == {"idle"}
+    run.sim.refuses_to_arm = set()
+    run.play(lambda: run.motion("left_arm").status == "idle", "the part to come back", ticks=1000)
+    motion = run.motion("left_arm")
+    gate = run.sim.gates["left_arm"]
+    first = wait_for(lambda: [c for c in run.commands("left_arm") if c.epoch == gate.epoch], "its first command")[0]
+    assert gate.epoch > before
+    np.testing.assert_allclose(first.ref, 0.0, atol=1e-12)
+    np.testing.assert_allclose(motion.goal, run.sim.of("left_arm"), atol=0.01)
+    assert motion.action_id == ""
+    assert run.numbers()["held_ticks"] > 0
+    run.goal("left_arm", epoch, near("left_arm"), "after")  # the goal's owner is still the same
+    run.play(lambda: run.motion("left_arm").status == "settled", "the next action")
+
+
+def test_while_one_part_waits_to_be_armed_the_others_get_their_commands(run: Stage) -> None:
+    takes = len(run.sim.takes)
+    run.sim.answers.clear()
+    try:
+        run.sim.hold("left_arm")
+        since = run.rig.bus.k
+        run.ticks(20)
+        assert len(wait_for(lambda: len(run.commands("torso", since)) == 20 and run.commands("torso", since), "commands")) == 20
+        assert run.motion("left_arm").status == "held"
+    finally:
+        run.sim.answers.set()
+    run.play(lambda: run.motion("left_arm").status == "idle", "its return")
+    assert len(run.sim.takes) - takes < 10  # a controller that waits for each answer asks anew every tick
+
+
+def test_a_part_whose_state_stands_still_is_not_under_control(run: Stage) -> None:
+    events = run.rig.record(keys.event("controller"), Event)
+    run.sim.silent = {"right_arm"}
+    run.play(lambda: run.motion("right_arm").status == "held", "the hold", ticks=30)
+    assert run.motion("torso").status == "idle"
+    since = run.rig.bus.k
+    run.ticks(5)
+    assert run.commands("right_arm", since) == []
+    wait_for(lambda: any("no fresh state" in e.text for e in events if e.code == "held"), "the event")
+
+
+def test_a_new_run_resets_everything_but_who_owns_the_goals(run: Stage) -> None:
+    _, epoch = run.own("left_arm")
+    run.force("left_arm", epoch, f=[5.0] + [0.0] * 15)
+    run.goal("left_arm", epoch, near("left_arm", 0.8), "old")
+    run.ticks(40)
+    takes = len(run.sim.takes)
+    run.sim.new_run()
+    assert run.rig.bus.k == 0
+    run.under_control()
+    motion = run.motion("left_arm")
+    assert sorted(run.sim.takes[takes:]) == sorted(PARTS)
+    assert (motion.action_id, motion.epoch) == ("", epoch)
+    np.testing.assert_allclose(motion.goal, ROBOT.home[ROBOT.part("left_arm").slice], atol=1e-9)
+    run.ticks(20)
+    assert np.abs(run.motion("left_arm").dq).max() < 1e-6  # neither the old goal nor the old force
+    run.goal("left_arm", epoch, near("left_arm"), "new")

@@ -1,0 +1,38 @@
+"""The model as a test plays it."""
+
+from __future__ import annotations
+
+import numpy as np
+import zenoh
+
+from bus_schema import Refused, decode, keys
+from bus_schema.chain import Tick
+from bus_schema.messages import Forces
+from services.common.delivery import LATEST
+from tests.services.harness import Rig
+
+
+class FakeModel:
+    """Answers every tick with forces that the test chooses; unless silent, late or muddled."""
+
+    def __init__(self, rig: Rig) -> None:
+        n = len(rig.robot.motors)
+        self.rig, self.collision = rig, np.zeros(n)
+        self.silent, self.behind = False, 0  # ticks by which re_k lags
+        self.touched: dict[str, list[str]] = {}
+        self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
+        self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
+        rig.listen(keys.TICK, self._answer)
+
+    def _answer(self, sample: zenoh.Sample) -> None:
+        try:
+            tick = decode(Tick, sample.payload.to_bytes(), str(sample.encoding))
+        except Refused:  # a test of random bytes
+            return
+        if not self.silent:
+            self.put(max(tick.k - self.behind, 0))
+
+    def put(self, re_k: int) -> None:
+        zeros = [0.0] * len(self.collision)
+        collision, age = self.collision.tolist(), self.part_age
+        self._forces.put(re_k=re_k, limits=zeros, constraints=zeros, collision=collision, part_age=age, touched=self.touched)

@@ -1,0 +1,92 @@
+"""The model as a process: the test plays robot_sim, vision and whoever edits the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import Contacts, Forces, Geometry, Pose, WorldObject
+from bus_schema.rpc import (
+    Done,
+    Empty,
+    ObjectState,
+    World,
+)
+from mobee import Model, load_robot, load_world
+from mobee.robot.robot import Array
+from services.common.delivery import DATA
+from tests.services.fake_sim import FakeSim
+from tests.services.harness import Program, Rig, wait_for
+
+TICK = 10_000_000  # ns
+BALL = Geometry(kind="sphere", size=[0.03])
+UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+
+
+@dataclass
+class Stage:
+    """The model under test and what it says."""
+
+    rig: Rig
+    sim: FakeSim
+    model: Program
+    forces: list[Forces]
+    poses: list[Pose]
+    contacts: list[Contacts]
+
+    def tick(self, **how: Any) -> Forces:
+        """One tick of the simulator, and the model's whole answer to it."""
+        k = self.sim.tick(**how)
+        wait_for(lambda: self.contacts and self.contacts[-1].re_k == k and self.contacts[-1].run == self.rig.bus.run, f"contacts {k}")
+        wait_for(lambda: self.forces[-1].re_k == k, f"forces {k}")
+        return self.forces[-1]
+
+    def at(self, q: Array) -> Forces:
+        self.sim.q = q.copy()
+        return self.tick()
+
+    def edit(self, verb: str, request: type[Any], **fields: Any) -> None:
+        self.rig.call(keys.world_rpc(verb), request, Done, **fields)
+
+    def world(self) -> dict[str, ObjectState]:
+        return {o.name: o for o in self.rig.call(keys.world_rpc("list"), Empty, World).objects}
+
+    def numbers(self) -> dict[str, float]:
+        return self.rig.stat("model").numbers
+
+    def perceive(self, position: list[float], valid_for: int = 50, **fields: Any) -> None:
+        """As vision does; `valid_for` ticks."""
+        t = self.rig.bus.t
+        whole = {"name": "ball", "geometry": BALL, "quaternion": UPRIGHT, "role": "target", **fields}
+        publisher = self.rig.bus.publisher(keys.world("ball"), WorldObject, DATA)
+        publisher.put(position=position, covariance=[0.0] * 9, t_capture=t, valid_until=t + valid_for * TICK, **whole)
+
+
+def staged(made: Rig, *arguments: str) -> Stage:
+    sim = FakeSim(made)
+    streams = (made.record(keys.MODEL_FORCES, Forces), made.record(keys.MODEL_POSE, Pose), made.record(keys.MODEL_CONTACTS, Contacts))
+    return Stage(made, sim, made.start("services.model", "model", *arguments), *streams)
+
+
+def library() -> Model:
+    """What the model service should know: the table's world without what is left to be perceived."""
+    world = load_world("table")
+    for name in [name for name, thing in world.objects.items() if thing.role == "target"]:
+        world.remove(name)
+    return Model(load_robot("icub"), world)
+
+
+def on_the_table() -> Array:
+    """A pose whose left arm pushes into the table's field, found with the library."""
+    model, rng = library(), np.random.default_rng(5)
+    robot = model.robot
+    where = robot.part("left_arm").slice
+    for _ in range(2000):
+        q = robot.home.copy()
+        q[where] = rng.uniform(*robot.limits[where].T)
+        if any(c.second == "table" for c in model.evaluate(q).contacts):
+            return q
+    raise AssertionError("no such pose")

@@ -1,0 +1,177 @@
+"""The world as it is perceived, and edited by calls."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bus_schema import keys
+from bus_schema.messages import Event, Geometry
+from bus_schema.rpc import (
+    AddObject,
+    Attach,
+    Done,
+    Empty,
+    MoveObject,
+    ObjectState,
+    OneName,
+    SetRole,
+)
+from mobee import load_world
+from services.common.rpc import CallFailed
+from tests.services.harness import wait_for
+from tests.services.model.stage import BALL, UPRIGHT, Stage, library
+
+
+def test_objects_to_be_perceived_are_not_known_beforehand(run: Stage) -> None:
+    file = load_world("table").objects
+    assert {name for name, thing in file.items() if thing.role == "target"} == {"ball"}
+    assert set(run.world()) == set(file) - {"ball"}
+
+
+def test_what_is_perceived_is_known_until_it_was_not_seen_for_long_enough(run: Stage) -> None:
+    events = run.rig.record(keys.event("model"), Event)
+    run.perceive([-0.3, 0.1, 0.0], valid_for=20)
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    ball = run.world()["ball"]
+    assert (ball.role, ball.position, ball.geometry) == ("target", [-0.3, 0.1, 0.0], BALL)
+    for _ in range(15):
+        run.tick()
+    run.perceive([-0.3, 0.2, 0.0], valid_for=20)
+    wait_for(lambda: run.world()["ball"].position == [-0.3, 0.2, 0.0], "its move")
+    for _ in range(20):
+        run.tick()
+    assert "ball" in run.world()  # seen again in time
+    run.tick()
+    assert "ball" not in run.world()
+    wait_for(lambda: [e for e in events if e.code == "expired"], "the event")
+
+
+def test_a_perceived_object_is_felt(run: Stage) -> None:
+    palm = library().evaluate(run.rig.robot.home).position("left_palm")
+    assert "ball" not in run.tick().touched.get("left_arm", [])
+    run.perceive(palm.tolist())
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    assert "ball" in run.tick().touched["left_arm"]
+
+
+def test_perception_never_makes_an_object_vanish_that_it_did_not_bring(run: Stage) -> None:
+    table = run.world()["table"]
+    run.perceive(table.position, valid_for=1, name="table", geometry=table.geometry, role="obstacle")
+    run.perceive([-0.4, 0.1, 0.3], valid_for=3)
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    run.edit("add", AddObject, name="ball", geometry=BALL, position=[-0.5, 0.0, 0.3], quaternion=UPRIGHT, role="obstacle")
+    run.perceive([-0.5, 0.1, 0.3], valid_for=1)
+    wait_for(lambda: run.world()["ball"].position == [-0.5, 0.1, 0.3], "the move")
+    for _ in range(5):
+        run.tick()
+    assert {"table", "ball"} <= set(run.world())
+    run.edit("remove", OneName, name="ball")
+
+
+def test_perceived_nonsense_is_refused_and_counted(run: Stage) -> None:
+    run.rig.call(keys.service_rpc("model", "mark"), Empty, Done)
+    run.perceive([-0.3, 0.0, 0.0], quaternion=[0.0] * 4)
+    run.perceive([-0.3, 0.0, 0.0], geometry=Geometry(kind="box", size=[0.1]))
+    wait_for(lambda: run.rig.stat("model").rejected.get("world") == 2, "the refusals")
+    assert "ball" not in run.world()
+
+
+def test_the_world_is_edited_by_calls(run: Stage) -> None:
+    box = Geometry(kind="box", size=[0.1, 0.2, 0.3])
+    run.edit("add", AddObject, name="crate", geometry=box, position=[-0.5, 0.0, 0.5], quaternion=UPRIGHT, role="obstacle")
+    assert run.world()["crate"] == ObjectState(
+        name="crate", geometry=box, position=[-0.5, 0.0, 0.5], quaternion=UPRIGHT, role="obstacle", link=""
+    )
+    half = [0.5**0.5, 0.0, 0.0, 0.5**0.5]
+    run.edit("move", MoveObject, name="crate", position=[-0.6, 0.0, 0.5], quaternion=half)
+    run.edit("move", MoveObject, name="crate", position=[-0.7, 0.0, 0.5])
+    run.edit("role", SetRole, name="crate", role="ghost")
+    crate = run.world()["crate"]
+    assert (crate.position, crate.role) == ([-0.7, 0.0, 0.5], "ghost")
+    np.testing.assert_allclose(crate.quaternion, half, atol=1e-9)
+    run.edit("add", AddObject, name="crate", geometry=BALL, position=[0.0, 0.0, 1.0], quaternion=UPRIGHT, role="obstacle")
+    assert run.world()["crate"].geometry == BALL
+    run.edit("remove", OneName, name="crate")
+    assert "crate" not in run.world()
+
+
+def test_edits_from_several_callers_are_felt_by_the_very_next_tick_while_ticks_go_on(run: Stage) -> None:
+    palm = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
+    away = [-0.9, 0.0, 0.9]
+
+    def is_felt(name: str) -> bool:
+        """In the answer to the first tick that begins from now on."""
+        seen, k = len(run.contacts), run.rig.bus.k
+        answer = wait_for(lambda: next((c for c in run.contacts[seen:] if c.re_k > k), None), f"a tick after {k}")
+        return name in {contact.second for contact in answer.contacts}
+
+    def edit(name: str) -> bool:
+        for _ in range(5):
+            run.edit("add", AddObject, name=name, geometry=BALL, position=palm, quaternion=UPRIGHT, role="obstacle")
+            assert is_felt(name)
+            run.edit("role", SetRole, name=name, role="ghost")
+            assert not is_felt(name)
+            run.edit("role", SetRole, name=name, role="target")
+            assert is_felt(name)
+            run.edit("move", MoveObject, name=name, position=away)
+            assert not is_felt(name)
+            run.edit("move", MoveObject, name=name, position=palm)
+            assert is_felt(name)
+            run.edit("remove", OneName, name=name)
+            assert not is_felt(name)
+        return True
+
+    with ThreadPoolExecutor() as callers:
+        edits = [callers.submit(edit, f"ball {number}") for number in range(4)]
+        while not all(done.done() for done in edits):
+            run.tick()
+    assert all(done.result() for done in edits)
+    assert set(run.world()) == set(library().world.objects)
+
+
+def test_an_attached_object_goes_with_its_link_and_stays_where_it_is_detached(run: Stage) -> None:
+    robot, model = run.rig.robot, library()
+    palm = model.evaluate(robot.home).position("left_palm")
+    run.tick()
+    run.edit("add", AddObject, name="cup", geometry=BALL, position=palm.tolist(), quaternion=UPRIGHT, role="ghost")
+    run.edit("attach", Attach, name="cup", link="l_hand")
+    q = robot.home.copy()
+    q[robot.part("left_arm").slice][:4] = np.deg2rad([-30.0, 40.0, 10.0, 60.0])
+    run.at(q)
+    there = model.evaluate(q).position("left_palm")
+    assert np.linalg.norm(there - palm) > 0.05
+    assert run.world()["cup"].link == "l_hand"
+    np.testing.assert_allclose(run.world()["cup"].position, there, atol=1e-9)
+    run.edit("detach", OneName, name="cup")
+    run.at(robot.home)
+    np.testing.assert_allclose(run.world()["cup"].position, there, atol=1e-9)
+    run.edit("remove", OneName, name="cup")
+
+
+@pytest.mark.parametrize(
+    ("verb", "request_type", "fields", "says"),
+    [
+        ("move", MoveObject, {"name": "tabel", "position": [0.0, 0.0, 0.0]}, "Did you mean 'table'?"),
+        ("remove", OneName, {"name": "none"}, "Valid: .*table"),
+        ("role", SetRole, {"name": "none", "role": "ghost"}, "unknown world object"),
+        ("attach", Attach, {"name": "table", "link": "l_hnad"}, "Did you mean 'l_hand'?"),
+        ("detach", OneName, {"name": "table"}, "not attached"),
+        ("move", MoveObject, {"name": "table", "position": [0.0] * 3, "quaternion": [0.0] * 4}, "quaternion"),
+        (
+            "add",
+            AddObject,
+            {"name": "x", "geometry": Geometry(kind="capsule", size=[0.1]), "position": [0.0] * 3, "quaternion": UPRIGHT, "role": "ghost"},
+            "2 lengths",
+        ),
+    ],
+)
+def test_a_wrong_edit_is_refused_with_what_is_valid(run: Stage, verb: str, request_type: type, fields: dict[str, Any], says: str) -> None:
+    before = run.world()
+    with pytest.raises(CallFailed, match=says) as caught:
+        run.edit(verb, request_type, **fields)
+    assert caught.value.code == "world"
+    assert run.world() == before

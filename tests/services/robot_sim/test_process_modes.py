@@ -1,0 +1,97 @@
+"""Position and torque; stop, pause and reset."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from bus_schema import keys
+from bus_schema.messages import EStop
+from bus_schema.rpc import Done, Empty
+from mobee.kinematics.gravity import gravity_torque
+from services.common.delivery import LATEST
+from services.common.rpc import CallFailed
+from tests.services.harness import wait_for
+from tests.services.robot_sim.bench import DT, ELBOW, ROBOT, Bench, elbow
+
+
+def test_position_mode_goes_where_the_reference_goes(bench: Bench) -> None:
+    epoch = bench.arm("left_arm")
+    state = {"q": list(bench.newest("left_arm").q)}
+    start = state["q"][ELBOW]
+
+    def reference() -> list[float]:
+        if state["q"][ELBOW] > start - 0.2:
+            state["q"][ELBOW] -= 0.3 * DT
+        return state["q"]
+
+    bench.keep("left_arm", epoch, 1.6, reference, mode="position")
+    reached = bench.next_state("left_arm")
+    assert reached.mode == "position"
+    assert reached.q[ELBOW] == pytest.approx(state["q"][ELBOW], abs=0.02)
+
+
+def test_torque_mode_accelerates_a_motor(bench: Bench) -> None:
+    epoch = bench.arm("left_arm")
+    arm = ROBOT.part("left_arm").slice
+
+    def carry_and_bend() -> list[float]:
+        q = ROBOT.home.copy()
+        q[arm] = bench.newest("left_arm").q
+        return (gravity_torque(ROBOT, q)[arm] + elbow(1.0)).tolist()
+
+    bench.keep("left_arm", epoch, 0.5, carry_and_bend, mode="torque")
+    state = bench.next_state("left_arm")
+    assert state.mode == "torque"
+    assert state.dq[ELBOW] == pytest.approx(1.0 / 5.0, abs=0.02)  # where friction, 5 N m s/rad, balances it
+    assert state.tau[ELBOW] == pytest.approx(1.0, abs=0.1)
+
+
+def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
+    stops = bench.rig.record(keys.ESTOP, EStop)
+    epoch = bench.arm("left_arm")
+    bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.3))
+    bench.rig.bus.publisher(keys.ESTOP, EStop, LATEST).put(set=True, source="test", reason="because")
+    wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+    with pytest.raises(CallFailed) as caught:
+        bench.drive("left_arm", "arm", epoch)
+    assert caught.value.code == "estop"
+    wait_for(lambda: sum(stop.src == "robot_sim" for stop in stops) >= 3, "its repetition")
+    assert abs(bench.newest("left_arm").dq[ELBOW]) < 0.01
+    bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+    assert bench.next_state("left_arm").gate == "hold"
+    assert bench.drive("left_arm", "arm", epoch) == "armed"
+    time.sleep(0.25)
+    assert bench.next_state("torso").gate == "hold"
+
+
+def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench) -> None:
+    epoch = bench.arm("left_arm")
+    bench.keep("left_arm", epoch, 0.1, lambda: elbow(0.3))
+    bench.rig.call(keys.sim("pause"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].mode == "paused", "the pause")
+    k = bench.clocks[-1].k
+    time.sleep(0.1)
+    assert bench.clocks[-1].k == k
+    bench.rig.call(keys.sim("resume"), Empty, Done)
+    assert bench.next_state("left_arm").gate == "hold"
+    assert bench.clocks[-1].mode == "free"
+
+
+def test_a_reset_is_a_new_run_at_home_in_which_nobody_owns_anything(bench: Bench) -> None:
+    epoch = bench.arm("left_arm")
+    bench.keep("left_arm", epoch, 0.4, lambda: elbow(0.6))
+    run = bench.clocks[-1].run
+    bench.rig.call(keys.sim("reset"), Empty, Done)
+    bench.follow()
+    assert bench.clocks[-1].run != run
+    state = bench.next_state("left_arm")
+    assert state.run == bench.clocks[-1].run
+    assert state.gate == "idle"
+    home = ROBOT.home[ROBOT.part("left_arm").slice]
+    assert state.q == pytest.approx(home, abs=0.02)
+    with pytest.raises(CallFailed) as caught:
+        bench.drive("left_arm", "arm", epoch)
+    assert caught.value.code == "epoch"
+    assert bench.take("left_arm") > epoch

@@ -1,0 +1,90 @@
+"""Processes with other rates, back-ends and settings."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from bus_schema import keys
+from bus_schema.rpc import Done, Empty
+from tests.services.harness import free_endpoint, rig, wait_for
+from tests.services.robot_sim.bench import ROBOT, Bench, elbow
+
+
+@pytest.mark.parametrize(("rate", "backend"), [(200, "pybullet"), (1000, "kinematic")])
+def test_it_runs_at_other_rates(tmp_path: Path, rate: int, backend: str) -> None:
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", backend, "--rate", str(rate))
+        time.sleep(0.5)  # start-up is over
+        bench.rig.call(keys.service_rpc("robot_sim", "mark"), Empty, Done)
+        epoch = bench.arm("left_arm")
+        bench.keep("left_arm", epoch, 1.0, lambda: elbow(0.2))
+        assert bench.next_state("left_arm").gate == "armed"
+        clocks = bench.clocks[-100:]
+        assert {clock.dt for clock in clocks} == {10**9 // rate}
+        numbers = bench.numbers()
+        print(
+            f"\n{backend} {rate} Hz: "
+            + ", ".join(f"{name} {value:.3g}" for name, value in numbers.items() if name.endswith(("p50", "p99", "_ticks")))
+        )
+        assert numbers["ticks"] > 0.3 * rate
+
+
+def test_physics_stops_a_hand_at_the_table_and_the_truth_tells_the_depth(tmp_path: Path) -> None:
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "pybullet")
+        wait_for(lambda: bench.truths, "the truth")
+        assert bench.truths[-1].depth == 0.0
+        assert 0.05 < bench.truths[-1].gap < 0.12
+        epoch = bench.arm("torso")
+        bench.keep("torso", epoch, 1.5, lambda: [0.0, 0.0, 0.4])
+        assert any(0.0 < truth.depth < 0.01 and truth.pair in ("l_hand table", "r_hand table") for truth in bench.truths)
+        assert bench.truths[-1].gap == 0.0
+        numbers = bench.numbers()
+        assert numbers["solid_ticks"] > 0
+        assert 0.0 < numbers["solid_depth_max"] < 0.01
+        assert numbers["pairs_watched"] > 200
+        started = time.monotonic()
+        assert bench.program.stop(signal.SIGTERM) == 0
+        print(f"\nended {time.monotonic() - started:.3f} s after SIGTERM")
+
+
+def test_a_new_process_is_a_new_run_in_which_no_old_epoch_fits(tmp_path: Path) -> None:
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "kinematic")
+        epoch, run = bench.arm("left_arm"), bench.clocks[-1].run
+        bench.program.stop(signal.SIGKILL)
+        bus.start("services.robot_sim", "robot_sim", "--backend", "kinematic")
+        bench.follow()
+        assert bench.clocks[-1].run != run
+        assert bench.next_state("left_arm").gate == "idle"
+        assert bench.take("left_arm") > epoch
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--backend", "bullet"], "bullet"),
+        (["--rate", "0"], "rate"),
+        (["--robot", "icup"], "'icub'"),
+        (["--world", "tabel", "--backend", "kinematic"], "'table'"),
+        (["--robot", "icub_2014"], "kinematic"),
+    ],
+)
+def test_a_setting_that_cannot_be_used_is_told_at_once(tmp_path: Path, arguments: list[str], says: str) -> None:
+    with rig(tmp_path, ROBOT) as bus:
+        program = bus.spawn("-m", "services.robot_sim", "--endpoint", free_endpoint(), *arguments)
+        assert program.wait(10.0) == 2
+        assert says in program.says
+
+
+def test_a_typo_in_the_file_is_told_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "robot_sim.toml"
+    file.write_text('backend = "kinematic"\nrat = 100\n')
+    with rig(tmp_path, ROBOT) as bus:
+        program = bus.spawn("-m", "services.robot_sim", "--config", str(file))
+        assert program.wait(10.0) == 2
+        assert f"{file}:2: unknown field 'rat'. Did you mean 'rate'?" in program.says
