@@ -15,7 +15,7 @@ from tests.services.test_launcher_summary import RUN, child
 
 def participants(scenario: Scenario) -> tuple[str, ...]:
     sim = next(part for part in scenario.parts if part.who == "robot_sim")
-    return sim.config.participants  # type: ignore[attr-defined, no-any-return]
+    return sim.config.participants
 
 
 def test_robot_sim_waits_for_all_who_compute_what_the_robot_does() -> None:

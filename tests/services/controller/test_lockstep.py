@@ -156,7 +156,7 @@ def test_an_owner_is_busy_when_all_its_parts_are() -> None:
 
     def action(status: str, who: str = "") -> Action:
         made = Action(settle)
-        made.status = status  # type: ignore[assignment]
+        made.status = status
         made.owner = Owner(who, "i1", 1) if who else None
         return made
 
