@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
@@ -252,7 +252,7 @@ def test_pictures_of_different_ticks_are_not_paired_and_bad_ones_do_no_harm(stag
         assert process.poll() is None
 
 
-def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray):  # noqa: ANN201
+def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray) -> Callable[..., None]:
     """A function that puts both eyes' pictures of a ball and their cameras, right or wrong in one way."""
     images = {eye: stage.publisher(keys.image(eye), Image) for eye in keys.EYES}
     cameras = {eye: stage.publisher(keys.camera(eye), Camera) for eye in keys.EYES}
