@@ -9,7 +9,8 @@ import numpy as np
 
 from experiments.accuracy.worlds import WORLDS, space_of, truths
 from experiments.claims import Claim
-from experiments.learning.model_error import CERTAIN, l1, most_likely
+from experiments.learning.model_error import CERTAIN, l1, most_likely, sampling_error
+from experiments.learning.truth import Truth
 from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
 from experiments.sweep import CellResult
 from mobee import TransitionModel
@@ -74,19 +75,28 @@ def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:
     """A row a world and explorer after the last look, and the claims."""
     found_errors = errors(found)
     last = {key: curves[:, -1] for key, curves in found_errors.items()}
-    stochastic = {world: int((most_likely(truth) < CERTAIN).sum()) for world, truth in truths(found).items()}
-    rows = {" ".join(key): _row(mine, stochastic[key[0]]) for key, mine in last.items()}
-    return {"runs": rows, "claims": [claim.record() for claim in _claims(last)]}
+    known = truths(found)
+    floors = {world: truth_error(truth) for world, truth in known.items()}
+    rows = {" ".join(key): _row(mine, known[key[0]], floors[key[0]]) for key, mine in last.items()}
+    return {"runs": rows, "claims": [claim.record() for claim in _claims(last, floors)]}
 
 
-def _row(last: Array, stochastic: int) -> dict[str, Any]:
+def truth_error(truth: OutcomeModel) -> float | None:
+    """The error of the truth itself on the stochastic actions, below which no model is seen to get: 0 for a table; None without any."""
+    stochastic = most_likely(truth) < CERTAIN
+    if not stochastic.any():
+        return None
+    return float(sampling_error(truth)[stochastic].mean()) if isinstance(truth, Truth) else 0.0
+
+
+def _row(last: Array, truth: OutcomeModel, floor: float | None) -> dict[str, Any]:
     numbers = {
         name: interquartile_mean(column) if np.isfinite(column).all() else None for name, column in zip(COLUMNS, last.T, strict=True)
     }
-    return {"seeds": len(last), "stochastic_actions": stochastic, **numbers}
+    return {"seeds": len(last), "stochastic_actions": int((most_likely(truth) < CERTAIN).sum()), **numbers, "truth_stochastic": floor}
 
 
-def _claims(last: Mapping[tuple[str, str], Array]) -> list[Claim]:
+def _claims(last: Mapping[tuple[str, str], Array], floors: Mapping[str, float | None]) -> list[Claim]:
     def column(world: str, explorer: str, number: int) -> Array | None:
         rows = last.get((world, explorer))
         return None if rows is None or not np.isfinite(rows[:, number]).all() else rows[:, number]
@@ -97,15 +107,17 @@ def _claims(last: Mapping[tuple[str, str], Array]) -> list[Claim]:
         claims.append(claim if mine is None else claim.measured(told(mine, 4), decides(interval(mine), most=MOST)))
     for (world, explorer), claim in STOCHASTIC.items():
         times = BETTER if explorer == "curious" else AIM
-        claims.append(_ratio(claim, column(world, "least_tried", DEBIASED_STOCHASTIC), column(world, explorer, DEBIASED_STOCHASTIC), times))
+        rival, mine = (column(world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
+        floor = floors.get(world)
+        claims.append(_ratio(claim, rival, mine, times, f"; the truth's own error, a floor to both, is {floor:.3f}" if floor else ""))
     claims.append(_ratio(WITHOUT, column("rank3", "curious", COUNTS), column("rank3", "curious", DEBIASED), TEN))
     return claims
 
 
-def _ratio(claim: Claim, above: Array | None, below: Array | None, times: float) -> Claim:
+def _ratio(claim: Claim, above: Array | None, below: Array | None, times: float, note: str = "") -> Claim:
     """Whether what is above is that many times what is below; open if one is not known, or the interval holds the number."""
     if above is None or below is None:
         return claim
     low, high = ratio_interval(above, below)
     said = f"{ratio(above, below):.2f} x [{low:.2f}, {high:.2f}] ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
-    return claim.measured(said, decides((low, high), times))
+    return claim.measured(said + note, decides((low, high), times))

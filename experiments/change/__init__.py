@@ -8,9 +8,10 @@ Run time: 5 minutes on 2 cores.
 The left arm on the lattice of rank 3.  After 3000 transitions a ball of 6 cm enters where the hand is in the middle state, or the
 friction of the elbow doubles, from 4 deg/s, with which it arrives, to 8, with which it sticks; 3000 more follow, from home.  With
 friction no action ever looks settled, for the controller goes on asking the motor: actions end after 8 s.  Which actions changed is
-measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed.  Forgetting bounds an
-action's counts, to 1 / (1 - forgetting), and so its reward from below: with 0.8 whatever has most outcomes stays the most interesting
-for ever, and a curious agent tries little else.
+measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed; its first value is
+looked at 50 transitions after the change, when some of it is gone already, so that what is left of it, and how long half of it takes,
+are told too large rather than too small.  Forgetting bounds an action's counts, to 1 / (1 - forgetting), and so its reward from
+below: with 0.8 whatever has most outcomes stays the most interesting for ever, and a curious agent tries little else.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from experiments.learning.trial import explore
 from experiments.learning.truth import Truth, truth_of
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
+from mobee.errors import InvalidValue
 
 NAME = "change"
 CLAIM = "actions that suddenly end elsewhere become interesting, and are tried until the model is right again; sooner with forgetting"
@@ -67,6 +69,10 @@ def work(cell: Cell) -> dict[str, Any]:
     chosen, space = cell.settings, arm_space()
     truths = _truths(chosen["change"])
     changed, same = groups(*truths)
+    if not changed.any():
+        raise InvalidValue(
+            f"the change {chosen['change']!r}: no action that could be tried before and after ends elsewhere; make it larger."
+        )
     agent = CuriousAgent(
         space, plant_of(chosen["change"], False, cell.seed), chosen["explorer"], cell.seed, forgetting=chosen["forgetting"]
     )

@@ -16,7 +16,7 @@ from mobee.robot.robot import Array, Ints
 BEFORE = 3_000  # transitions, and as many after the change
 EVERY = 50  # transitions between two looks at the model
 CONDITIONS = (("curious", 1.0), ("curious", 0.95), ("curious", 0.8), ("least_tried", 1.0), ("least_tried", 0.8))  # explorer, forgetting
-RELEARNED = 0.5  # of the error right after the change
+RELEARNED = 0.5  # of the error at the first look after the change
 SOON = 500  # transitions after the change
 
 Key = tuple[str, str, float]  # change, explorer, forgetting
@@ -69,7 +69,7 @@ class Run:
 
     @property
     def errors(self) -> Array:
-        """L1 where actions changed, after the change, over that right after it; (looks after,)."""
+        """L1 where actions changed, after the change, over that at the first look, when some of it is gone already; (looks,)."""
         after = self.series[self.looks_before :, 0]
         relative: Array = after / after[0]
         return relative

@@ -3,8 +3,9 @@
 Claim: the curious agent's reward decays uniformly over the state-actions, since wherever there is a spike it goes and gets it.
 Source: paper 3.1, fig. 6 (snapshots, no numbers).  Run time: 1 minute on 2 cores.
 
-The left arm with its cable constraints and self-contacts; 81 states with 16 neighbours, 4000 transitions.  Looked at: mean, largest
-and relative spread of the rewards of all state-actions at fixed times, for the curious agent, least-tried and random exploration.
+The left arm with its cable constraints and self-contacts; 81 states with 16 neighbours, one graph for all runs, 4000 transitions.
+Looked at: mean, largest and relative spread of the rewards of all state-actions at fixed times, for the curious agent, least-tried
+and random exploration.
 """
 
 from __future__ import annotations

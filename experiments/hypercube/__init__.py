@@ -5,9 +5,10 @@ fewest transitions possible, tries and values become uniform, and the values gro
 Source: thesis 7.1, figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Published number: 320 actions (64 x 5).
 Run time: 30 seconds on 2 cores.
 
-The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, 50-50
-initialisation.  Tries and values are looked at after 50 transitions and at the end.  Uniformity of early tries: their variance
-over that of a uniformly random choice among 64 actions, 1 for a random choice and 0 for equal tries.
+The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, 50-50 initialisation.
+Tries and values are looked at after 50 transitions and at the end.  Uniformity of early tries: their variance over that of a
+uniformly random choice among 64 actions, 1 for a random choice and 0 for equal tries (spread_early, spread_end).  uneven_value:
+standard deviation over mean of the values; value_of_limit: their mean over what earning the mean reward for ever is worth.
 """
 
 from __future__ import annotations

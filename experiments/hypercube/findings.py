@@ -58,10 +58,10 @@ def _row(discount: float, values: list[dict[str, Any]]) -> dict[str, Any]:
         "low": low,
         "high": high,
         "all_once": interquartile_mean(once),
-        "dispersion_early": interquartile_mean([dispersion(one["early_tries"]) for one in values]),
-        "dispersion_end": interquartile_mean([dispersion(one["tries"]) for one in values]),
-        "value_spread": interquartile_mean([_spread(one["values"]) for one in values]),
-        "value_x_(1-discount)_/_reward": interquartile_mean([_share(discount, one) for one in values]),
+        "spread_early": interquartile_mean([dispersion(one["early_tries"]) for one in values]),
+        "spread_end": interquartile_mean([dispersion(one["tries"]) for one in values]),
+        "uneven_value": interquartile_mean([_spread(one["values"]) for one in values]),
+        "value_of_limit": interquartile_mean([_share(discount, one) for one in values]),
         "value": interquartile_mean([float(one["values"].mean()) for one in values]),
         "failed": sum(one["failed"] for one in values),
     }
@@ -109,10 +109,11 @@ def _proportional(grouped: Groups) -> Claim:
     """In the limit it is the mean reward / (1 - discount), which grows much faster than the discount."""
     means = {discount: interquartile_mean([float(one["values"].mean()) for one in values]) for discount, values in grouped.items()}
     shares = [interquartile_mean([_share(discount, one) for one in values]) for discount, values in grouped.items()]
+    of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
     low, high = min(means), max(means)
     grown = means[high] / means[low]
     text = (
         f"mean value {', '.join(f'{1e3 * value:.3g}' for value in means.values())} x 1e-3 nats at {', '.join(f'{d:g}' for d in means)}: "
-        f"{min(shares):.2f} to {max(shares):.2f} of mean reward / (1 - discount), proportional to that"
+        f"{of_limit} of mean reward / (1 - discount), proportional to that"
     )
     return PROPORTIONAL.measured(text, abs(grown / (high / low) - 1.0) < 0.5)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.learning.truth import Truth
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.robot.robot import Array
 
@@ -39,3 +40,15 @@ def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, floa
     error = l1(beliefs, truth)
     stochastic = most_likely(truth) < CERTAIN
     return float(np.nanmean(error)), float(error[stochastic].mean()) if stochastic.any() else float("nan")
+
+
+def sampling_error(truth: Truth) -> Array:
+    """The L1 distance to be expected between these frequencies and the distribution they were drawn from, shape (S, A); NaN untried.
+
+    The sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)): no model can be
+    measured to be truer than that.
+    """
+    p = truth.probabilities
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error: Array = np.sqrt(2.0 * p * (1.0 - p) / (np.pi * truth.tries[..., None])).sum(axis=-1)
+    return error

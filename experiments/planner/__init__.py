@@ -10,6 +10,7 @@ The left arm of the published robot, 81 states with 16 neighbours, 4000 curious 
 is set up or down at random after every ten actions; or 2000 without it, then it enters.  Plans are made from debiased counts, anew
 after each action, and learn nothing from the 60 queries; in the straight way between start and goal, and there only, is the raised table.
 Beside them: the lattice as a roadmap that was verified without the table, planned once or repaired when a motion fails.
+The seeds draw noise and queries; all runs share one graph.
 """
 
 from __future__ import annotations

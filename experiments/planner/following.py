@@ -14,7 +14,8 @@ from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, clear, who
 from experiments.planner.table import DOWN, UP, TablePlant
 from experiments.prm_vs_mdp.rivals import Rival
 from mobee import Lattice
-from mobee.learning.planner import Planner
+from mobee.errors import MobeeError
+from mobee.learning.planner import Plan, Planner
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.robot.robot import Array
 
@@ -113,10 +114,18 @@ def follow(space: Lattice, rival: Rival, wanted: Queries, tops: Sequence[float],
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, wanted: Queries, ways: Sequence[tuple[int, ...]]) -> tuple[float, float]:
-    """How likely a plan is believed to go as it says, and how often it did, means over the queries."""
-    plans = [Planner(space, beliefs, [goal]).plan(start) for start, goal in wanted]
-    kept = [plan.path == way for plan, way in zip(plans, ways, strict=True)]
-    return float(np.mean([plan.success for plan in plans])), float(np.mean(kept))
+    """How likely a plan is believed to go as it says, and how often it did, means over the queries; 0 without a plan."""
+    plans = [_plan(space, beliefs, start, goal) for start, goal in wanted]
+    kept = [plan is not None and plan.path == way for plan, way in zip(plans, ways, strict=True)]
+    return float(np.mean([plan.success if plan else 0.0 for plan in plans])), float(np.mean(kept))
+
+
+def _plan(space: Lattice, beliefs: OutcomeModel, start: int, goal: int) -> Plan | None:
+    """None where no way is known."""
+    try:
+        return Planner(space, beliefs, [goal]).plan(start)
+    except MobeeError:
+        return None
 
 
 def through(ways: Sequence[tuple[int, ...]], blocked: NDArray[np.bool_]) -> float:

@@ -69,8 +69,13 @@ class Row:
         return {
             "rank4": "carried" if self.rank4 else "lost",
             "rank3": "carried" if self.rank3 else "lost",
-            **{name: getattr(self, name) for name in self.__dataclass_fields__},
+            **{name: _known(getattr(self, name)) for name in self.__dataclass_fields__},
         }
+
+
+def _known(value: Any) -> Any:
+    """None for NaN, which JSON has not."""
+    return None if value != value else value
 
 
 def rows_of(found: Mapping[str, CellResult]) -> dict[str, Row]:
@@ -104,14 +109,14 @@ def _row(runs: Sequence[Mapping[str, Any]]) -> Row:
 
 
 def _share(space: Any, runs: Sequence[Ints], ends: Mapping[tuple[int, int], set[int]]) -> float:
-    """Which share of the tries of these actions (source, goal) ended in one of these states; 0 without a try."""
+    """Which share of the tries of these actions (source, goal) ended in one of these states; NaN without a try."""
     hits = tries = 0
     for seen in runs:
         for (source, goal), wanted in ends.items():
             found = ends_of(space, seen, source, goal)
             tries += sum(found.values())
             hits += sum(count for state, count in found.items() if state in wanted)
-    return hits / tries if tries else 0.0
+    return hits / tries if tries else float("nan")
 
 
 def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:

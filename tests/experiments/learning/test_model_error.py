@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.learning.model_error import l1, model_error, most_likely
+from experiments.learning.model_error import l1, model_error, most_likely, sampling_error
+from experiments.learning.truth import Truth
 
 
 @dataclass
@@ -61,3 +62,11 @@ def test_without_stochastic_actions_their_error_is_not_a_number():
     certain = Table(np.zeros((1, 1, 1), dtype=int), np.ones((1, 1, 1)))
     assert model_error(certain, certain)[0] == 0.0
     assert np.isnan(model_error(certain, certain)[1])
+
+
+def test_the_error_of_a_truth_is_that_of_drawing_it_anew():
+    rng, tries, p = np.random.default_rng(0), 40, np.array([0.5, 0.3, 0.2])
+    truth = Truth(np.zeros((1, 2, 3), dtype=int), np.array([[p, np.zeros(3)]]), np.array([[tries, 0]]), {})
+    drawn = np.abs(rng.multinomial(tries, p, size=4000) / tries - p).sum(axis=1).mean()
+    expected = sampling_error(truth)
+    assert expected[0, 0] == pytest.approx(drawn, rel=0.03) and np.isnan(expected[0, 1])

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,9 @@ def test_fates_count_what_was_tried_twice(space):
         for end in ends:
             model.observe(state, action, end)
     assert fates(model) == {"tried": 3, "goal": 1, "elsewhere": 1, "sometimes": 1}
+
+
+def test_a_goal_to_which_no_way_is_known_promises_nothing(space):
+    shape, goal = space.goals.shape, int(space.goal(0, 0))
+    stuck = SimpleNamespace(outcomes=np.indices(shape)[0][..., None], probabilities=np.ones((*shape, 1)))
+    assert promises(space, stuck, [(0, goal)], [(0, 0)]) == (0.0, 0.0)

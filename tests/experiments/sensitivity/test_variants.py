@@ -50,3 +50,9 @@ def test_a_finding_is_lost_where_one_of_its_numbers_is_not_as_published():
     assert not row(aside=0.5).rank4
     assert not row(failing=0.2).rank3
     assert not row(entering=0.5).rank3
+
+
+def test_what_was_never_tried_is_not_carried_and_not_a_number_of_the_results():
+    untried = row(failing=float("nan"))
+    assert not untried.rank3 and untried.rank4
+    assert untried.record()["failing"] is None and untried.record()["rank3"] == "lost"
