@@ -90,7 +90,7 @@ def better(before: Recorded, after: Recorded) -> Recorded:
 def finished_runs(runs: Path) -> list[Path]:
     """The runs that are finished, at least in part, and no --quick ones, the oldest first."""
     folders = sorted({path.parent for path in runs.glob(f"*/{CONFIG}")}, key=lambda folder: folder.name)
-    return [folder for folder in folders if read(folder / CONFIG)["experiment"] in EXPERIMENTS and _counts(folder)]
+    return [folder for folder in folders if read(folder / CONFIG).get("experiment") in EXPERIMENTS and _counts(folder)]
 
 
 def _counts(run: Path) -> bool:

@@ -75,6 +75,9 @@ def test_runs_of_few_seeds_are_open_on_the_page(tmp_path, claim):
 def test_short_and_unfinished_runs_are_not_taken_by_themselves(tmp_path, claim):
     finished(tmp_path, "coverage", [claim], quick=True)
     new_run(tmp_path, "hypercube", {})
+    live = tmp_path / "20260101-000000-default"  # a run of `mobee launch` beside them
+    live.mkdir()
+    write(live / "config.json", {"scenario": "default"})
     assert finished_runs(tmp_path) == []
 
 
