@@ -1,11 +1,15 @@
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import socket
+import warnings
+from collections.abc import Iterator
 
 import hypothesis
 import numpy as np
+import psutil
 import pytest
 
 # A shell that starts the tests in the background has them ignore Ctrl-C, and all programs that they start would inherit it.
@@ -13,6 +17,20 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 hypothesis.settings.register_profile("mobee", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("mobee")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_left_running() -> Iterator[None]:
+    """No process that a test started outlives the tests, however it was detached: what is left is named and killed."""
+    name, mark = "MOBEE_STARTED_BY_TESTS", secrets.token_hex(8)
+    os.environ[name] = mark  # inherited by all that the tests start
+    yield
+    all_now = psutil.process_iter(["environ", "cmdline"])
+    started = [each for each in all_now if (each.info["environ"] or {}).get(name) == mark and each.pid != os.getpid()]
+    started = [each for each in started if not any("resource_tracker" in word for word in each.info["cmdline"])]  # Python's own
+    for each in psutil.wait_procs(started, timeout=3.0)[1]:
+        warnings.warn(f"left running by the tests and killed: {' '.join(each.info['cmdline'])}", stacklevel=1)
+        each.kill()
 
 
 @pytest.fixture

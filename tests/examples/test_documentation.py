@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from experiments.launched import stop
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
@@ -31,7 +33,7 @@ def run(folder: Path, *arguments: str) -> str:
 
 def launch(folder: Path, scenario: str, endpoint: str, *options: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--endpoint", endpoint, *options]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL, stdout=subprocess.PIPE)
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
 
 
 def test_the_main_flow_in_the_readme_runs(tmp_path: Path) -> None:
@@ -85,7 +87,10 @@ def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
 def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None:
     blocks("docs/robots.md", tmp_path)
     launcher = launch(tmp_path, "pointer.toml", f"tcp/127.0.0.1:{free_port}", "--duration", "5")
-    summary = launcher.communicate(timeout=120)[0].decode()
+    try:
+        summary = launcher.communicate(timeout=120)[0].decode()
+    finally:
+        stop(launcher)
     assert launcher.returncode == 0, summary
     assert re.search(r"^  arm +\d+ transitions", summary, re.MULTILINE)
 
@@ -99,8 +104,7 @@ def test_the_readers_own_agent_moves_the_free_arm(tmp_path: Path, free_port: int
         wait_for_router(endpoint, tmp_path)
         assert run(tmp_path, "my_agent.py", endpoint).startswith("Transition(n=2, ")
     finally:
-        launcher.terminate()
-        launcher.communicate(timeout=60)
+        stop(launcher)
 
 
 def wait_for_router(endpoint: str, folder: Path) -> None:

@@ -153,6 +153,17 @@ class Watcher:
     def stat(self, who: str) -> Stat:
         return rpc.call(self.session, "watcher", keys.service_rpc(who, "stat"), Empty, Stat, timeout=2.0)
 
+    def pid(self, who: str) -> int:
+        """Of its process; asked more than once, as a stall of this machine may cut anybody off for a moment."""
+
+        def answered() -> int | None:
+            try:
+                return self.stat(who).pid
+            except rpc.CallFailed:
+                return None
+
+        return int(until(answered, 15.0, f"{who} answers"))
+
     def speed(self, part: str) -> float:
         """Fastest motor of the part now, rad/s."""
         seen = self.states[part]

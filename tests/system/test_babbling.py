@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from experiments.launched import stop
 from tests.services.harness import ROOT
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]
@@ -19,9 +20,14 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     pytest.importorskip("pybullet")
     folder = tmp_path_factory.mktemp("babbling")
     argv = ["-m", "mobee_cli", "experiment", "run", "babbling", "--minutes", "1", "--seed", "1", "--json", "--runs", str(folder)]
-    done = subprocess.run([sys.executable, *argv], cwd=ROOT, capture_output=True, text=True, timeout=280)
-    assert done.stdout, done.stderr
-    found = json.loads(done.stdout)
+    pipe = subprocess.PIPE
+    run = subprocess.Popen([sys.executable, *argv], cwd=ROOT, stdout=pipe, stderr=pipe, text=True, process_group=0)
+    try:
+        printed, said = run.communicate(timeout=240)
+    finally:
+        stop(run)
+    assert printed, said
+    found = json.loads(printed)
     print({mode: {key: row[key] for key in KEYS} for mode, row in found["modes"].items()})
     return found
 

@@ -29,7 +29,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Wat
 
 def kill(watcher: Watcher, who: str) -> tuple[int, int]:
     """kill -9; the tick at which it happened, and the pid that is no more."""
-    pid = watcher.stat(who).pid
+    pid = watcher.pid(who)
     until(lambda: keeps_up(watcher), 20.0, "the watcher hears ticks as they are made")
     k = watcher.k
     os.kill(pid, signal.SIGKILL)
@@ -53,11 +53,11 @@ def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
     until(is_back, 20.0, f"{who} is back")
 
 
-def two_more_each(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]]) -> None:
-    """Every agent makes two more transitions, and what was on disk is still there, in order."""
+def all_go_on(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]], more: int = 1) -> None:
+    """Every agent makes more transitions, and what was on disk is still there, in order."""
     system, _ = live
     counts = {agent: len(transitions(system.run_dir)[agent]) for agent in AGENTS}
-    until(lambda: all(len(transitions(system.run_dir)[agent]) >= counts[agent] + 2 for agent in AGENTS), 90.0, "two more transitions each")
+    until(lambda: all(len(transitions(system.run_dir)[agent]) >= counts[agent] + more for agent in AGENTS), 90.0, f"{more} more each")
     after = transitions(system.run_dir)
     for agent in AGENTS:
         assert after[agent][: len(before[agent])] == before[agent]
@@ -90,7 +90,7 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
     assert max(held) <= limit
     assert max(rested) <= limit + 0.2  # 60 deg/s at 600 deg/s^2 is 0.1 s, and the motors' delay and lag
     wait_back(watcher, who, pid)
-    two_more_each(live, before)
+    all_go_on(live, before)
 
 
 def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:
@@ -107,7 +107,7 @@ def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:
         assert all(m.status != "held" for m in watcher.motions[part] if k < m.k <= end)
     assert all(s.gate == "armed" for part in PARTS for s in watcher.states[part] if k < s.k <= end)
     wait_back(watcher, "agent_left_arm", pid)
-    two_more_each(live, before)
+    all_go_on(live, before)
 
 
 def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher]) -> None:
@@ -121,7 +121,7 @@ def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher
     assert first.gate in ("idle", "hold")
     assert max(map(abs, first.dq)) < 0.05
     wait_back(watcher, "robot_sim", pid)
-    two_more_each(live, before)
+    all_go_on(live, before, 2)
 
 
 @pytest.mark.parametrize("who", ["vision", "renderer", "monitor"])
@@ -144,7 +144,7 @@ def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: st
 def test_without_launcher_and_router_the_robot_holds_and_everything_ends(tmp_path: Path) -> None:
     with running(tmp_path, "kinematic") as (system, watcher):
         until(lambda: any(watcher.speed(part) > 0.15 for part in AGENTS), 40.0, "a part moves")
-        pids = [watcher.stat(who).pid for who in ("robot_sim", "model", "controller", "agent_torso")]
+        pids = [watcher.pid(who) for who in ("robot_sim", "model", "controller", "agent_torso")]
         before = transitions(system.run_dir)
         os.kill(system.process.pid, signal.SIGKILL)
         until(lambda: all(f"hold: {part}" in system.log("robot_sim") for part in PARTS), 5.0, "every part holds")

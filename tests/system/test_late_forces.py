@@ -26,7 +26,7 @@ AT_REST = 0.01  # rad/s
 def test_late_forces_make_the_robot_slow_down_and_hold_and_never_jump(tmp_path: Path) -> None:
     with running(tmp_path, "kinematic", "services.robot_sim.encoder_noise=0.0") as (_, watcher):
         until(lambda: any(watcher.speed(part) > 0.15 for part in AGENTS), 40.0, "a part moves")
-        pid, k = watcher.stat("model").pid, watcher.k
+        pid, k = watcher.pid("model"), watcher.k
         os.kill(pid, signal.SIGSTOP)
         try:
             until(lambda: watcher.k >= k + round(FROZEN / TICK), 10.0, "ticks without forces")

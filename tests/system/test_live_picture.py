@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from experiments.figures.live import find_chromium
+from experiments.launched import stop
 
 SCENE = (slice(40, 580), slice(0, 780))  # rows and columns of the 3D panel
 BACKGROUND = 40  # brighter than the empty panel
@@ -21,8 +22,12 @@ pytestmark = pytest.mark.system
 @pytest.mark.skipif(find_chromium() is None, reason="live picture: no Chromium")
 def test_the_page_shows_a_robot_that_moves(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "experiments.figures.live", "--shots", "2", "--gap", "5", "--warm-up", "3", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=280)
-    assert done.returncode == 0, done.stderr[-3000:]
+    page = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, process_group=0)
+    try:
+        _, said = page.communicate(timeout=240)
+    finally:
+        stop(page)
+    assert page.returncode == 0, said[-3000:]
     before, after = (cv2.imread(str(tmp_path / f"live-{shot}.png"))[SCENE].astype(int) for shot in (1, 2))
     assert (before.max(axis=2) > BACKGROUND).mean() > 0.2  # robot and table are drawn
     assert (np.abs(after - before).max(axis=2) > BACKGROUND).mean() > 0.002  # a thousand pixels of arm are elsewhere
