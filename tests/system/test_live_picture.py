@@ -21,7 +21,8 @@ pytestmark = pytest.mark.system
 
 @pytest.mark.skipif(find_chromium() is None, reason="live picture: no Chromium")
 def test_the_page_shows_a_robot_that_moves(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "experiments.figures.live", "--shots", "2", "--gap", "5", "--warm-up", "3", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "experiments.figures.live", "--scenario", str(Path(__file__).with_name("picture.toml"))]
+    command += ["--shots", "2", "--gap", "5", "--warm-up", "3", "--out", str(tmp_path)]
     page = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, process_group=0)
     try:
         _, said = page.communicate(timeout=240)
