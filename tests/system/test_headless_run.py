@@ -13,7 +13,7 @@ pytestmark = pytest.mark.system
 
 
 def test_live_at_the_table(tmp_path: Path) -> None:
-    summary = launch(tmp_path, "default", duration=24).summary(timeout=90)
+    summary = launch(tmp_path, "default", duration=30).summary(timeout=90)
     print(summary_line(summary))
     for agent in AGENTS:
         assert summary["agents"][agent]["transitions"] >= 2
