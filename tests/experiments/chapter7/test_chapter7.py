@@ -9,7 +9,7 @@ import pytest
 
 from experiments import chapter7
 from experiments.claims import Claim
-from experiments.registry import CHAPTER7, EXPERIMENTS
+from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS
 from experiments.run_folder import new_run
 from experiments.sweep import sweep_arguments
 from mobee.errors import MobeeError, UnknownName
@@ -43,7 +43,8 @@ def toys(monkeypatch):
         return folder / "toy.png"
 
     broken: dict[str, Exception] = {}
-    monkeypatch.setattr(chapter7, "_there_are", lambda: ["hypercube", "coverage"])
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube", "coverage"))
+    monkeypatch.setattr(chapter7, "BEYOND", ())
     for name in ("hypercube", "coverage"):
         toy = SimpleNamespace(NAME=name, add_arguments=sweep_arguments, run=run(name), figure=figure)
         monkeypatch.setitem(EXPERIMENTS, name, f"toy_{name}")
@@ -51,7 +52,7 @@ def toys(monkeypatch):
     return SimpleNamespace(calls=calls, broken=broken)
 
 
-@pytest.mark.parametrize("name", [name for name in CHAPTER7 if name in EXPERIMENTS])
+@pytest.mark.parametrize("name", (*CHAPTER7, *BEYOND))
 def test_a_part_needs_no_option(name):
     given = chapter7.options_of_part(name, options("--seed", "3", "--jobs", "1"))
     assert given.seed == 3
@@ -115,3 +116,10 @@ def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkey
 def test_an_unknown_part_is_refused(tmp_path):
     with pytest.raises(UnknownName, match="experiment of chapter 7 'tabel'"):
         chapter7.run(options("--only", "tabel"), tmp_path)
+
+
+def test_all_runs_what_goes_beyond_the_chapter_too(tmp_path, toys, monkeypatch):
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube",))
+    monkeypatch.setattr(chapter7, "BEYOND", ("coverage",))
+    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube"]
+    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube", "coverage"]
