@@ -24,7 +24,7 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
     names = [str(graph) for graph in grouped]
     for budget in budgets:
         _line(left, names, [[100.0 * direct(run, budget) for run in runs] for runs in grouped.values()], f"after {budget} transitions")
-    left.set(ylabel="tasks solved with the fewest actions possible [%]", xlabel="neighbours", ylim=(0, 102))
+    left.set(ylabel="tasks solved as directly as can be [%]", xlabel="neighbours", ylim=(None, 100.5))
     left.legend(fontsize=8)
     _line(middle, names, [[length(run) for run in runs] for runs in grouped.values()], f"after {budgets[-1]} transitions")
     middle.set(ylabel="actions on the way", xlabel="neighbours")
