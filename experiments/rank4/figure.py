@@ -66,7 +66,7 @@ def _map(drawing: Any, axes: Any, runs: list[Run], title: str) -> None:
         axes.axvline(edge - 0.5, color="white", linewidth=0.6)
         axes.axhline(edge - 0.5, color="white", linewidth=0.6)
     axes.set(title=title, xlabel="pitch (4 levels) within roll (4)", ylabel="yaw (4 levels) within elbow (4)", xticks=[], yticks=[])
-    drawing.colorbar(shown, ax=axes, shrink=0.5, label="log10 visits; numbers: never reached (orange: in some runs)")
+    drawing.colorbar(shown, ax=axes, shrink=0.5, label="log10 of visits; numbered: never (orange: in some)")
 
 
 def _visits(axes: Any, runs: list[Run]) -> None:
