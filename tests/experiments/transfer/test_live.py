@@ -80,3 +80,18 @@ def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_o
     assert [one.variation for one in found.offline] == [0.5, 0.5, 0.5]
     assert (found.live["pybullet"].variation, found.live["pybullet"].agree, found.live["pybullet"].compared) == (1.0, 0.0, 2)
     assert found.counts["pybullet"]["left_arm"].sum() == 8  # as many as the offline seeds made
+
+
+def test_who_has_enough_goes_on_with_the_others_so_that_nobody_waits_for_it(tmp_path, monkeypatch):
+    left = []
+
+    def launched(path, ticks, runs):
+        goals = {part.who.removeprefix("agent_"): part.config.transitions for part in read_scenario(path).parts if "agent_" in part.who}
+        left.append(goals)
+        for part, goal in goals.items():
+            made(tmp_path, part, goal - (4 if part == "right_arm" and len(left) == 1 else 0))
+        return {}
+
+    monkeypatch.setattr(live, "summary_of", launched)
+    learn("arms", "kinematic", 0, 25, tmp_path, lambda number: None)
+    assert left == [{"left_arm": 25, "right_arm": 25}, {"left_arm": 29, "right_arm": 25}]
