@@ -14,6 +14,7 @@ from mobee.learning.value_iteration import value_iteration
 from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
+from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
@@ -39,7 +40,10 @@ __all__ = [
     "Planner",
     "Plant",
     "Pose",
+    "ReachOutcome",
     "ReachPath",
+    "ReachPlant",
+    "ReachTarget",
     "Reacher",
     "Robot",
     "RobotFileError",

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee import InvalidValue, MobeeError, ReachTarget
+from mobee.reach import reward_of
+
+
+def test_a_target_says_how_much_is_missing() -> None:
+    place = np.array([-0.3, 0.1, 0.2])
+    assert ReachTarget(place).missing(place + [0.0, 0.0, 0.08]) == pytest.approx(0.08)
+    assert ReachTarget(place, aim="surface").missing(place + [0.0, 0.0, 0.08]) == pytest.approx(0.03)
+    assert ReachTarget(place, aim="surface").missing(place) == 0.0
+
+
+@pytest.mark.parametrize("bad", [[0.1, 0.2], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0], "here", None], ids=str)
+def test_a_place_that_is_none_is_refused(bad: object) -> None:
+    with pytest.raises(InvalidValue, match="three finite numbers"):
+        ReachTarget(bad)  # type: ignore[arg-type]  # the test is about wrong types
+
+
+def test_a_radius_a_normal_or_an_aim_that_is_none_is_refused() -> None:
+    for bad in ({"radius": 0.0}, {"radius": np.nan}, {"normal": [0.0, 0.0, 0.0]}, {"aim": "middle"}):
+        with pytest.raises(MobeeError):
+            ReachTarget(np.zeros(3), **bad)
+
+
+def test_the_reward_falls_with_the_distance_in_units_of_the_scale() -> None:
+    """Thesis eq. 8.4."""
+    assert reward_of(0.0) == 1.0
+    assert reward_of(0.01) == pytest.approx(0.5)
+    assert reward_of(0.09) == pytest.approx(0.1)
+    assert reward_of(1.0, scale=1.0) == 0.5
