@@ -1,0 +1,67 @@
+"""What predicts the reward of reaching for a target from each state, and what it is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array
+
+SCALE = 0.01  # m: the unit of distances in the published equations, which the thesis leaves open
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reaches:
+    """The reach actions of a space, one a state.
+
+    `samples`: (S, d) rad, the joints' poses at which they begin.  `hands`: (S, 3) m, root frame, where the marker is then.
+    `scale`: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
+    """
+
+    samples: Array
+    hands: Array
+    scale: float = SCALE
+
+    def __post_init__(self) -> None:
+        """Check; raises InvalidValue."""
+        if self.samples.ndim != 2 or self.hands.shape != (len(self.samples), 3):
+            raise InvalidValue(
+                f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row a state."
+            )
+        if not (np.isfinite(self.samples).all() and np.isfinite(self.hands).all() and 0.0 < self.scale < np.inf):
+            raise InvalidValue(f"samples, hands and scale={self.scale!r}: all must be finite, and the scale a length above 0 m.")
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+
+class RewardPredictor(Protocol):
+    """Predicts rewards of reaching from each of S states.
+
+    What it predicts follows from its settings and the sequence of `add` alone, so that learned reaches are rebuilt from their
+    record; asking changes nothing.  Targets are positions (3,) m, root frame, any number of distinct ones.
+    """
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn how a reach from a state went; `expected`: what `mean` said of it just before."""
+        ...
+
+    def mean(self, target: Array) -> Array:
+        """Expected reward of reaching from each state, shape (S,): for exploitation."""
+        ...
+
+    def deviation(self, target: Array) -> Array:
+        """Standard deviation of what is not known of the expected rewards, shape (S,); raises InvalidValue if it has none."""
+        ...
+
+    def sample(self, target: Array, rng: np.random.Generator) -> Array:
+        """One draw of the reward function, shape (S,); raises InvalidValue if there is nothing to draw from."""
+        ...
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides what it predicts, as plain JSON values."""
+        ...
