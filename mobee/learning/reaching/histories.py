@@ -49,6 +49,12 @@ class Histories:
         total: Array = np.bincount(action, weight * self._total[:used], self._actions).astype(np.float64, copy=False)
         return total, np.bincount(action, weight * self._count[:used], self._actions).astype(np.float64, copy=False)
 
+    def optimistic(self, target: Array) -> Array:
+        """Weighted averages over each action's history and one value of 1 at no distance, shape (actions,) (thesis eqs. 8.5 and 8.7)."""
+        total, weight = self.weighted(target)
+        average: Array = (1.0 + total) / (1.0 + weight)
+        return average
+
     def _index(self, target: Array) -> int:
         key = target.tobytes()
         index = self._known.get(key)

@@ -1,4 +1,4 @@
-"""The published predictor: averages over a state's history, weighted by how near its targets were (thesis eqs. 8.5 and 8.7)."""
+"""The published predictor: averages over a state's history, weighted by how near its targets were (thesis eq. 8.5)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.robot.robot import Array
 
 
+_NO_DEVIATION = (
+    "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."
+)
+
+
 class Weighted:
     """Optimistic weighted averages: 1 where nothing was tried, and nearly so for targets far from those tried.
 
@@ -22,7 +27,6 @@ class Weighted:
     def __init__(self, reaches: Reaches) -> None:
         self._scale = reaches.scale
         self._rewards = Histories(len(reaches), reaches.scale)
-        self._errors = Histories(len(reaches), reaches.scale)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -32,15 +36,10 @@ class Weighted:
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
         """Append a reach to the history of its state (thesis eq. 8.2)."""
         self._rewards.add(state, target, reward)
-        self._errors.add(state, target, expected - reward)
 
     def mean(self, target: Array) -> Array:
         """Expected reward of reaching from each state, shape (S,) (thesis eq. 8.5)."""
-        return _optimistic(self._rewards, target)
-
-    def intrinsic(self, target: Array) -> Array:
-        """Expected prediction error, expected less actual reward, of reaching from each state, shape (S,) (thesis eq. 8.7)."""
-        return _optimistic(self._errors, target)
+        return self._rewards.optimistic(target)
 
     def deviation(self, target: Array) -> NoReturn:
         """Raise InvalidValue: an average does not say how sure it is."""
@@ -49,14 +48,3 @@ class Weighted:
     def sample(self, target: Array, rng: np.random.Generator) -> NoReturn:
         """Raise InvalidValue: there is no distribution to draw from."""
         raise InvalidValue(_NO_DEVIATION)
-
-
-_NO_DEVIATION = (
-    "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."
-)
-
-
-def _optimistic(histories: Histories, target: Array) -> Array:
-    total, weight = histories.weighted(target)
-    expected: Array = (1.0 + total) / (1.0 + weight)
-    return expected

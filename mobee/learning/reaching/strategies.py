@@ -1,0 +1,99 @@
+"""Strategies that say what reaching from each state is worth to a learner (thesis 8.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from mobee.learning.reaching.histories import Histories
+from mobee.learning.reaching.predictors.predictor import Reaches, RewardPredictor
+from mobee.robot.robot import Array
+
+OPTIMISM = 2.0  # standard deviations that `ucb` hopes for
+
+
+class Strategy(Protocol):
+    """What a learner pursues: its plan treats these as the rewards of the reach actions.
+
+    It follows from the reaches learned from and the generator alone; asking changes nothing.
+    """
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn how a reach went, as the predictor does."""
+        ...
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """What reaching from each state is worth, shape (S,); the generator is the same throughout a problem-try."""
+        ...
+
+
+class Random:
+    """One state drawn a problem-try is worth 1, all others nothing (thesis 8.3.2)."""
+
+    def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
+        self._states = len(reaches)
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn nothing."""
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """1 for one state, shape (S,)."""
+        worth = np.zeros(self._states)
+        worth[rng.integers(self._states)] = 1.0
+        return worth
+
+
+class Greedy:
+    """The expected reward: optimistic if the predictor is (thesis eq. 8.5)."""
+
+    def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
+        self._predictor = predictor
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn nothing: the predictor does."""
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """The expected rewards, shape (S,)."""
+        return self._predictor.mean(target)
+
+
+class Intrinsic:
+    """The expected prediction error, from the errors that the predictor made (thesis eqs. 8.6 and 8.7); with any predictor."""
+
+    def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
+        self._errors = Histories(len(reaches), reaches.scale)
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Append the error, expected less actual reward, to the history of the state."""
+        self._errors.add(state, target, expected - reward)
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """The expected errors, shape (S,): 1 where nothing was tried."""
+        return self._errors.optimistic(target)
+
+
+class UpperBound(Greedy):
+    """The expected reward and two standard deviations more; needs a predictor that has them."""
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """The upper confidence bounds, shape (S,)."""
+        return self._predictor.mean(target) + OPTIMISM * self._predictor.deviation(target)
+
+
+class Thompson(Greedy):
+    """One draw of the reward function a problem-try; needs a predictor that has one."""
+
+    def rewards(self, target: Array, rng: np.random.Generator) -> Array:
+        """The drawn rewards, shape (S,)."""
+        return self._predictor.sample(target, rng)
+
+
+STRATEGIES: dict[str, Callable[[Reaches, RewardPredictor], Strategy]] = {
+    "random": Random,
+    "greedy": Greedy,
+    "intrinsic": Intrinsic,
+    "ucb": UpperBound,
+    "thompson": Thompson,
+}
