@@ -84,6 +84,7 @@ def running(folder: Path, scenario: str, *settings: str, headless: bool = True) 
         until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 60.0, "the system is ready")
         assert system.process.poll() is None, system.errors.read_text()[-3000:]
         with Watcher(system.endpoint) as watcher:
+            until(lambda: watcher.clock, 20.0, "the watcher hears the clock")
             yield system, watcher
     finally:
         if system.process.poll() is None:
