@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
+from mobee.control.layout import ACTIVE, FEEDFORWARD, I_ACTIVE, OWN_ACCELERATION, OWN_VELOCITY
 from mobee.control.load import law
 from mobee.control.modality import Command, Modality
 from mobee.control.pack import Law, pack
+from mobee.control.reach_law import Reaching, reach_torque
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
+from mobee.kinematics.tables import tables
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
+    from mobee.reach import ReachTarget
 
 
 class Controller:
@@ -36,7 +39,7 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_state", "_track", "contact_forces", "gains", "last_forces",
+        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains", "last_forces",
         "max_dt", "modality", "model", "propagate", "robot", "weight",
     )  # fmt: skip
 
@@ -112,12 +115,12 @@ class Controller:
     @property
     def pushed(self) -> bool:
         """Whether forces act on markers, which depend on the pose."""
-        return bool(self._pushes)
+        return bool(self._pushes or self._reaches)
 
     def client_force(self, q: Array) -> Array:
         """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
         total = np.zeros(len(q))
-        if self._pushes or self._client.any():
+        if self.pushed or self._client.any():
             self._add_client(q, total)
         return total
 
@@ -142,6 +145,28 @@ class Controller:
         """End all forces of the client."""
         self._client = np.zeros(len(self.robot.motors))
         self._pushes: dict[str, Array] = {}
+        self._reaches: dict[str, Reaching] = {}
+
+    def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
+        """Draw a marker to a target with the motors of one part, against its attractor, until the next, `end_reach` or `clear` (8.2).
+
+        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        """
+        link = self.robot.marker(marker).link
+        integers = self._packed.integers
+        moving = np.zeros(len(self.robot.motors), dtype=bool)
+        moving[integers[integers[I_ACTIVE] :][: integers[ACTIVE]]] = True
+        moving &= (self.robot.coupling[0][tables(self.robot).ancestry[link]] != 0.0).any(axis=0)
+        where = self.robot.part(part)
+        motors = where.start + np.flatnonzero(moving[where.slice])
+        if not len(motors):
+            raise InvalidValue(f"{part} cannot reach with {marker} on {self.robot.links[link]}: none of the motors that it may move does")
+        self._reaches[part] = Reaching(marker, target, motors)
+
+    def end_reach(self, part: str) -> None:
+        """End the pull on a part's marker, if there is one."""
+        self.robot.part(part)
+        self._reaches.pop(part, None)
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
@@ -202,3 +227,5 @@ class Controller:
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
             self._compiled.add_client(integers, floats, projected, total)
+        for reaching in self._reaches.values():
+            self._compiled.add_client(integers, floats, reach_torque(self.model, reaching, q), total)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +15,14 @@ from mobee.control.layout import SETTLED
 from mobee.control.modality import Modality
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
+from mobee.reach import ReachOutcome, ReachTarget
 from mobee.robot.robot import Array
 from mobee.simulation.active import living
 from mobee.simulation.described import described
 from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
+from mobee.simulation.reaches import Reaches
 from mobee.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -93,6 +95,8 @@ class OfflinePlant:
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
+        self._reaches = Reaches(model, self._controller)
+        self._period, self._called = 0, _nothing
 
     @property
     def controller(self) -> Controller:
@@ -133,13 +137,12 @@ class OfflinePlant:
 
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
         """
-        if others := [self._names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if self._names[p] != part]:
-            raise InvalidValue(f"act({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
+        self._require_alone(part, "act")
         self.begin(part, target)
         return self.advance()[0][1]
 
     def begin(self, part: str, target: Array) -> None:
-        """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test."""
+        """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; a reach of the part is over."""
         where = self.robot.part(part)
         if not self._alive[where.slice].any():
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
@@ -150,19 +153,49 @@ class OfflinePlant:
                 low, high = limits[i]
                 raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
         self.controller.set_attractor(part, target)
-        index = self._names.index(part)
-        asked = self.time - self.dt  # in the tick just over, as live: the next one is the first to see it
-        self._tests[index] = asked, asked + self.controller.gains.settle.first_look
-        self._parts[index, ACTING] = 1
+        self._reaches.drop(part)
+        self._test(part)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Put the target into the world as `TARGET`, role "target", or move it there, also while a reach is on; None takes it away."""
+        self._reaches.present(target)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """Draw the marker to the presented target until the part has settled or timed out, then let it go: see `ReachPlant`.
+
+        Raises InvalidValue as `act` does too.
+        """
+        self._require_alone(part, "reach")
+        self.begin_reach(part, marker, stay)
+        self.advance()
+        return self.reached(part)
+
+    def begin_reach(self, part: str, marker: str, stay: bool = False) -> None:
+        """Begin to draw the marker to the presented target; `advance` goes on until the part has come to rest for the second time."""
+        self._reaches.begin(part, marker, stay)
+        self._test(part)
+
+    def reached(self, part: str) -> ReachOutcome:
+        """How the part's last reach ended; raises InvalidValue before that."""
+        return self._reaches.outcome(part)
+
+    def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
+        """Call that function with the plant's time [s] after each so many ticks: it may edit the world.  None: no more."""
+        if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
+            raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
+        self._period, self._called = (0, _nothing) if callback is None else (ticks, callback)
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts."""
+        """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts.
+
+        Of a reach: how the part came to rest again (`reached` tells the rest).
+        """
         acting = self._parts[:, ACTING].astype(bool)
         if not acting.any():
             raise InvalidValue("no part is acting: call begin first")
         while (self._parts[acting, ACTING] == 1).all():
             self._run(CHUNK)
-        return [self._outcome(int(p)) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
+        return [(self._names[p], self._outcome(int(p))) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
 
     def tick(self) -> None:
         """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
@@ -182,6 +215,8 @@ class OfflinePlant:
     def _run(self, most: int, traced: bool = False) -> Array:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
         kept = traced or self._digest is not None
+        if self._period:
+            most = min(most, self._period - self._ticks % self._period)
         rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept, traced)
         if done:
             self._pose = None
@@ -192,11 +227,38 @@ class OfflinePlant:
                 self._digest.update(np.ascontiguousarray(rows[:, :n]).astype("<f8").tobytes())
         if lost:
             self._parts[:, ACTING] = 0
+            for part in self._reaches.running:
+                self._reaches.drop(part)
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
+        if self._reaches.running:
+            self._let_go()
+        if self._period and self._ticks % self._period == 0:
+            self._called(self.time)
         return rows
 
-    def _outcome(self, index: int) -> tuple[str, Outcome]:
+    def _let_go(self) -> None:
+        """Let the parts whose reach has settled or timed out be drawn back by their attractors."""
+        for part in self._reaches.running:
+            index = self._names.index(part)
+            if self._parts[index, ACTING] == 0 and self._reaches.ended(part, self._outcome(index), self._q):
+                self._test(part)
+
+    def _test(self, part: str) -> None:
+        """Start the part's settle test: in the tick just over, as live, so that the next one is the first to see it."""
+        index, asked = self._names.index(part), self.time - self.dt
+        self._tests[index] = asked, asked + self.controller.gains.settle.first_look
+        self._parts[index, ACTING] = 1
+
+    def _require_alone(self, part: str, doing: str) -> None:
+        if others := [self._names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if self._names[p] != part]:
+            raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
+
+    def _outcome(self, index: int) -> Outcome:
         name = self._names[index]
         first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
         duration = self.time - self.dt - float(self._tests[index, 0])
-        return name, Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
+        return Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
+
+
+def _nothing(time: float) -> None:
+    """Nobody wants to be called."""

@@ -1,0 +1,116 @@
+"""The reaches of an offline plant: drawn to the target, then drawn back, and how each ended (thesis 8.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mobee.collision.geometry import sphere
+from mobee.errors import InvalidValue
+from mobee.plant import Outcome
+from mobee.reach import TARGET, ReachOutcome, ReachTarget
+from mobee.robot.robot import Array
+
+if TYPE_CHECKING:
+    from mobee.control import Controller
+    from mobee.model import Model
+
+
+@dataclass(slots=True, eq=False)
+class Reach:
+    """One reach.  `end` and `marker`: how the part was when the force ended, and where its marker, (3,) m; None as long as it acts."""
+
+    name: str
+    stay: bool
+    end: Outcome | None = None
+    marker: Array | None = None
+    missing: float = 0.0  # m
+
+
+class Reaches:
+    """Which parts reach, for what is presented."""
+
+    def __init__(self, model: Model, controller: Controller) -> None:
+        self._model, self._controller = model, controller
+        self._target: ReachTarget | None = None
+        self._under_way: dict[str, Reach] = {}
+        self._ended: dict[str, ReachOutcome] = {}
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """The parts that reach or are drawn back."""
+        return tuple(self._under_way)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Put the target into the world, or move it there; None takes it away."""
+        pulled = [part for part, reach in self._under_way.items() if reach.end is None]
+        if target is None and pulled:
+            raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not taken away")
+        world, self._target = self._model.world, target
+        there = world.objects.get(TARGET)
+        if (
+            target is not None
+            and there is not None
+            and there.kind == "sphere"
+            and there.size == (target.radius,)
+            and there.role == "target"
+        ):
+            world.move(TARGET, position=target.position)
+        else:
+            if there is not None:
+                world.remove(TARGET)
+            if target is not None:
+                world.add(TARGET, sphere(target.radius), position=target.position, role="target")
+        if target is not None:
+            for part in pulled:
+                self._controller.reach_toward(part, self._under_way[part].name, target)
+
+    def begin(self, part: str, marker: str, stay: bool) -> None:
+        """Begin to draw the marker."""
+        if self._target is None:
+            raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
+        others = {reach.name for other, reach in self._under_way.items() if reach.end is None and other != part} - {marker}
+        if others:
+            raise InvalidValue(f"{part} cannot reach with {marker} while {', '.join(others)} reaches: one link at a time spares the target")
+        self._controller.reach_toward(part, marker, self._target)
+        self._model.reaching = marker
+        self._under_way[part] = Reach(marker, stay)
+
+    def ended(self, part: str, end: Outcome, q: Array) -> bool:
+        """Note that a part has settled or timed out, at q (n,) rad; whether it is to be drawn back now."""
+        reach = self._under_way[part]
+        if reach.end is None and self._target is not None:
+            reach.end, reach.marker = end, self._model.evaluate(q).position(reach.name)
+            reach.missing = self._target.missing(reach.marker)
+            self._release(part)
+            if not reach.stay:
+                return True
+            self._controller.set_attractor(part, end.q)
+        self._ended[part] = _outcome(reach, end)
+        del self._under_way[part]
+        return False
+
+    def outcome(self, part: str) -> ReachOutcome:
+        """How the part's last reach ended."""
+        if part not in self._ended:
+            raise InvalidValue(f"{part} has not ended a reach on this plant")
+        return self._ended[part]
+
+    def drop(self, part: str) -> None:
+        """Forget a part's reach, if there is one, and end its force."""
+        if part in self._under_way:
+            self._release(part)
+            del self._under_way[part]
+
+    def _release(self, part: str) -> None:
+        self._controller.end_reach(part)
+        if not any(reach.end is None for other, reach in self._under_way.items() if other != part):
+            self._model.reaching = None
+
+
+def _outcome(reach: Reach, after: Outcome) -> ReachOutcome:
+    end = reach.end
+    if end is None or reach.marker is None:
+        raise InvalidValue("a reach that is not over has no outcome")
+    duration = end.duration + (0.0 if reach.stay else after.duration)
+    return ReachOutcome(reach.marker, end.q, reach.missing, end.settled, duration, end.touched, after)
