@@ -39,8 +39,8 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains", "last_forces",
-        "max_dt", "modality", "model", "propagate", "robot", "weight",
+        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains",
+        "last_forces", "max_dt", "modality", "model", "propagate", "robot", "weight",
     )  # fmt: skip
 
     def __init__(

@@ -96,7 +96,8 @@ class OfflinePlant:
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
         self._reaches = Reaches(model, self._controller)
-        self._period, self._called = 0, _nothing
+        self._period = 0  # ticks
+        self._callback: Callable[[float], None] | None = None
 
     @property
     def controller(self) -> Controller:
@@ -183,7 +184,7 @@ class OfflinePlant:
         """Call that function with the plant's time [s] after each so many ticks: it may edit the world.  None: no more."""
         if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
             raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
-        self._period, self._called = (0, _nothing) if callback is None else (ticks, callback)
+        self._period, self._callback = ticks, callback
 
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts.
@@ -215,7 +216,7 @@ class OfflinePlant:
     def _run(self, most: int, traced: bool = False) -> Array:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
         kept = traced or self._digest is not None
-        if self._period:
+        if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
         rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept, traced)
         if done:
@@ -232,8 +233,8 @@ class OfflinePlant:
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
         if self._reaches.running:
             self._let_go()
-        if self._period and self._ticks % self._period == 0:
-            self._called(self.time)
+        if self._callback is not None and self._ticks % self._period == 0:
+            self._callback(self.time)
         return rows
 
     def _let_go(self) -> None:
@@ -258,7 +259,3 @@ class OfflinePlant:
         first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
         duration = self.time - self.dt - float(self._tests[index, 0])
         return Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
-
-
-def _nothing(time: float) -> None:
-    """Nobody wants to be called."""
