@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import replace
-from pathlib import Path
 
 from experiments.options import positive_whole
-from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
-
-_PICTURES = (".png", ".svg", ".pdf")
+from mobee_cli.bench.drawn import draw_costs, picture
+from mobee_cli.errors import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,26 +47,8 @@ def _model(arguments: argparse.Namespace) -> int:
 
 def _figure(arguments: argparse.Namespace) -> int:
     from experiments.bench.model_cost import draw, empty_figure, measure
-    from experiments.matplotlib_figure import MatplotlibMissing
 
-    try:
-        figure = empty_figure()  # before minutes of measuring
-    except MatplotlibMissing as error:
-        raise UserError(str(error), ENVIRONMENT) from None
-    curves = measure(arguments.rounds or (3 if arguments.quick else 9))
-    draw(figure, curves, arguments.figure)
-    print(json.dumps(curves, indent=2) if arguments.json else arguments.figure)
-    return 0
-
-
-def picture(text: str) -> Path:
-    """A file for a figure, as an argument."""
-    path = Path(text)
-    if path.suffix not in _PICTURES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no picture; valid endings: {', '.join(_PICTURES)}")
-    if not path.absolute().parent.is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r}: there is no folder {str(path.parent)!r}; make it first")
-    return path
+    return draw_costs(arguments, empty_figure, lambda: measure(arguments.rounds or (3 if arguments.quick else 9)), draw)
 
 
 def _objects(text: str) -> int:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 
-from mobee_cli.bench.model import picture
-from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+from mobee_cli.bench.drawn import draw_costs, picture
+from mobee_cli.errors import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     if arguments.figure:
-        return _figure(arguments.figure, arguments.quick, arguments.json)
+        return _figure(arguments)
     from experiments.bench.plant import QUICK, Settings, measure, report
 
     result = measure(QUICK if arguments.quick else Settings())
@@ -27,15 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if result["passed"] else FAILED
 
 
-def _figure(path: Path, quick: bool, as_json: bool) -> int:
+def _figure(arguments: argparse.Namespace) -> int:
     from experiments.bench.plant_cost import draw, empty_figure, measure
-    from experiments.matplotlib_figure import MatplotlibMissing
 
-    try:
-        figure = empty_figure()  # before it is measured
-    except MatplotlibMissing as error:
-        raise UserError(str(error), ENVIRONMENT) from None
-    curves = measure(10 if quick else 100)
-    draw(figure, curves, path)
-    print(json.dumps(curves, indent=2) if as_json else path)
-    return 0
+    return draw_costs(arguments, empty_figure, lambda: measure(10 if arguments.quick else 100), draw)
