@@ -8,10 +8,10 @@ Run time: 5 minutes on 2 cores.
 The left arm on the lattice of rank 3.  After 3000 transitions a ball of 6 cm enters where the hand is in the middle state, or the
 friction of the elbow doubles, from 4 deg/s, with which it arrives, to 8, with which it sticks; 3000 more follow, from home.  With
 friction no action ever looks settled, for the controller goes on asking the motor: actions end after 8 s.  Which actions changed is
-measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed; its first value is
-looked at 50 transitions after the change, when some of it is gone already, so that what is left of it, and how long half of it takes,
-are told too large rather than too small.  Forgetting bounds an action's counts, to 1 / (1 - forgetting), and so its reward from
-below: with 0.8 whatever has most outcomes stays the most interesting for ever, and a curious agent tries little else.
+measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed; what is left of it, and
+how long half of it takes, are told of the error at the change itself, before the first transition after it.  Forgetting bounds an
+action's counts, to 1 / (1 - forgetting), and so its reward from below: with 0.8 whatever has most outcomes stays the most interesting
+for ever, and a curious agent tries little else.
 """
 
 from __future__ import annotations
@@ -65,7 +65,11 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """Explore before and after the change; transitions (T, 3), and every so often error and value of what changed and of what did not."""
+    """Explore before and after the change.
+
+    Returns transitions (T, 3); every so often error and value of what changed and of what did not, (looks, 4); and the error of
+    what changed at the change, before anything was tried after it.
+    """
     chosen, space = cell.settings, arm_space()
     truths = _truths(chosen["change"])
     changed, same = groups(*truths)
@@ -81,11 +85,18 @@ def work(cell: Cell) -> dict[str, Any]:
         if is_after:
             agent.plant = plant_of(chosen["change"], True, cell.seed + 1)
             agent.interrupt()
+            at_change = float(np.mean(l1(agent.model.debiased(), truths[True])[changed]))
         for _ in range(chosen["transitions"] // EVERY):
             seen.append(explore(agent, EVERY))
             error, value = l1(agent.model.debiased(), truths[is_after]), agent.plan()[1]
             series.append([float(np.mean(numbers[which])) for numbers in (error, value) for which in (changed, same)])
-    return {"seen": np.concatenate(seen).astype(np.uint16), "series": np.array(series), "changed": changed, "same": same}
+    return {
+        "seen": np.concatenate(seen).astype(np.uint16),
+        "series": np.array(series),
+        "at_change": at_change,
+        "changed": changed,
+        "same": same,
+    }
 
 
 @cache

@@ -15,9 +15,7 @@ from experiments.sweep import CellResult
 
 VALUE = Claim("thesis 7.2.6", "the value of actions that suddenly end elsewhere shoots up: over that before", "shot up")
 TRIED = Claim("thesis 7.2.6", "the agent becomes interested in them: tries over the mean of all in the next 500", "a few times")
-MENDED = Claim(
-    "thesis 7.2.6", "so it improves its model: error (L1) where they changed, at the end over that 50 transitions after", "qualitative"
-)
+MENDED = Claim("thesis 7.2.6", "so it improves its model: error (L1) where they changed, at the end over that at the change", "qualitative")
 SOONER = Claim(
     "aim of this reproduction", "a curious agent that forgets (0.95) relearns sooner: transitions until the error is halved", "sooner"
 )

@@ -16,7 +16,7 @@ from mobee.robot.robot import Array, Ints
 BEFORE = 3_000  # transitions, and as many after the change
 EVERY = 50  # transitions between two looks at the model
 CONDITIONS = (("curious", 1.0), ("curious", 0.95), ("curious", 0.8), ("least_tried", 1.0), ("least_tried", 0.8))  # explorer, forgetting
-RELEARNED = 0.5  # of the error at the first look after the change
+RELEARNED = 0.5  # of the error at the change
 SOON = 500  # transitions after the change
 
 Key = tuple[str, str, float]  # change, explorer, forgetting
@@ -28,6 +28,7 @@ class Run:
 
     seen: Ints
     series: Array  # (looks, 4)
+    at_change: float  # error of what changed, before the first transition after the change
     changed: NDArray[np.bool_]
     same: NDArray[np.bool_]
 
@@ -69,9 +70,8 @@ class Run:
 
     @property
     def errors(self) -> Array:
-        """L1 where actions changed, after the change, over that at the first look, when some of it is gone already; (looks,)."""
-        after = self.series[self.looks_before :, 0]
-        relative: Array = after / after[0]
+        """L1 where actions changed, after the change, over that at the change; (looks,)."""
+        relative: Array = self.series[self.looks_before :, 0] / self.at_change
         return relative
 
     @property
@@ -87,6 +87,7 @@ def runs_of(found: Mapping[str, CellResult]) -> dict[Key, list[Run]]:
     for result in found.values():
         chosen: dict[str, Any] = result.cell.settings
         values = result.values
-        run = Run(values["seen"].astype(np.intp), values["series"], values["changed"].astype(bool), values["same"].astype(bool))
+        changed, same = (values[name].astype(bool) for name in ("changed", "same"))
+        run = Run(values["seen"].astype(np.intp), values["series"], values["at_change"], changed, same)
         grouped.setdefault((chosen["change"], chosen["explorer"], chosen["forgetting"]), []).append(run)
     return grouped

@@ -18,7 +18,7 @@ def a_run(errors):
     series = np.ones((LOOKS, 4))
     series[LOOKS // 2 :, 0] = errors
     series[LOOKS // 2 :, 2] = 3.0
-    return Run(seen, series, changed, ~changed)
+    return Run(seen, series, 2.0, changed, ~changed)
 
 
 def test_tries_are_over_the_mean_of_all_actions():
@@ -28,7 +28,11 @@ def test_tries_are_over_the_mean_of_all_actions():
     assert run.value_jump == pytest.approx(3.0) and run.value_jump_before == pytest.approx(1.0)
 
 
-def test_half_of_the_error_is_gone_or_never_is():
-    errors = np.linspace(2.0, 0.0, LOOKS // 2)
+def test_half_of_the_error_at_the_change_is_gone_or_never_is():
+    errors = np.linspace(1.8, 0.0, LOOKS // 2)
     assert a_run(errors).relearned == EVERY * (np.flatnonzero(errors <= 1.0)[0] + 1)
     assert a_run(np.full(LOOKS // 2, 1.5)).relearned == np.inf
+
+
+def test_what_is_gone_by_the_first_look_counts():
+    assert a_run(np.full(LOOKS // 2, 0.9)).relearned == EVERY
