@@ -1,6 +1,6 @@
 """Table: do three agents that know nothing of each other become interested in the table, which only two of them together can touch?
 
-Claim: over time the agents of torso and arms bend forward, put the arms low and touch the table ever more often, with ups and downs;
+Claim: over time the agents of torso and arms bend forward, put the arms low and touch the table ever more often, in a cyclic manner;
 what they try most are the actions whose outcomes depend on another part, both arms the same ones; an outcome that depends on
 others spreads over a handful of states.
 Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from experiments.claims import Claim
 from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
+from experiments.table.cycles import at_second_peak, correlations, is_cyclic, second_peak
 from experiments.table.dependence import LEARNERS, SCORES, judged
-from experiments.table.interest import agreement, autocorrelation, by_goal, of_arms, share_of_top
-from experiments.table.runs import ARMS, EXPLORERS, PARTS, TRANSITIONS, Key, Run, low, runs_of, spaces, with_ghosts
+from experiments.table.interest import agreement, by_goal, of_arms, share_of_top
+from experiments.table.runs import ARMS, EXPLORERS, PARTS, TRANSITIONS, WINDOW, Key, Run, low, runs_of, spaces, with_ghosts
 
 HANDFUL = 5  # states
 SIMILAR = 0.3  # rank correlation
@@ -28,8 +29,8 @@ SIMILAR_ARMS = Claim(
     "paper 3.2, fig. 10", "the two arms choose very similar actions: rank correlation of tries beside the ghost's, by goal", "qualitative"
 )
 CYCLES = Claim(
-    "thesis 7.4",
-    "touching comes in bouts (not in cycles of one period): autocorrelation of the touch rate at lag 1, 50 transitions",
+    PAPER,
+    "periods of exploring, of static constraints and of touching come in a cyclic manner: second peak of the touch rate's autocorrelation",
     "cyclic",
 )
 RICHER = Claim("paper fig. 9, thesis 7.4", "outcomes are richer than by static constraints: actions with 3 or more", "qualitative")
@@ -126,14 +127,14 @@ def detector(runs: dict[Key, list[Run]]) -> dict[str, dict[str, float]]:
 
 
 def _claims(runs: Runs) -> list[Claim]:
-    curious, ghost = runs["tree", "curious", "table"], runs["tree", "curious", "ghost"]
+    curious = runs["tree", "curious", "table"]
     return [
         _against(TOUCH, runs, lambda run: run.touch),
         _against(GROWS, runs, lambda run: run.growth, least=0.0),
         _against(FORWARD, runs, lambda run: run.torso_forward),
         _against(LOW, runs, lambda run: run.arms_low),
         _similar(runs),
-        _cycles(curious, ghost),
+        _cycles(runs),
         _against(RICHER, runs, lambda run: float((outcome_numbers(run) >= 3).sum()), 0),
         FEW.measured(_most(curious), max(int(outcome_numbers(run).max()) for run in curious) <= HANDFUL),
         _detects(runs),
@@ -160,10 +161,17 @@ def _similar(runs: Runs) -> Claim:
     return SIMILAR_ARMS.measured(text, ours > SIMILAR and all(ours > interval(found[e])[1] for e in EXPLORERS[1:]))
 
 
-def _cycles(curious: list[Run], ghost: list[Run]) -> Claim:
-    ours, theirs = ([float(autocorrelation(run.touch_rate, 1)[1]) for run in runs] for runs in (curious, ghost))
-    text = f"at lag 1 {told(ours)}, at the ghost {told(theirs)}"
-    return CYCLES.measured(text, interval(ours)[0] > max(0.0, interval(theirs)[1]))
+def _cycles(runs: Runs) -> Claim:
+    pairs = with_ghosts(runs, "tree", "curious")
+    if len(pairs) < 2:
+        return CYCLES.measured("needs two seeds", None)
+    ours, theirs = (correlations([pair[which] for pair in pairs]) for which in (0, 1))
+    here, there = at_second_peak(ours, theirs)
+    text = (
+        f"around a lag of {WINDOW * second_peak(ours)} transitions {told(here)}, at the ghost {told(there)}; touching comes in bouts: "
+        f"{told(ours[:, 1])} at {WINDOW}, at the ghost {told(theirs[:, 1])}"
+    )
+    return CYCLES.measured(text, is_cyclic(ours, theirs))
 
 
 def _most(curious: list[Run]) -> str:

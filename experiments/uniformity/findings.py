@@ -35,7 +35,7 @@ SPIKES = Claim(
 )
 NONE = Claim("paper 3.1, fig. 5", "least-tried and random exploration have no such spikes", "none visible")
 SAME = Claim(
-    "notes of this project", "with equidistant neighbours least-tried tries as evenly as curiosity: fig. 5 depends on its graph", "-"
+    "aim of this reproduction", "with equidistant neighbours least-tried tries as evenly as curiosity: fig. 5 depends on its graph", "-"
 )
 CLAIMS = (VISITS, TRIES, SPIKES, NONE, SAME)
 
