@@ -31,7 +31,7 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
         paper.set(title=f"{TITLES[divergence]}: one action of 81 states", xlabel="try", ylabel="reward [nats]", yscale="log")
         for part, label in (("left_arm", "arm, 81 states"), ("torso", "torso, 27 states")):
             if (part, divergence) in grouped:
-                paid.plot(_smooth(np.mean([run.paid for run in grouped[part, divergence]], axis=0)), label=label)
+                paid.plot(_smooth(np.mean([run.values["paid"] for run in grouped[part, divergence]], axis=0)), label=label)
         paid.set(title="what the agents' transitions paid", xlabel="transition", ylabel="reward [nats]", yscale="log")
         if ("left_arm", divergence) in grouped:
             _tries(tried, grouped["left_arm", divergence][0].tries, at_constraints(grouped))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from experiments.claims import Claim
 from experiments.kail.on_paper import told_apart
 from experiments.kail.spaces import space_of
 from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
-from experiments.learning.outcomes import exists_in, failures_of, tries_of
+from experiments.learning.explored import Explored, Groups, explored
 from experiments.statistics import interquartile_mean, interval, told
 from experiments.sweep import CellResult
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array
 
 DIVERGENCES = ("kail", "kl")
 PARTS = ("left_arm", "torso")
@@ -35,36 +34,9 @@ COMPARABLE = Claim("thesis 6.4.3", "with 'Kail' rewards of learners of different
 CLAIMS = (FIRST, SECOND, SPIKES, SIZE, COMPARABLE)
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Tries and failures (E,) of the E state-actions, what each transition paid (T,)."""
-
-    seed: int
-    tries: Ints
-    failures: Ints
-    paid: Array
-    first_reward: float
-
-
-Groups = dict[tuple[str, str], list[Run]]  # part and divergence
-
-
 def groups(found: Mapping[str, CellResult]) -> Groups:
     """The runs of each part and divergence, by seed."""
-    grouped: Groups = {}
-    for result in sorted(found.values(), key=lambda result: result.cell.seed):
-        settings, values = result.cell.settings, result.values
-        space = space_of(settings["part"])
-        exists = exists_in(space)
-        one = Run(
-            result.cell.seed,
-            tries_of(space, values["seen"])[exists],
-            failures_of(space, values["seen"])[exists],
-            values["paid"],
-            values["first_reward"],
-        )
-        grouped.setdefault((settings["part"], settings["divergence"]), []).append(one)
-    return grouped
+    return explored(found, space_of, "part", "divergence")
 
 
 def at_constraints(grouped: Groups) -> Array:
@@ -72,7 +44,7 @@ def at_constraints(grouped: Groups) -> Array:
     return constraint_actions(_of_arm(grouped))
 
 
-def _of_arm(grouped: Groups) -> list[Run]:
+def _of_arm(grouped: Groups) -> list[Explored]:
     return [run for divergence in DIVERGENCES for run in grouped.get(("left_arm", divergence), [])]
 
 
@@ -90,13 +62,13 @@ def findings(found: Mapping[str, CellResult]) -> dict[str, Any]:
     return {"runs": rows, "claims": [claim.record() for claim in claims]}
 
 
-def _row(runs: list[Run]) -> dict[str, Any]:
+def _row(runs: list[Explored]) -> dict[str, Any]:
     untried = [float((run.tries == 0).sum()) for run in runs]
     return {
         "seeds": len(runs),
-        "promised_first": round(runs[0].first_reward, 5),
-        "paid_first_100": round(interquartile_mean([float(run.paid[:EARLY].mean()) for run in runs]), 5),
-        "paid_last_100": round(interquartile_mean([float(run.paid[-EARLY:].mean()) for run in runs]), 5),
+        "promised_first": round(runs[0].values["first_reward"], 5),
+        "paid_first_100": round(interquartile_mean([_early_pay(run) for run in runs]), 5),
+        "paid_last_100": round(interquartile_mean([float(run.values["paid"][-EARLY:].mean()) for run in runs]), 5),
         "untried": interquartile_mean(untried),
     }
 
@@ -133,5 +105,9 @@ def _tries(count: float) -> str:
 
 def _sizes(grouped: Groups, divergence: str) -> list[float]:
     """What the torso's first tries pay over what the arm's do, of each seed that both have."""
-    torso, arm = ({run.seed: float(run.paid[:EARLY].mean()) for run in grouped[part, divergence]} for part in ("torso", "left_arm"))
+    torso, arm = ({run.seed: _early_pay(run) for run in grouped[part, divergence]} for part in ("torso", "left_arm"))
     return [torso[seed] / arm[seed] for seed in sorted(torso.keys() & arm.keys())]
+
+
+def _early_pay(run: Explored) -> float:
+    return float(run.values["paid"][:EARLY].mean())

@@ -6,26 +6,14 @@ What a run is judged by is chosen from the other runs: the tries of an action th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
+from experiments.learning.explored import Explored
 from mobee.robot.robot import Array, Ints
 
 
-class Tried(Protocol):
-    """A run: tries and failures (E,) of the E state-actions."""
-
-    @property
-    def tries(self) -> Ints:
-        """How often each was tried."""
-
-    @property
-    def failures(self) -> Ints:
-        """How often each did not end in its goal."""
-
-
-def constraint_actions(runs: Sequence[Tried]) -> Array:
+def constraint_actions(runs: Sequence[Explored]) -> Array:
     """Which state-actions (E,) failed in more than half of the tries of all runs, at least one, together; all False without runs."""
     return np.asarray(2 * sum(run.failures for run in runs) > sum(run.tries for run in runs))
 
@@ -37,7 +25,7 @@ def relative_tries(tries: Ints, chosen: Array) -> float:
     return float(tries[chosen].mean() / tries[~chosen].mean())
 
 
-def relative_tries_of(judged: Sequence[Tried], runs: Sequence[Tried]) -> list[float]:
+def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> list[float]:
     """`relative_tries` of each judged run at what fails in the other `runs`; without those that have none to compare."""
     ratios = [relative_tries(one.tries, constraint_actions([run for run in runs if run is not one])) for one in judged]
     return [ratio for ratio in ratios if np.isfinite(ratio)]

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from experiments.claims import Claim
 from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
-from experiments.learning.outcomes import exists_in, failures_of, tries_of, visits_of
+from experiments.learning.explored import Explored, Groups, explored
 from experiments.learning.published import ARM_NEIGHBOURS, arm_space
 from experiments.learning.spread import gini, relative_spread
 from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
 from experiments.sweep import CellResult
 from mobee import Lattice
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array
 
 EXPLORERS = ("curious", "least_tried", "random")
 GRAPHS = ("nearest", "equidistant")
@@ -40,18 +39,6 @@ SAME = Claim(
 CLAIMS = (VISITS, TRIES, SPIKES, NONE, SAME)
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What one explorer did: tries and failures (E,) of the E state-actions, visits (S,)."""
-
-    tries: Ints
-    failures: Ints
-    visits: Ints
-
-
-Groups = dict[tuple[str, str], list[Run]]  # graph and explorer
-
-
 @cache
 def space_of(graph: str) -> Lattice:
     """The lattice of a graph."""
@@ -60,14 +47,7 @@ def space_of(graph: str) -> Lattice:
 
 def groups(found: Mapping[str, CellResult]) -> Groups:
     """The runs of each graph and explorer, by seed."""
-    grouped: Groups = {}
-    for result in sorted(found.values(), key=lambda result: result.cell.seed):
-        settings, seen = result.cell.settings, result.values["seen"]
-        space = space_of(settings["graph"])
-        exists = exists_in(space)
-        one = Run(tries_of(space, seen)[exists], failures_of(space, seen)[exists], visits_of(space, seen))
-        grouped.setdefault((settings["graph"], settings["explorer"]), []).append(one)
-    return grouped
+    return explored(found, space_of, "graph", "explorer")
 
 
 def at_constraints(grouped: Groups, graph: str) -> Array:
@@ -75,7 +55,7 @@ def at_constraints(grouped: Groups, graph: str) -> Array:
     return constraint_actions(_all_runs(grouped, graph))
 
 
-def _all_runs(grouped: Groups, graph: str) -> list[Run]:
+def _all_runs(grouped: Groups, graph: str) -> list[Explored]:
     return [run for explorer in EXPLORERS for run in grouped.get((graph, explorer), [])]
 
 

@@ -1,22 +1,14 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from experiments.learning.constraint_actions import constraint_actions, relative_tries, relative_tries_of
-from mobee.robot.robot import Ints
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    tries: Ints
-    failures: Ints
+from experiments.learning.explored import Explored
 
 
 def run(tries, failures):
-    return Run(np.array(tries), np.array(failures))
+    return Explored(0, np.array(tries), np.array(failures), np.zeros(1, dtype=int), {})
 
 
 def test_actions_at_constraints_fail_in_more_than_half_of_all_tries():
