@@ -6,10 +6,9 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any
 
-from mobee.database import explained, opened, transaction
+from mobee.agent_file import AgentFile
+from mobee.database import explained
 from mobee.errors import MobeeError
 
 STORE = "transitions.sqlite"  # of a run, in its folder
@@ -33,7 +32,7 @@ class Transition:
     touched: tuple[str, ...] = ()
 
 
-class TransitionStore:
+class TransitionStore(AgentFile):
     """The transitions of one agent in the file of a run, which the processes of several agents may share.
 
     Write-ahead log with full synchronisation: what `append` has returned from survives a kill and a power cut.
@@ -48,36 +47,8 @@ class TransitionStore:
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
-        self.path, self.agent = Path(path), agent
-        self._db = opened(self.path, read_only)
+        super().__init__(path, agent, read_only)
         self._last = self._newest()
-
-    def bind(self, settings: dict[str, Any]) -> None:
-        """Record the agent's settings (plain JSON values), or refuse if it has others on record."""
-        given = {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
-        with explained(self.path), transaction(self._db):
-            known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
-            if not known:
-                self._db.executemany("INSERT INTO meta VALUES (?, ?, ?)", [(self.agent, key, value) for key, value in given.items()])
-                return
-        if missing := sorted(given.keys() - known.keys()):
-            raise MobeeError(
-                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, or on a plant "
-                "that does not say what it is. `mobee plan` and `mobee export` read it; to learn on, use another file."
-            )
-        for key in sorted(known):
-            if known[key] != given.get(key):
-                then, now = _differing(json.loads(known[key]), json.loads(given.get(key, "null")))
-                raise MobeeError(
-                    f"{self.path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
-                    "A run goes on only with the settings it began with: use those, or another file."
-                )
-
-    def settings(self, agent: str | None = None) -> dict[str, Any]:
-        """The settings on record of this agent, or of another one in the file; empty if there are none."""
-        with explained(self.path):
-            rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self._named(agent),)).fetchall()
-        return {key: json.loads(value) for key, value in rows}
 
     def append(self, transition: Transition) -> None:
         """Commit one transition; it is on disk when this returns."""
@@ -125,28 +96,7 @@ class TransitionStore:
         with explained(self.path):
             return tuple(name for (name,) in self._db.execute("SELECT DISTINCT agent FROM transitions ORDER BY agent"))
 
-    def close(self) -> None:
-        """Let go of the file."""
-        self._db.close()
-
-    def __enter__(self) -> TransitionStore:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
     def _newest(self) -> int:
         with explained(self.path):
             newest = self._db.execute("SELECT max(n) FROM transitions WHERE agent = ?", (self.agent,)).fetchone()[0]
         return int(newest or 0)
-
-    def _named(self, agent: str | None) -> str:
-        return self.agent if agent is None else agent
-
-
-def _differing(then: Any, now: Any) -> tuple[Any, Any]:
-    """What differs of two values: of two mappings that have the same keys only the entries that are not equal."""
-    if not (isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys()):
-        return then, now
-    pairs = {key: _differing(then[key], now[key]) for key in sorted(then) if then[key] != now[key]}
-    return {key: pair[0] for key, pair in pairs.items()}, {key: pair[1] for key, pair in pairs.items()}

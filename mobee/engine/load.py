@@ -22,6 +22,7 @@ MODULES = (
     "mobee.simulation.braking",
     "mobee.learning.sweeps",
     "mobee.learning.gains",
+    "mobee.learning.reaching.sums",
     "mobee.engine.evaluate",
 )
 PATIENCE = 300.0  # s that a process waits for another that compiles

@@ -1,6 +1,9 @@
-"""What each action brought on which target, and averages of that, weighted by how near the targets were (thesis eq. 8.1)."""
+"""What each action brought on which target, and averages of that, weighted by how near the targets were (thesis eqs. 8.1, 8.5, 8.7)."""
 
 from __future__ import annotations
+
+from functools import cache
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,48 +15,51 @@ from mobee.robot.robot import Array
 class Histories:
     """Histories of so many actions: targets and values.
 
-    Repeats on one target are kept as their number and sum, so that a history never grows beyond one entry an action and
-    target, and a weighted sum over all of them is one compiled pass.
+    Repeats on one target are kept as their sum and number, so that there is one entry for an action and a target, and a
+    weighted sum over all of them is one compiled pass of microseconds.
 
     Args:
         actions: how many.
         scale: m, the unit of the distances.
+        near: m, how far from a target others count at all.
     """
 
-    def __init__(self, actions: int, scale: float) -> None:
-        self._actions, self._scale = actions, scale
+    def __init__(self, actions: int, scale: float, near: float = np.inf) -> None:
+        self._actions, self._scale, self._near = actions, scale, near
         self._targets = np.empty((4, 3))
         self._known: dict[bytes, int] = {}
-        self._entry: dict[tuple[int, int], int] = {}
-        self._action, self._target = np.empty(4, dtype=np.int64), np.empty(4, dtype=np.int64)
-        self._total, self._count = np.zeros(4), np.zeros(4)
+        self._entries: dict[tuple[int, int], int] = {}
+        self._keys = np.empty((4, 2), dtype=np.int64)
+        self._sums = np.zeros((4, 2))
 
     def add(self, action: int, target: Array, value: float) -> None:
         """Append a value to the history of an action; target (3,) m."""
         key = action, self._index(target)
-        entry = self._entry.get(key)
+        entry = self._entries.get(key)
         if entry is None:
-            entry = self._entry[key] = len(self._entry)
-            self._action, self._target = _room(self._action, entry), _room(self._target, entry)
-            self._total, self._count = _room(self._total, entry), _room(self._count, entry)
-            self._action[entry], self._target[entry] = key
-        self._total[entry] += value
-        self._count[entry] += 1.0
+            entry = self._entries[key] = len(self._entries)
+            self._keys, self._sums = _room(self._keys, entry), _room(self._sums, entry)
+            self._keys[entry] = key
+        self._sums[entry] += value, 1.0
 
-    def weighted(self, target: Array) -> tuple[Array, Array]:
-        """Sums over each action's history of weight times value, and of the weights, shape (actions,): 1 / (1 + |x - x_i|)."""
-        used = len(self._entry)
-        offsets = self._targets[: len(self._known)] - target
-        weights = 1.0 / (1.0 + np.sqrt(np.einsum("ij,ij->i", offsets, offsets)) / self._scale)
-        weight, action = weights[self._target[:used]], self._action[:used]
-        total: Array = np.bincount(action, weight * self._total[:used], self._actions).astype(np.float64, copy=False)
-        return total, np.bincount(action, weight * self._count[:used], self._actions).astype(np.float64, copy=False)
+    def average(self, target: Array, prior: float) -> Array:
+        """The average of each action's history with one value of `prior` at no distance, shape (actions,).
 
-    def optimistic(self, target: Array) -> Array:
-        """Weighted averages over each action's history and one value of 1 at no distance, shape (actions,) (thesis eqs. 8.5 and 8.7)."""
-        total, weight = self.weighted(target)
-        average: Array = (1.0 + total) / (1.0 + weight)
-        return average
+        Weights are 1 / (1 + |x - x_i|).  A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
+        """
+        totals, weights = np.full(self._actions, prior), np.ones(self._actions)
+        where = np.ascontiguousarray(target, dtype=np.float64)
+        sizes = len(self._known), len(self._entries)
+        _sums().weighted_sums(self._targets, sizes[0], where, self._scale, self._near, self._keys, self._sums, sizes[1], totals, weights)
+        totals /= weights
+        return totals
+
+    def copy(self) -> Histories:
+        """One that goes its own way from here."""
+        other = Histories(self._actions, self._scale, self._near)
+        other._targets, other._known = self._targets.copy(), self._known.copy()
+        other._entries, other._keys, other._sums = self._entries.copy(), self._keys.copy(), self._sums.copy()
+        return other
 
     def _index(self, target: Array) -> int:
         key = target.tobytes()
@@ -68,3 +74,11 @@ class Histories:
 def _room(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
     """The array, or a copy twice as long where it has no such index."""
     return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
+
+
+@cache
+def _sums() -> ModuleType:
+    """The compiled sums, imported when they are first needed."""
+    from mobee.engine.load import load_only
+
+    return load_only("mobee.learning.reaching.sums")

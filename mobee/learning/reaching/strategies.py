@@ -71,7 +71,7 @@ class Intrinsic:
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """The expected errors, shape (S,): 1 where nothing was tried."""
-        return self._errors.optimistic(target)
+        return self._errors.average(target, 1.0)
 
 
 class UpperBound(Greedy):

@@ -11,7 +11,6 @@ from mobee.learning.reaching.histories import Histories
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.robot.robot import Array
 
-
 _NO_DEVIATION = (
     "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."
 )
@@ -39,7 +38,7 @@ class Weighted:
 
     def mean(self, target: Array) -> Array:
         """Expected reward of reaching from each state, shape (S,) (thesis eq. 8.5)."""
-        return self._rewards.optimistic(target)
+        return self._rewards.average(target, 1.0)
 
     def deviation(self, target: Array) -> NoReturn:
         """Raise InvalidValue: an average does not say how sure it is."""

@@ -1,0 +1,111 @@
+"""How well a learner reaches by now, without leaving a trace in it (thesis 8.3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mobee.learning.explorers import choose
+from mobee.learning.reaching.acting import move, reach
+from mobee.reach import ReachTarget, reward_of
+from mobee.robot.robot import Array, Ints
+
+if TYPE_CHECKING:
+    from mobee.learning.reaching.reach_agent import ReachAgent
+
+NOWHERE = -1  # instead of a state
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation:
+    """What came of the problems, R repetitions of P.
+
+    `rewards`: (R, P), 0 where no reach came about.  `states`: (R, P) from which it reached, -1 where it did not.  `missing`: (R, P) m,
+    NaN where it did not.  `failures`: (R, P) failed transitions.  `actions`: (R, P), the reach included.
+    `duration`: (R, P) s of plant time.
+    """
+
+    rewards: Array
+    states: Ints
+    missing: Array
+    failures: Ints
+    actions: Ints
+    duration: Array
+
+    @property
+    def scores(self) -> Array:
+        """The cumulative reward over the problems, shape (R,): what thesis figure 8.2 shows."""
+        total: Array = self.rewards.sum(axis=1)
+        return total
+
+
+def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: int) -> Evaluation:
+    """Reach for every problem in random order, from a random state at first; as often as asked for.
+
+    The agent expects as it does then, and does not learn from its reaches; failed transitions it remembers until the end of a repetition.
+    """
+    shape = repetitions, len(problems)
+    found = Evaluation(
+        np.zeros(shape),
+        np.full(shape, NOWHERE),
+        np.full(shape, np.nan),
+        np.zeros(shape, np.intp),
+        np.zeros(shape, np.intp),
+        np.zeros(shape),
+    )
+    for repetition in range(repetitions):
+        rng = np.random.default_rng([agent.seed, agent.tries, repetition])
+        trial = _Trial(agent, rng)
+        trial.go_to(int(rng.integers(len(agent.space))))
+        for problem in rng.permutation(len(problems)).tolist():
+            trial.reach_for(problems[problem], found, (repetition, problem))
+    return found
+
+
+class _Trial:
+    """One repetition: where the part is, and which transitions failed in it."""
+
+    def __init__(self, agent: ReachAgent, rng: np.random.Generator) -> None:
+        self.agent, self.rng, self.failures = agent, rng, agent.failures.copy()
+        self.state = agent.space.state_of(agent.plant.measure(agent.part)[agent.space.columns])
+
+    def go_to(self, goal: int) -> None:
+        """Go to a state with nothing presented, or as far as the limit of actions allows."""
+        agent = self.agent
+        agent.plant.present(None)
+        arrived = np.full(len(agent.space), -np.inf)
+        arrived[goal] = 1.0
+        _, action_values = agent.planning.values(arrived, 0.0)
+        for _ in range(agent.limit):
+            if self.state == goal:
+                return
+            action = choose(action_values[self.state], self.rng)
+            _, self.state = move(agent.plant, agent.space, self.state, action)
+
+    def reach_for(self, target: ReachTarget, found: Evaluation, at: tuple[int, int]) -> None:
+        """One problem-try by what is expected now."""
+        agent, position = self.agent, target.position
+        agent.plant.present(target)
+        expected = np.maximum(agent.predictor.mean(position), 0.0)
+        values, action_values = agent.planning.values(expected, self.failures.rewards(position))
+        for _ in range(agent.limit):
+            found.actions[at] += 1
+            action = choose(action_values[self.state], self.rng)
+            if action == agent.space.goals.shape[1]:
+                reached, following = reach(agent.plant, agent.space, agent.marker)
+                found.rewards[at], found.states[at] = reward_of(reached.missing, agent.reaches.scale), self.state
+                found.missing[at] = reached.missing
+                found.duration[at] += reached.duration
+                self.state = following
+                return
+            outcome, following = move(agent.plant, agent.space, self.state, action)
+            found.duration[at] += outcome.duration
+            failed = bool(values[following] <= values[self.state])
+            self.failures.add(self.state, action, position, agent.penalty if failed else 0.0)
+            self.state = following
+            if failed:
+                found.failures[at] += 1
+                values, action_values = agent.planning.values(expected, self.failures.rewards(position))

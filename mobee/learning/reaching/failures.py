@@ -1,0 +1,46 @@
+"""Which transitions fail on which targets, as negative rewards (thesis 8.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.errors import UnknownName
+from mobee.learning.reaching.histories import Histories
+from mobee.robot.robot import Array
+
+FAILURES = ("spread", "local")
+NEAR = 0.025  # m: targets of the published size this near one another are in the way of nearly the same
+
+
+class Failures:
+    """Histories of all transitions: 0 for each success and a penalty for each failure, by target.
+
+    Args:
+        states, actions: of the space.
+        scale: m, the unit of distances.
+        kind: "spread": every failure tells a little of every target (thesis eq. 8.1, with 1 added to its denominator, or one failure
+            would forbid a transition on all targets); "local": it tells of targets within 25 mm alone.
+
+    Raises:
+        UnknownName: no such kind.
+    """
+
+    def __init__(self, states: int, actions: int, scale: float, kind: str = "spread") -> None:
+        if kind not in FAILURES:
+            raise UnknownName("way to remember failures", kind, FAILURES)
+        self._shape = states, actions
+        self._histories = Histories(states * actions, scale, NEAR if kind == "local" else np.inf)
+
+    def add(self, state: int, action: int, target: Array, reward: float) -> None:
+        """Append the reward of a transition made while a target (3,) m was presented."""
+        self._histories.add(state * self._shape[1] + action, target, reward)
+
+    def rewards(self, target: Array) -> Array:
+        """The expected reward of each transition, shape (S, A), at most 0."""
+        return self._histories.average(target, 0.0).reshape(self._shape)
+
+    def copy(self) -> Failures:
+        """One that goes its own way from here."""
+        other = object.__new__(Failures)
+        other._shape, other._histories = self._shape, self._histories.copy()
+        return other

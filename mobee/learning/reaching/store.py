@@ -1,0 +1,129 @@
+"""Learned reaches on disk, in the file of a run: every action is committed before the next one (DESIGN section 8)."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.agent_file import AgentFile
+from mobee.database import explained, transaction
+from mobee.errors import MobeeError
+from mobee.learning.reaching.tries import Step
+from mobee.reach import ReachTarget
+
+TABLES = """
+CREATE TABLE IF NOT EXISTS reach_problems (
+    agent TEXT NOT NULL, problem INTEGER NOT NULL, target TEXT NOT NULL, PRIMARY KEY (agent, problem));
+CREATE TABLE IF NOT EXISTS reach_learners (agent TEXT NOT NULL, n INTEGER NOT NULL, settings TEXT NOT NULL, PRIMARY KEY (agent, n));
+CREATE TABLE IF NOT EXISTS reach_steps (
+    agent TEXT NOT NULL, n INTEGER NOT NULL, number INTEGER NOT NULL, problem INTEGER NOT NULL, s INTEGER NOT NULL, a INTEGER NOT NULL,
+    s_next INTEGER NOT NULL, failed INTEGER NOT NULL, reward REAL NOT NULL, expected REAL NOT NULL, missing REAL NOT NULL,
+    settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
+"""
+COLUMNS = "n, number, problem, s, a, s_next, failed, reward, expected, missing, settled, duration, q, touched"
+
+
+class ReachStore(AgentFile):
+    """The problems and steps of the reach learner of one part, in the file of a run.
+
+    Args:
+        path, read_only: of the AgentFile.
+        part: whose reaches they are; they are kept under its name and "reaching", beside the part's transitions.
+    """
+
+    def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
+        super().__init__(path, f"{part} reaching", read_only)
+        with explained(self.path):
+            if read_only:
+                if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'reach_steps'").fetchone():
+                    raise MobeeError(f"{self.path}: nobody has learned to reach in this run yet.")
+            else:
+                with transaction(self._db):
+                    for statement in TABLES.split(";")[:-1]:
+                        self._db.execute(statement)
+            self._last, self._problems = (
+                int(self._db.execute(f"SELECT count(*) FROM {table} WHERE agent = ?", (self.agent,)).fetchone()[0])
+                for table in ("reach_steps", "reach_problems")
+            )
+
+    def learner(self, settings: dict[str, Any]) -> None:
+        """Record who learns from here on (plain JSON values), if it is another than before."""
+        given = json.dumps(settings, sort_keys=True)
+        with explained(self.path), transaction(self._db):
+            newest = self._db.execute(
+                "SELECT settings FROM reach_learners WHERE agent = ? ORDER BY n DESC LIMIT 1", (self.agent,)
+            ).fetchone()
+            if newest is None or newest[0] != given:
+                self._db.execute("INSERT OR REPLACE INTO reach_learners VALUES (?, ?, ?)", (self.agent, self._last, given))
+
+    def learners(self) -> list[tuple[int, dict[str, Any]]]:
+        """Who learned, each with the number of steps that were on record before."""
+        with explained(self.path):
+            rows = self._db.execute("SELECT n, settings FROM reach_learners WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
+        return [(n, json.loads(settings)) for n, settings in rows]
+
+    def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
+        """Commit one step, and the targets of problems that are new; all is on disk when this returns."""
+        if step.n != self._last + 1:
+            raise MobeeError(f"{self.path}: {self.agent} has {self._last} steps: append number {self._last + 1}, not {step.n}.")
+        values = (self.agent, *_row(step), time.time())
+        new = [(self.agent, number, _written(problems[number])) for number in range(self._problems, step.problem + 1)]
+        with explained(self.path), transaction(self._db):
+            self._db.executemany("INSERT INTO reach_problems VALUES (?, ?, ?)", new)
+            self._db.execute(f"INSERT INTO reach_steps VALUES ({', '.join('?' * len(values))})", values)
+        self._last, self._problems = step.n, self._problems + len(new)
+
+    def problems(self) -> list[ReachTarget]:
+        """The target of each problem, in order."""
+        with explained(self.path):
+            rows = self._db.execute("SELECT target FROM reach_problems WHERE agent = ? ORDER BY problem", (self.agent,)).fetchall()
+        return [_read(target) for (target,) in rows]
+
+    def load(self) -> list[Step]:
+        """All steps, in order."""
+        with explained(self.path):
+            rows = self._db.execute(f"SELECT {COLUMNS} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
+        for expected, row in enumerate(rows, start=1):
+            if row[0] != expected:
+                raise MobeeError(f"{self.path}: step {expected} of {self.agent} is missing; the file was edited. Restore it from a copy.")
+        return [_step(*row) for row in rows]
+
+
+def _row(step: Step) -> tuple[Any, ...]:
+    return (
+        step.n,
+        step.number,
+        step.problem,
+        step.s,
+        step.a,
+        step.s_next,
+        step.failed,
+        step.reward,
+        step.expected,
+        step.missing,
+        step.settled,
+        step.duration,
+        json.dumps(step.q),
+        json.dumps(step.touched),
+    )
+
+
+def _step(*row: Any) -> Step:
+    *whole, failed, reward, expected, missing, settled, duration, q, touched = row
+    return Step(*whole, bool(failed), reward, expected, missing, bool(settled), duration, tuple(json.loads(q)), tuple(json.loads(touched)))
+
+
+def _written(target: ReachTarget) -> str:
+    normal = None if target.normal is None else target.normal.tolist()
+    return json.dumps({"position": target.position.tolist(), "radius": target.radius, "aim": target.aim, "normal": normal})
+
+
+def _read(text: str) -> ReachTarget:
+    made = json.loads(text)
+    normal = None if made["normal"] is None else np.array(made["normal"])
+    return ReachTarget(np.array(made["position"]), made["radius"], made["aim"], normal)

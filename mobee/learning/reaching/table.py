@@ -1,0 +1,87 @@
+"""A world given as tables in which one can also reach, at once: for tests, and for worlds whose truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue
+from mobee.learning.draws import Draws
+from mobee.learning.space import Space
+from mobee.learning.tabular import TabularPlant
+from mobee.plant import Outcome
+from mobee.reach import TARGET, ReachOutcome, ReachTarget
+from mobee.robot.robot import Array
+
+World = Callable[[Array], tuple[Array, Array]]
+
+
+class ReachTable(TabularPlant):
+    """A TabularPlant on which a part can reach and the presented target is in the way of transitions.
+
+    What action number n draws follows from the seed and n alone, as there.
+
+    Args:
+        space, outcomes, probabilities, seed, start: of the TabularPlant.
+        world: of a target (3,) m: how far from it a reach from each state ends on average, (S,) m, and the probability that it
+            blocks each transition, (S, A), which then ends where it began.  Asked once a place.
+        noise: m, standard deviation of where a reach ends.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        outcomes: ArrayLike,
+        probabilities: ArrayLike,
+        world: World,
+        noise: float = 0.0,
+        seed: int = 0,
+        start: int = 0,
+    ) -> None:
+        super().__init__(space, outcomes, probabilities, seed, start)
+        self._world, self._noise = world, noise
+        self._seen: dict[bytes, tuple[Array, Array]] = {}
+        self._presented: tuple[Array, Array] | None = None
+        self._chances = Draws("reach table")
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """A digest of the table of transitions and the noise, as plain JSON values; the world's function cannot tell what it is."""
+        return super().settings | {"noise": self._noise}
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Put the target into the world; None takes it away."""
+        if target is None:
+            self._presented = None
+            return
+        key = target.position.tobytes()
+        if key not in self._seen:
+            self._seen[key] = self._world(target.position)
+        self._presented = self._seen[key]
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """As of the TabularPlant, if the presented target does not block it; each takes 1 s."""
+        if self._presented is not None:
+            action = self._action[self.state].get(self.space.state_of(target[self.space.columns]))
+            if action is not None and self._chance() < self._presented[1].item(self.state, action):
+                self.actions += 1
+                return Outcome(self.measure(part), settled=True, duration=1.0, touched=(TARGET,))
+        return super().act(part, target)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """End at the distance of the table, then where it began; takes 2 s.  There is no body: the marker and its place are made up."""
+        if self._presented is None:
+            raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")
+        q = self.measure(part)
+        missing = self._presented[0].item(self.state)
+        if self._noise:
+            missing = abs(missing + self._noise * float(self._chances.at(self.seed, self.actions).standard_normal()))
+        self.actions += 1
+        after = Outcome(q, settled=True, duration=1.0)
+        return ReachOutcome(np.zeros(3), q, missing, settled=True, duration=2.0, touched=(), after=after)
+
+    def _chance(self) -> float:
+        return float(self._chances.at(self.seed, self.actions).random())

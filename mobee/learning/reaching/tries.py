@@ -1,0 +1,78 @@
+"""What a reach learner did: single steps, which are kept on record, and whole problem-tries (thesis 8.3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mobee.learning.reaching.planning import REACH
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One action of a problem-try.
+
+    `n`: 1, 2, ... of this learner.  `number`: 1, 2, ... of the problem-try, `problem`: 0, 1, ... of its target.
+    `a`: a transition's action, or REACH.  `failed`: the value did not rise.  `reward`: of a transition 0 or the penalty; of a
+    reach that of thesis eq. 8.4, then `expected` is what was predicted just before, and `missing` m what eq. 8.4 was taken of.
+    `q`: rad, all motors of the part, of a reach at the end of its force.  `touched`: world objects.  `duration`: s of plant time.
+    """
+
+    n: int
+    number: int
+    problem: int
+    s: int
+    a: int
+    s_next: int
+    failed: bool
+    reward: float
+    expected: float
+    missing: float
+    settled: bool
+    duration: float
+    q: tuple[float, ...]
+    touched: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """A problem-try that has ended.
+
+    `path`: its transitions, as (s, a, s', failed).  `reach_state`: from which it reached; None: it did not come to that in time, and
+    the four that follow are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected less actual reward (thesis eq. 8.6).
+    `missing`: m, from where the marker was to be.  `timeouts`: actions that did not settle.  `duration`: s of plant time.
+    """
+
+    number: int
+    problem: int
+    path: tuple[tuple[int, int, int, bool], ...]
+    reach_state: int | None
+    reward: float
+    expected: float
+    intrinsic: float
+    missing: float
+    timeouts: int
+    duration: float
+
+    @property
+    def failures(self) -> int:
+        """How many of its transitions failed."""
+        return sum(failed for _, _, _, failed in self.path)
+
+
+def made_of(steps: Sequence[Step]) -> Try:
+    """The problem-try that consists of these steps, at least one."""
+    moves, last = [step for step in steps if step.a != REACH], steps[-1]
+    reached = last.a == REACH
+    return Try(
+        number=last.number,
+        problem=last.problem,
+        path=tuple((step.s, step.a, step.s_next, step.failed) for step in moves),
+        reach_state=last.s if reached else None,
+        reward=last.reward if reached else 0.0,
+        expected=last.expected if reached else 0.0,
+        intrinsic=last.expected - last.reward if reached else 0.0,
+        missing=last.missing if reached else 0.0,
+        timeouts=sum(not step.settled for step in steps),
+        duration=sum(step.duration for step in steps),
+    )
