@@ -8,6 +8,7 @@ from mobee.learning.lattice import Lattice
 from mobee.learning.parallel import run
 from mobee.learning.planner import Plan, Planner
 from mobee.learning.policy_iteration import policy_iteration
+from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
@@ -40,6 +41,7 @@ __all__ = [
     "Planner",
     "Plant",
     "Pose",
+    "ReachAgent",
     "ReachOutcome",
     "ReachPath",
     "ReachPlant",

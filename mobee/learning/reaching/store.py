@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ CREATE TABLE IF NOT EXISTS reach_steps (
     s_next INTEGER NOT NULL, failed INTEGER NOT NULL, reward REAL NOT NULL, expected REAL NOT NULL, missing REAL NOT NULL,
     settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
 """
-COLUMNS = "n, number, problem, s, a, s_next, failed, reward, expected, missing, settled, duration, q, touched"
+COLUMNS = tuple(column.name for column in fields(Step))
 
 
 class ReachStore(AgentFile):
@@ -87,7 +88,7 @@ class ReachStore(AgentFile):
     def load(self) -> list[Step]:
         """All steps, in order."""
         with explained(self.path):
-            rows = self._db.execute(f"SELECT {COLUMNS} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
+            rows = self._db.execute(f"SELECT {', '.join(COLUMNS)} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         for expected, row in enumerate(rows, start=1):
             if row[0] != expected:
                 raise MobeeError(f"{self.path}: step {expected} of {self.agent} is missing; the file was edited. Restore it from a copy.")
@@ -95,27 +96,13 @@ class ReachStore(AgentFile):
 
 
 def _row(step: Step) -> tuple[Any, ...]:
-    return (
-        step.n,
-        step.number,
-        step.problem,
-        step.s,
-        step.a,
-        step.s_next,
-        step.failed,
-        step.reward,
-        step.expected,
-        step.missing,
-        step.settled,
-        step.duration,
-        json.dumps(step.q),
-        json.dumps(step.touched),
-    )
+    return tuple(json.dumps(value) if isinstance(value, tuple) else value for value in astuple(step))
 
 
 def _step(*row: Any) -> Step:
-    *whole, failed, reward, expected, missing, settled, duration, q, touched = row
-    return Step(*whole, bool(failed), reward, expected, missing, bool(settled), duration, tuple(json.loads(q)), tuple(json.loads(touched)))
+    values = dict(zip(COLUMNS, row, strict=True))
+    lists = {name: tuple(json.loads(values[name])) for name in ("q", "touched")}
+    return Step(**values | lists | {name: bool(values[name]) for name in ("failed", "settled")})
 
 
 def _written(target: ReachTarget) -> str:
