@@ -1,0 +1,138 @@
+"""How alike the rewards of two reaches are: the covariance of the Gaussian process.
+
+Reaches are alike from similar poses for near targets ("place"), from similar poses over a similar way from the hand to the target
+("approach"), over a similar distance whatever the pose ("distance"), and a little in any case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.robot.robot import Array, Ints
+
+OFFSET = 0.3**2  # variance of what all rewards have in common
+USUAL = {  # variances of rewards, which are in [0, 1], and lengths in m
+    "noise": 0.05**2,
+    "place": 0.2**2,
+    "place length": 0.15,
+    "approach": 0.2**2,
+    "approach length": 0.10,
+    "approach joints": 2.0,  # times the lengths of the joints
+    "distance": 0.2**2,
+    "distance length": 0.10,
+}
+USUAL_JOINT = 0.5  # length of each joint, in units of the spread of the samples
+Slopes = Callable[[Array], Array]
+_NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTANCE_L, _JOINTS = range(9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Reaches: from `state` (n,) for `target` (n, 3) m; `way` (n, 3) m: from the hand to the target, `length` (n,) m long."""
+
+    state: Ints
+    target: Array
+    way: Array
+    length: Array
+
+
+def points(reaches: Reaches, state: Ints, target: Array) -> Points:
+    """Reaches from states (n,) for targets (n, 3) m, or for one (3,) m."""
+    where = np.broadcast_to(target, (len(state), 3))
+    way = where - reaches.hands[state]
+    return Points(state, where, way, np.sqrt((way**2).sum(axis=1)))
+
+
+def usual(reaches: Reaches) -> Array:
+    """The logarithms of the parameters before anything is known, shape (8 + d,): those of `USUAL` and one length a joint."""
+    return np.log([*USUAL.values(), *[USUAL_JOINT] * reaches.samples.shape[1]])
+
+
+def joint_squares(reaches: Reaches) -> Array:
+    """Squared differences of the samples, in units of their spread, shape (d, S, S)."""
+    scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
+    squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
+    return squares
+
+
+class Covariance:
+    """The covariance function of given parameters.
+
+    Args:
+        squares: of the differences of the samples, see `joint_squares`.
+        logs: logarithms of the parameters, see `usual`.
+    """
+
+    def __init__(self, squares: Array, logs: Array) -> None:
+        self.logs = logs
+        self._squares = squares
+        self._value = np.exp(logs)
+        lengths = self._value[_JOINTS:]
+        far = np.tensordot(lengths**-2.0, squares, 1)
+        self._by_place = self._value[_PLACE] * np.exp(-0.5 * far)
+        self._by_approach = self._value[_APPROACH] * np.exp(-0.5 * far / self._value[_APPROACH_J] ** 2)
+
+    @property
+    def noise(self) -> float:
+        """Variance of one reward around its mean."""
+        return float(self._value[_NOISE])
+
+    @property
+    def prior(self) -> float:
+        """Variance of a mean reward of which nothing is known."""
+        return float(OFFSET + self._value[[_PLACE, _APPROACH, _DISTANCE]].sum())
+
+    def between(self, a: Points, b: Points) -> Array:
+        """Covariances of the mean rewards of reaches, shape (a, b)."""
+        pair = np.ix_(a.state, b.state)
+        place = self._by_place[pair] * np.exp(_squared(a.target, b.target) * (-0.5 / self._value[_PLACE_L] ** 2))
+        approach = self._by_approach[pair] * np.exp(_squared(a.way, b.way) * (-0.5 / self._value[_APPROACH_L] ** 2))
+        distance = np.exp((a.length[:, None] - b.length) ** 2 * (-0.5 / self._value[_DISTANCE_L] ** 2))
+        total: Array = place + approach + self._value[_DISTANCE] * distance + OFFSET
+        return total
+
+    def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
+        """Covariance of average rewards of `count` (n,) tries each, shape (n, n), and what gives its derivatives."""
+        value, pair = self._value, np.ix_(a.state, a.state)
+        place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
+        approach_far = _squared(a.way, a.way) / value[_APPROACH_L] ** 2
+        distance_far = (a.length[:, None] - a.length) ** 2 / value[_DISTANCE_L] ** 2
+        place, approach = self._by_place[pair] * np.exp(-0.5 * place_far), self._by_approach[pair] * np.exp(-0.5 * approach_far)
+        distance = value[_DISTANCE] * np.exp(-0.5 * distance_far)
+        joints = [squares[pair] / length**2 for squares, length in zip(self._squares, value[_JOINTS:], strict=True)]
+
+        def slopes(weights: Array) -> Array:
+            """Derivatives of the sum of weights (n, n) times the covariance by the logarithms of the parameters."""
+            by_place, by_approach, by_distance = weights * place, weights * approach, weights * distance
+            narrower = by_approach / value[_APPROACH_J] ** 2
+            by_joint = [float((by_place * far).sum()) for far in joints]
+            by_joint_too = [float((narrower * far).sum()) for far in joints]
+            return np.array(
+                [
+                    (weights.diagonal() / count).sum() * value[_NOISE],
+                    by_place.sum(),
+                    (by_place * place_far).sum(),
+                    by_approach.sum(),
+                    (by_approach * approach_far).sum(),
+                    sum(by_joint_too),
+                    by_distance.sum(),
+                    (by_distance * distance_far).sum(),
+                    *np.add(by_joint, by_joint_too),
+                ]
+            )
+
+        return place + approach + distance + OFFSET + np.diag(value[_NOISE] / count), slopes
+
+
+def _squared(a: Array, b: Array) -> Array:
+    """Squared distances between rows, shape (a, b); exactly 0 for the same row."""
+    gap: Array = a[:, 0, None] - b[:, 0]
+    total = gap * gap
+    for axis in range(1, a.shape[1]):
+        gap = a[:, axis, None] - b[:, axis]
+        total += gap * gap
+    return total

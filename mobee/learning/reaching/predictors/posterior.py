@@ -1,0 +1,116 @@
+"""What is known of the rewards for each target, given all reaches: the exact posterior of the Gaussian process.
+
+A lower triangular factor grows by a row a reach.  For every target asked about, the rows of its states are kept and continued when
+it is asked about again, by whole blocks: so what is said depends on the reaches alone, not on what was asked before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.learning.reaching.predictors.covariance import Covariance, Points, points
+from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.robot.robot import Array, Ints
+
+BLOCK = 32  # rows
+KEPT = 64  # targets whose rows are in memory
+
+
+class Known:
+    """What is known of one target: rows (n, S), of which the first `done` will not change, and their sums."""
+
+    def __init__(self, at: Points, prior: Array, rows: int) -> None:
+        self.at, self.done, self.upto = at, 0, 0
+        self.rows = np.empty((rows, len(prior)))
+        self.sure: tuple[Array, Array] = np.zeros(len(prior)), prior  # of the done rows: mean and covariance
+        self.mean, self.covariance = self.sure
+
+
+class Posterior:
+    """Mean and covariance of the rewards from all states, a target.
+
+    Args:
+        reaches: the reach actions.
+        covariance: of their mean rewards.
+        state: (n,) of the reaches to begin with, for `target` (n, 3) m.
+        residual: (n,) rewards less the prior mean, or averages of `count` (n,) rewards.
+    """
+
+    def __init__(self, reaches: Reaches, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
+        from scipy.linalg import cholesky, solve_triangular
+
+        self._reaches, self._covariance, self._solve = reaches, covariance, solve_triangular
+        self._all = np.arange(len(reaches))
+        self._used = len(state)
+        room = -(-self._used // BLOCK) * BLOCK + 8 * BLOCK
+        self._state, self._target = np.zeros(room, dtype=np.intp), np.zeros((room, 3))
+        self._factor, self._score = np.zeros((room, room)), np.zeros(room)
+        self._known: dict[bytes, Known] = {}
+        if self._used:
+            self._state[: self._used], self._target[: self._used] = state, target
+            seen = points(reaches, state, target)
+            matrix = covariance.between(seen, seen) + np.diag(covariance.noise / count)
+            factor = cholesky(matrix, lower=True, overwrite_a=True, check_finite=False)
+            self._factor[: self._used, : self._used] = factor
+            self._score[: self._used] = self._solve(factor, residual, lower=True, check_finite=False)
+
+    def __len__(self) -> int:
+        return self._used
+
+    def about(self, target: Array) -> tuple[Array, Array]:
+        """Mean (S,) without the prior mean, and covariance (S, S), of the mean rewards for a target (3,) m."""
+        known = self._brought_up(target)
+        return known.mean, known.covariance
+
+    def append(self, state: int, target: Array, residual: float) -> None:
+        """Take one more reach."""
+        known = self._brought_up(target)
+        row = self._used
+        if row == len(self._score):
+            self._grow()
+        deviation = np.sqrt(max(known.covariance[state, state], 0.0) + self._covariance.noise)
+        self._factor[row, :row] = known.rows[:row, state]
+        self._factor[row, row] = deviation
+        self._score[row] = (residual - known.mean[state]) / deviation
+        self._state[row], self._target[row] = state, target
+        self._used += 1
+
+    def _brought_up(self, target: Array) -> Known:
+        """The rows of a target, to the last."""
+        key = target.tobytes()
+        known = self._known.pop(key, None)
+        if known is None:
+            at = points(self._reaches, self._all, target)
+            known = Known(at, self._covariance.between(at, at), len(self._score))
+            while len(self._known) >= KEPT:
+                del self._known[next(iter(self._known))]  # the one not asked about for the longest time
+        self._known[key] = known
+        if known.upto < self._used:
+            if len(known.rows) < self._used:
+                known.rows = np.concatenate([known.rows, np.empty((len(self._score) - len(known.rows), len(self._all)))])
+            for first in range(known.done, self._used, BLOCK):
+                end = min(first + BLOCK, self._used)
+                known.mean, known.covariance = self._continued(known, first, end)
+                if end - first == BLOCK:
+                    known.done, known.sure = end, (known.mean, known.covariance)
+            known.upto = self._used
+        return known
+
+    def _continued(self, known: Known, first: int, end: int) -> tuple[Array, Array]:
+        """Rows first to end of a target; returns mean and covariance with them."""
+        new = slice(first, end)
+        seen = points(self._reaches, self._state[new], self._target[new])
+        rows = self._covariance.between(seen, known.at)
+        rows -= self._factor[new, :first] @ known.rows[:first]
+        rows = self._solve(self._factor[new, new], rows, lower=True, overwrite_b=True, check_finite=False)
+        known.rows[new] = rows
+        mean, covariance = known.sure
+        return mean + rows.T @ self._score[new], covariance - rows.T @ rows
+
+    def _grow(self) -> None:
+        room = len(self._score) * 3 // 2 // BLOCK * BLOCK
+        self._state, self._score = np.resize(self._state, room), np.resize(self._score, room)
+        self._target = np.resize(self._target, (room, 3))
+        factor = np.zeros((room, room))
+        factor[: self._used, : self._used] = self._factor
+        self._factor = factor

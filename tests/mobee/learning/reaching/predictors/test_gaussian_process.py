@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.learning.reaching.predictors import gaussian_process
+from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
+from mobee.learning.reaching.predictors.gaussian_process import FIRST_MEAN, GaussianProcess, thinned
+from mobee.learning.reaching.predictors.posterior import BLOCK
+from mobee.learning.reaching.predictors.reached import Reached
+from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
+
+
+def dense(made, seen, target, logs, prior_mean):
+    """Mean and covariance from all reaches at once, repeats as rows of their own."""
+    covariance = Covariance(joint_squares(made), logs)
+    state, where, value = (np.array(column) for column in zip(*seen, strict=True))
+    data, asked = points(made, state, where), points(made, np.arange(len(made)), target)
+    inverse = np.linalg.inv(covariance.between(data, data) + covariance.noise * np.eye(len(seen)))
+    cross = covariance.between(data, asked)
+    return prior_mean + cross.T @ inverse @ (value - prior_mean), covariance.between(asked, asked) - cross.T @ inverse @ cross
+
+
+@pytest.mark.parametrize("tries", [1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 3])
+def test_mean_and_deviation_are_those_of_the_dense_posterior(tries):
+    made, seen = reaches(), drawn(reaches(), tries)
+    process = taught(GaussianProcess(made, refits=()), seen)
+    for target in (*places()[:2], np.array([0.05, 0.0, -0.1])):
+        mean, covariance = dense(made, seen, target, usual(made), FIRST_MEAN)
+        np.testing.assert_allclose(process.mean(target), mean, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(process.deviation(target), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
+
+
+def test_merging_repeats_changes_nothing(monkeypatch):
+    made, seen = reaches(), drawn(reaches(), 200)
+    monkeypatch.setattr(gaussian_process, "REPEATS", 20)
+    process = taught(GaussianProcess(made, refits=()), seen)
+    mean, covariance = dense(made, seen, places()[0], usual(made), FIRST_MEAN)
+    np.testing.assert_allclose(process.mean(places()[0]), mean, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(process.deviation(places()[0]), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
+
+
+def test_targets_forgotten_in_memory_are_worked_out_again(monkeypatch):
+    made, seen = reaches(), drawn(reaches(), 100)
+    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", 2)
+    process, other = taught(GaussianProcess(made, refits=()), seen), GaussianProcess(made, refits=())
+    monkeypatch.undo()
+    taught(other, seen)
+    for target in places():
+        np.testing.assert_array_equal(process.mean(target), other.mean(target))
+
+
+def test_no_data_is_the_prior_and_so_is_what_lies_far_from_all_data_but_for_what_all_rewards_share():
+    made = reaches()
+    fresh = GaussianProcess(made)
+    covariance = Covariance(joint_squares(made), usual(made))
+    np.testing.assert_allclose(fresh.mean(places()[0]), FIRST_MEAN)
+    np.testing.assert_allclose(fresh.deviation(places()[0]), np.sqrt(covariance.prior))
+    process = taught(GaussianProcess(made, refits=()), drawn(made, 100))
+    far = process.mean(FAR)
+    np.testing.assert_allclose(far, np.full(len(made), far[0]), rtol=1e-12)
+    own = covariance.prior - 0.3**2
+    assert (process.deviation(FAR) ** 2 > own).all()
+    assert (process.deviation(FAR) ** 2 < covariance.prior).all()
+
+
+def test_a_fit_makes_the_rewards_more_likely_and_predictions_better():
+    made, seen = reaches(0, 24), drawn(reaches(0, 24), 60, targets=12)
+    held = drawn(made, 300, seed=0, targets=12, noise=0.0)
+    errors = []
+    for refits in ((), (60,)):
+        process = taught(GaussianProcess(made, refits), seen)
+        errors.append(np.mean([(process.mean(target)[state] - value) ** 2 for state, target, value in held]))
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_any_number_of_targets_is_learned_from_in_bounded_memory(monkeypatch):
+    made, rng = reaches(), np.random.default_rng(3)
+    monkeypatch.setattr(gaussian_process, "MOST", 60)
+    monkeypatch.setattr(gaussian_process, "REPEATS", 20)
+    process = GaussianProcess(made, refits=())
+    for _ in range(400):
+        process.add(int(rng.integers(len(made))), rng.uniform(-0.2, 0.2, 3), float(rng.random()), 0.0)
+        assert len(process._posterior) <= 80
+    assert np.isfinite(process.mean(np.zeros(3))).all()
+
+
+def test_thinned_keeps_all_tries_their_average_reward_and_their_middle():
+    known, rng = Reached(), np.random.default_rng(1)
+    for _ in range(300):
+        known.add(int(rng.integers(4)), rng.uniform(-0.2, 0.2, 3), float(rng.random()))
+    state, target, mean, count = thinned(known, 40)
+    assert len(state) <= 40
+    assert count.sum() == 300
+    assert count @ mean == pytest.approx(known.count @ known.mean)
+    np.testing.assert_allclose(count @ target, known.places[known.target].sum(axis=0))
+    assert [count[state == s].sum() for s in range(4)] == [(known.state == s).sum() for s in range(4)]
+
+
+def test_thinned_leaves_few_pairs_as_they_are():
+    known = Reached()
+    for state, target, value in drawn(reaches(), 50):
+        known.add(state, target, value)
+    state, target, mean, count = thinned(known, len(known))
+    np.testing.assert_array_equal(state, known.state)
+    np.testing.assert_array_equal(target, known.places[known.target])
+    np.testing.assert_array_equal(mean, known.mean)
+    np.testing.assert_array_equal(count, known.count)
