@@ -1,0 +1,110 @@
+"""Kernel regression (Nadaraya and Watson) of the rewards over poses and targets; its scales are chosen by leaving one out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mobee.learning.reaching.predictors.covariance import joint_squares
+from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.predictors.prior import DistancePrior
+from mobee.learning.reaching.predictors.reached import Reached, around
+from mobee.robot.robot import Array
+
+JOINTS = (0.05, 0.15, 0.3, 0.5, 0.8)  # scales of the poses, in units of the spread of the samples
+PLACES = (0.03, 0.06, 0.1, 0.15, 0.25)  # of the targets, m
+IMAGINED = 0.2  # reaches that brought what the prior says, at every pose and target
+REFIT = 1.2  # scales and prior are fitted anew when there are so many times as many reaches
+LEFT_OUT = 400  # pairs at most that are predicted from all others
+
+
+class Kernel:
+    """Gaussian weights over poses and targets, drawn to the average, or to a prior from the distance, where there are few reaches.
+
+    Args:
+        reaches: the reach actions.
+        prior: whether it is drawn to the rewards expected from the distance of hand and target.
+    """
+
+    def __init__(self, reaches: Reaches, prior: bool = False) -> None:
+        self._reaches, self._prior = reaches, prior
+        squares = joint_squares(reaches).sum(axis=0)
+        self._alike = np.stack([np.exp(-0.5 * squares / scale**2) for scale in JOINTS])
+        self._reached, self._next = Reached(), 0.0
+        self._scales = JOINTS[2], PLACES[2]
+        self._refit()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its name, as plain JSON values."""
+        return {"name": "kernel_prior" if self._prior else "kernel"}
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """Of the poses, in units of the spread of the samples, and of the targets, in m."""
+        return self._scales
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn how a reach went."""
+        self._reached.add(state, target, reward)
+        if self._reached.tries >= self._next:
+            self._refit()
+
+    def mean(self, target: Array) -> Array:
+        """Expected reward of reaching from each state, shape (S,)."""
+        return self._posterior(target)[0]
+
+    def deviation(self, target: Array) -> Array:
+        """How far mean rewards are from what is expected with no reach near, less with the weight of those that are, shape (S,)."""
+        return self._posterior(target)[1]
+
+    def sample(self, target: Array, rng: np.random.Generator) -> Array:
+        """One draw of the mean rewards, each on its own, shape (S,)."""
+        drawn: Array = rng.normal(*self._posterior(target))
+        return drawn
+
+    def _posterior(self, target: Array) -> tuple[Array, Array]:
+        known, (by_joints, by_place) = self._reached, self._scales
+        near = np.exp(-0.5 * ((known.places - target) ** 2).sum(axis=1) / by_place**2)[known.target] * known.count
+        residual = known.mean - self._at_places(known)
+        sums = np.stack([np.bincount(known.state, one, len(self._reaches)) for one in (near * residual, near)], axis=1)
+        total, weight = (self._alike[JOINTS.index(by_joints)] @ sums).T
+        expected = self._expected.mean(target) if self._prior else self._middle
+        return expected + total / (weight + IMAGINED), self._spread * np.sqrt(IMAGINED / (weight + IMAGINED))
+
+    def _refit(self) -> None:
+        """Fit the prior and choose the scales."""
+        known = self._reached
+        self._next = known.tries * REFIT
+        self._middle, variance = around(known)
+        self._expected = DistancePrior(self._reaches, known)
+        self._at_place = self._expected.mean(known.places)
+        residual = known.mean - self._at_places(known)
+        self._spread = float(np.sqrt((residual**2).sum() + variance) / np.sqrt(len(known) + 1.0))
+        if len(known) > 1:
+            self._scales = self._best(residual)
+
+    def _at_places(self, known: Reached) -> Array:
+        """What the prior says of each pair, shape (n,)."""
+        if not self._prior:
+            return np.full(len(known), self._middle)
+        for place in known.places[self._at_place.shape[1] :]:
+            self._at_place = np.column_stack([self._at_place, self._expected.mean(place)])
+        return self._at_place[known.state, known.target]
+
+    def _best(self, residual: Array) -> tuple[float, float]:
+        """The scales with the least squared error of reaches, each predicted from all others."""
+        known = self._reached
+        chosen = np.unique(np.linspace(0, len(known) - 1, min(len(known), LEFT_OUT)).round().astype(np.intp))
+        far = ((known.places[known.target[chosen], None] - known.places) ** 2).sum(axis=-1)
+        itself = np.arange(len(chosen)), chosen
+        found = {}
+        for by_place in PLACES:
+            near = np.exp(-0.5 * far / by_place**2)[:, known.target] * known.count
+            near[itself] = known.count[chosen] - 1.0
+            for by_joints, alike in zip(JOINTS, self._alike, strict=True):
+                weight = near * alike[np.ix_(known.state[chosen], known.state)]
+                error = residual[chosen] - weight @ residual / (weight.sum(axis=1) + IMAGINED)
+                found[by_joints, by_place] = float(known.count[chosen] @ error**2)
+        return min(found, key=lambda scales: found[scales])

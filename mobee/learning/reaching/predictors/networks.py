@@ -1,0 +1,121 @@
+"""A few small neural networks that each learn from their own draw of the reaches: what they disagree about is not known yet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.robot.robot import Array
+
+NETWORKS, HIDDEN = 5, 32
+STEPS, BATCH = 4, 64  # of descent after each reach
+RATE, DECAY = 5e-3, 1e-4  # of Adam, and of the weights
+MOMENTUM = 0.9, 0.99
+REACH = 0.1  # m, unit of ways and places
+
+
+class Networks:
+    """Networks of two hidden layers on joints, target and the way from hand to target.
+
+    Each reach is repeated so many times for each network as its own draw of a Poisson distribution says (online bootstrap).
+    The order of the reaches matters here, other than with the other predictors.
+
+    Args:
+        reaches: the reach actions.
+        seed: of weights and draws.
+    """
+
+    def __init__(self, reaches: Reaches, seed: int = 0) -> None:
+        self._reaches, self._seed = reaches, seed
+        self._rng = np.random.default_rng(seed)
+        spread = np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)
+        self._joints = 2.0 * (reaches.samples - reaches.samples.mean(axis=0)) / spread
+        self._middle = reaches.hands.mean(axis=0)
+        inputs = self._joints.shape[1] + 7
+        sizes = [(inputs, HIDDEN), (HIDDEN, HIDDEN), (HIDDEN, 1)]
+        self._weights = [self._rng.normal(0.0, 1.0 / np.sqrt(a), (NETWORKS, a, b)) for a, b in sizes]
+        self._biases = [np.zeros((NETWORKS, 1, b)) for _, b in sizes]
+        self._biases[-1] += self._rng.normal(-1.0, 1.0, self._biases[-1].shape)
+        self._slow = [(np.zeros_like(one), np.zeros_like(one)) for one in (*self._weights, *self._biases)]
+        self._inputs, self._rewards = np.empty((64, inputs)), np.empty(64)
+        self._copies = np.empty((NETWORKS, 64))
+        self._tries = self._step = 0
+        self._last: tuple[bytes, int, Array] = (b"", -1, np.empty(0))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its name and seed, as plain JSON values."""
+        return {"name": "networks", "seed": self._seed}
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn how a reach went, and again how others did."""
+        if self._tries == len(self._rewards):
+            self._inputs, self._rewards = (np.concatenate([one, one]) for one in (self._inputs, self._rewards))
+            self._copies = np.concatenate([self._copies, self._copies], axis=1)
+        self._inputs[self._tries] = self._features(target)[state]
+        self._rewards[self._tries] = reward
+        self._copies[:, self._tries] = self._rng.poisson(1.0, NETWORKS)
+        self._tries += 1
+        for _ in range(STEPS):
+            self._descend()
+
+    def mean(self, target: Array) -> Array:
+        """Expected reward of reaching from each state, shape (S,): the average of the networks."""
+        mean: Array = self._each(target).mean(axis=0)
+        return mean
+
+    def deviation(self, target: Array) -> Array:
+        """How much the networks differ, shape (S,)."""
+        deviation: Array = self._each(target).std(axis=0, ddof=1)
+        return deviation
+
+    def sample(self, target: Array, rng: np.random.Generator) -> Array:
+        """What one network says, shape (S,)."""
+        drawn: Array = self._each(target)[rng.integers(NETWORKS)]
+        return drawn
+
+    def _features(self, target: Array) -> Array:
+        way = (target - self._reaches.hands) / REACH
+        length = np.sqrt((way**2).sum(axis=1, keepdims=True))
+        place = np.broadcast_to((target - self._middle) / REACH, way.shape)
+        return np.concatenate([self._joints, place, way, length], axis=1)
+
+    def _each(self, target: Array) -> Array:
+        """What each network says, shape (networks, S)."""
+        key = target.tobytes()
+        if self._last[:2] != (key, self._tries):
+            self._last = key, self._tries, layers(self._weights, self._biases, self._features(target))[-1][..., 0]
+        return self._last[2]
+
+    def _descend(self) -> None:
+        """One step of Adam on the squared errors of some reaches, the newest among them."""
+        chosen = self._rng.integers(self._tries, size=(NETWORKS, BATCH))
+        chosen[:, 0] = self._tries - 1
+        copies = np.take_along_axis(self._copies, chosen, axis=1)
+        errors = slopes(self._weights, self._biases, self._inputs[chosen], self._rewards[chosen], copies)
+        self._step += 1
+        kept, squares = MOMENTUM
+        rate = RATE * np.sqrt(1.0 - squares**self._step) / (1.0 - kept**self._step)
+        for value, slope, (average, square) in zip((*self._weights, *self._biases), errors, self._slow, strict=True):
+            average += (1.0 - kept) * (slope - average)
+            square += (1.0 - squares) * (slope**2 - square)
+            value -= rate * average / (np.sqrt(square) + 1e-8) + RATE * DECAY * value
+
+
+def layers(weights: list[Array], biases: list[Array], inputs: Array) -> list[Array]:
+    """Activations of the three layers for inputs (n, inputs) or (networks, n, inputs), each (networks, n, size)."""
+    first = np.tanh(inputs @ weights[0] + biases[0])
+    second = np.tanh(first @ weights[1] + biases[1])
+    return [first, second, 1.0 / (1.0 + np.exp(-(second @ weights[2] + biases[2])))]
+
+
+def slopes(weights: list[Array], biases: list[Array], inputs: Array, rewards: Array, copies: Array) -> list[Array]:
+    """Derivatives of half the mean squared error, each reach counted `copies` (networks, n) times, by weights and by biases."""
+    first, second, said = layers(weights, biases, inputs)
+    out = ((said[..., 0] - rewards) * copies)[..., None] * said * (1.0 - said) / inputs.shape[1]
+    back = (out @ weights[2].swapaxes(1, 2)) * (1.0 - second**2)
+    further = (back @ weights[1].swapaxes(1, 2)) * (1.0 - first**2)
+    by_weights = [one.swapaxes(1, 2) @ error for one, error in ((inputs, further), (first, back), (second, out))]
+    return by_weights + [error.sum(axis=1, keepdims=True) for error in (further, back, out)]
