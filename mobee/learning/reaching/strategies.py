@@ -9,6 +9,7 @@ import numpy as np
 
 from mobee.learning.reaching.histories import Histories
 from mobee.learning.reaching.predictors.predictor import Reaches, RewardPredictor
+from mobee.learning.reaching.progress import Progress
 from mobee.robot.robot import Array
 
 OPTIMISM = 2.0  # standard deviations that `ucb` hopes for
@@ -96,4 +97,5 @@ STRATEGIES: dict[str, Callable[[Reaches, RewardPredictor], Strategy]] = {
     "intrinsic": Intrinsic,
     "ucb": UpperBound,
     "thompson": Thompson,
+    "progress": Progress,
 }
