@@ -1,0 +1,251 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.table import ReachTable
+from mobee.learning.tabular import ideal
+from mobee.learning.transitions import TransitionModel
+from mobee.plant import Outcome
+from mobee.reach import ReachTarget, reward_of
+from mobee.robot.load import load_robot
+from tests.mobee.learning.reaching.toy import HANDS, PLACES, SPACE, TARGETS, agent, plant
+from tests.mobee.learning.worlds import space_of
+
+ROW = space_of([[1, -1], [0, 2], [1, 3], [2, -1]])  # a corridor of four states
+GOAL = ReachTarget(np.array([0.0, 0.0, 0.2]))
+MISSING = np.array([0.09, 0.04, 0.09, 0.0])  # reaching from the last state arrives: rewards .1, .2, .1, 1
+
+
+def corridor(blocked=(), touching=True, start=0, **options) -> ReachAgent:
+    """An agent in the corridor, whose target blocks the transitions given as (state, action)."""
+    chances = np.zeros((4, 2))
+    for state, action in blocked:
+        chances[state, action] = 1.0
+
+    class Corridor(ReachTable):
+        def act(self, part, target):
+            outcome = super().act(part, target)
+            return outcome if touching else Outcome(outcome.q, outcome.settled, outcome.duration)
+
+    table = Corridor(ROW, *ideal(ROW), lambda target: (MISSING, chances), start=start)
+    return ReachAgent(ROW, table, None, marker="hand", hands=np.zeros((4, 3)), **options)
+
+
+def test_at_first_it_reaches_from_where_it_is():
+    reacher = corridor(strategy="greedy")
+    made = reacher.try_problem(GOAL)
+    assert (made.number, made.problem, made.path, made.reach_state) == (1, 0, (), 0)
+    assert (made.expected, made.reward, made.missing) == (1.0, pytest.approx(0.1), pytest.approx(0.09))
+    assert made.intrinsic == pytest.approx(0.9)
+    assert (made.duration, made.timeouts, made.failures) == (2.0, 0, 0)
+    assert (reacher.tries, reacher.steps, reacher.problems.tries) == (1, 1, [1])
+
+
+def test_what_was_expected_is_taken_just_before_the_reach():
+    reacher = corridor(strategy="greedy", start=3)
+    expected = [reacher.try_problem(GOAL).expected for _ in range(3)]
+    assert expected == pytest.approx([1.0, 1.0, 1.0])  # from 3 it always arrives: eq. 8.5 stays at 1
+    elsewhere = ReachTarget(GOAL.position + [0.03, 0.0, 0.0])
+    other = corridor(strategy="greedy", discount=0.0)
+    assert [other.try_problem(target).expected for target in (GOAL, GOAL, elsewhere)] == pytest.approx(
+        [1.0, 1.1 / 2.0, (1 + 0.25 * 0.2) / 1.5]
+    )
+
+
+def test_it_goes_where_it_learned_to_reach_from():
+    reacher = corridor(strategy="greedy")
+    for _ in range(12):
+        made = reacher.try_problem(GOAL)
+        reacher.plant.state, reacher._state = 0, None
+    assert [state for _, _, state, _ in made.path] == [1, 2, 3]
+    assert made.reach_state == 3 and made.reward == 1.0
+    way = reacher.plan(GOAL, 0)
+    assert (way.path, way.actions, way.state) == ((0, 1, 2, 3), (0, 1, 1), 3)
+    assert way.expected == 1.0 and way.success == pytest.approx(0.75**3) and way.avoided == ()
+
+
+def test_a_transition_that_does_not_climb_fails_and_the_plan_is_made_anew():
+    reacher = corridor(blocked=[(1, 1)], strategy="greedy")
+    for state, reward in ((0, 0.1), (1, 0.2)):
+        for _ in range(9):
+            reacher.predictor.add(state, GOAL.position, reward, 1.0)
+    made = reacher.try_problem(GOAL)
+    assert made.path == ((0, 0, 1, False), (1, 1, 1, True))
+    assert made.reach_state == 1 and made.failures == 1
+    rewards = reacher.failures.rewards(GOAL.position)
+    assert rewards[1, 1] == pytest.approx(-10 / 2) and rewards[0, 0] == 0.0
+    assert reacher.plan(GOAL, 0).avoided == ((1, 2),)
+
+
+def test_who_comes_to_no_reach_ends_at_the_limit():
+    reacher = corridor(limit=2)
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    made = reacher.try_problem(GOAL)
+    assert made.path == ((0, 0, 1, False), (1, 1, 2, False))
+    assert (made.reach_state, made.reward, made.expected, made.intrinsic, made.missing) == (None, 0.0, 0.0, 0.0, 0.0)
+    assert (reacher.tries, reacher.problems.tries) == (1, [1])
+
+
+class Fixed:
+    def __init__(self, worth):
+        self.worth = np.array(worth)
+
+    def add(self, state, target, reward, expected):
+        pass
+
+    def rewards(self, target, rng):
+        return self.worth
+
+
+def test_the_state_drawn_by_random_is_kept_when_plans_are_made_anew():
+    reacher = agent(strategy="random")
+    drawn = []
+    rewards = reacher._strategy.rewards
+    reacher._strategy.rewards = lambda target, rng: drawn.append(1) or rewards(target, rng)
+    for _ in range(30):
+        reacher.try_problem(TARGETS[0])
+    assert reacher.last.number == len(drawn) == 30
+    assert np.count_nonzero(reacher.failures.rewards(PLACES[0])) > 5
+
+
+def test_the_least_tried_problems_come_first():
+    reacher = agent()
+    reacher.learn(TARGETS, 40)
+    assert sorted(reacher.problems.tries) == [1] * 14 + [2] * 13
+    assert reacher.tries == 40
+    new = ReachTarget(np.array([-0.2, 0.1, 0.1]))
+    reacher.learn([*TARGETS[:3], new], 1)
+    assert reacher.problems.tries[-1] == 1 and len(reacher.problems) == 28
+
+
+def test_seeds_decide_and_are_told_apart():
+    def path(seed):
+        reacher = agent(seed)
+        reacher.learn(TARGETS, 20)
+        return [reacher.last, reacher.steps, reacher.predictor.mean(PLACES[0]).tolist()]
+
+    assert path(3) == path(3)
+    assert path(3) != path(4)
+
+
+def test_an_evaluation_leaves_no_trace_in_what_was_learned():
+    on = plant(5)
+    reacher = agent(5, on)
+    reacher.learn(TARGETS, 60)
+    before = (reacher.predictor.mean(PLACES[3]).tolist(), reacher.failures.rewards(PLACES[3]).tolist(), reacher.tries, reacher.steps)
+    where = on.state, on.actions
+    found = reacher.evaluate(TARGETS, 2)
+    assert (
+        reacher.predictor.mean(PLACES[3]).tolist(),
+        reacher.failures.rewards(PLACES[3]).tolist(),
+        reacher.tries,
+        reacher.steps,
+    ) == before
+    assert found.rewards.shape == (2, 27) and found.scores == pytest.approx(found.rewards.sum(axis=1))
+    assert on.actions - where[1] >= found.actions.sum()
+    on.state, on.actions = where
+    reacher.learn(TARGETS, 20)
+    other = agent(5)
+    other.learn(TARGETS, 80)
+    assert other.last == reacher.last and other.steps == reacher.steps
+
+
+def test_an_evaluation_reaches_from_where_most_is_expected_and_gets_what_the_table_pays():
+    reacher = corridor(strategy="greedy", start=2)
+    for state, missing in enumerate(MISSING):
+        for _ in range(50):
+            reacher.predictor.add(state, GOAL.position, reward_of(missing), 1.0)
+    found = reacher.evaluate([GOAL], 4)
+    assert found.states.tolist() == [[3]] * 4
+    assert found.scores.tolist() == [1.0] * 4 and found.missing.tolist() == [[0.0]] * 4 and not found.failures.any()
+    assert set(found.actions[:, 0]) <= {1, 2, 3, 4}
+    assert found.duration[:, 0].tolist() == (found.actions[:, 0] + 1).tolist()
+
+
+def test_failures_in_an_evaluation_are_remembered_until_its_end():
+    reacher = corridor(blocked=[(2, 1)], strategy="greedy")
+    for state in range(4):
+        for _ in range(50):
+            reacher.predictor.add(state, GOAL.position, reward_of(MISSING[state]), 1.0)
+    found = reacher.evaluate([GOAL, GOAL], 8)
+    assert set(found.failures.sum(axis=1)) == {0, 1}  # none from behind the failing transition, else the first of two problems
+    assert not reacher.failures.rewards(GOAL.position).any()
+
+
+def test_learning_the_model_too_a_failure_without_contact_is_the_models():
+    model = TransitionModel(ROW)
+    reacher = corridor(blocked=[(0, 0)], touching=False, model=model)
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    reacher.try_problem(GOAL)
+    assert model.tries[0, 0] == reacher.last.failures == 10
+    assert not reacher.failures.rewards(GOAL.position).any()
+    assert model.debiased().probabilities[0, 0, 1] == pytest.approx(0.3 / 10.4)
+
+
+def test_learning_the_model_too_a_failure_that_touched_the_world_is_the_problems():
+    model = TransitionModel(ROW)
+    reacher = corridor(blocked=[(0, 0)], model=model)
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    reacher.try_problem(GOAL)
+    assert model.tries.sum() == 0
+    assert reacher.failures.rewards(GOAL.position)[0, 0] == pytest.approx(-5.0)
+    assert reacher.last.reach_state == 0  # there is no other way
+
+
+def test_an_interrupted_action_is_no_step_and_the_try_goes_on():
+    class Held(ReachTable):
+        held = 3
+
+        def act(self, part, target):
+            if self.actions == self.held:
+                self.held = -1
+                raise ActionInterrupted("held")
+            return super().act(part, target)
+
+    table = Held(ROW, *ideal(ROW), lambda target: (MISSING, np.zeros((4, 2))))
+    reacher = ReachAgent(ROW, table, None, marker="hand", hands=np.zeros((4, 3)))
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    table.actions = 2
+    with pytest.raises(ActionInterrupted):
+        reacher.try_problem(GOAL)
+    assert (reacher.steps, reacher.tries, reacher.under_way) == (1, 0, 0)
+    made = reacher.try_problem(GOAL)
+    assert [state for _, _, state, _ in made.path] == [1, 2, 3] and made.reach_state == 3
+    assert (reacher.steps, reacher.tries) == (4, 1)
+
+
+def test_a_try_left_for_another_problem_has_ended():
+    reacher = corridor()
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    reacher.begin(GOAL)
+    reacher.plant.present(GOAL)
+    reacher._step()
+    made = reacher.try_problem(ReachTarget(np.array([0.1, 0.0, 0.0])))
+    assert made.number == 2 and reacher.problems.tries == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"strategy": "intrinsik"}, UnknownName, "intrinsic"),
+        ({"predictor": "weigthed"}, UnknownName, "weighted"),
+        ({"failures": "far"}, UnknownName, "local"),
+        ({"penalty": 0.0}, InvalidValue, "below 0"),
+        ({"limit": 0}, InvalidValue, "at least 1"),
+        ({"scale": 0.0}, InvalidValue, "scale"),
+        ({"discount": 1.0}, InvalidValue, "discount"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options, error, message):
+    with pytest.raises(error, match=message):
+        agent(**options).try_problem(TARGETS[0])
+
+
+def test_a_plant_of_another_robot_is_refused():
+    on = plant()
+    on.robot = load_robot("katana")
+    with pytest.raises(InvalidValue, match="make both from one robot"):
+        ReachAgent(SPACE, on, marker="hand", hands=HANDS)
