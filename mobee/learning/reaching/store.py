@@ -26,6 +26,7 @@ CREATE TABLE IF NOT EXISTS reach_steps (
     s_next INTEGER NOT NULL, failed INTEGER NOT NULL, reward REAL NOT NULL, expected REAL NOT NULL, missing REAL NOT NULL,
     settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
 """
+_SUFFIX = " reaching"  # of the name under which they are kept
 COLUMNS = tuple(column.name for column in fields(Step))
 
 
@@ -38,11 +39,13 @@ class ReachStore(AgentFile):
     """
 
     def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
-        super().__init__(path, f"{part} reaching", read_only)
+        super().__init__(path, part + _SUFFIX, read_only)
         with explained(self.path):
             if read_only:
                 if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'reach_steps'").fetchone():
-                    raise MobeeError(f"{self.path}: nobody has learned to reach in this run yet.")
+                    raise MobeeError(
+                        f"{self.path}: nobody has learned to reach in this run yet; a ReachAgent with a ReachStore on it does."
+                    )
             else:
                 with transaction(self._db):
                     for statement in TABLES.split(";")[:-1]:
@@ -78,6 +81,12 @@ class ReachStore(AgentFile):
             self._db.executemany("INSERT INTO reach_problems VALUES (?, ?, ?)", new)
             self._db.execute(f"INSERT INTO reach_steps VALUES ({', '.join('?' * len(values))})", values)
         self._last, self._problems = step.n, self._problems + len(new)
+
+    def parts(self) -> tuple[str, ...]:
+        """The parts of which reaches are in the file."""
+        with explained(self.path):
+            rows = self._db.execute("SELECT DISTINCT agent FROM reach_steps ORDER BY agent").fetchall()
+        return tuple(agent.removesuffix(_SUFFIX) for (agent,) in rows)
 
     def problems(self) -> list[ReachTarget]:
         """The target of each problem, in order."""

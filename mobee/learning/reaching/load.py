@@ -1,0 +1,90 @@
+"""A learner of reaches, made again from its record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mobee.errors import MobeeError, UnknownName
+from mobee.learning.learned import load_learned
+from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.where import hands_of
+from mobee.learning.recorded import space_from
+from mobee.learning.space import Space
+from mobee.learning.transitions import TransitionModel
+from mobee.reach import ReachPlant
+from mobee.robot.robot import Array
+from mobee.store import TransitionStore
+
+
+def load_reaches(file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None) -> ReachAgent:
+    """Rebuild what was learned of reaching from a run's file, to be used: it is greedy, and writes nothing.
+
+    Where transitions lead it believes as the transitions of the part in the same file say, if there are any.
+
+    Args:
+        file: of the run.
+        plant: through which to reach.
+        part: whose reaches; needed where the file holds those of several.
+        hands: as of the ReachAgent.
+
+    Raises:
+        MobeeError, UnknownName: no such file or part, nobody has learned to reach in it, or by a predictor of one's own.
+    """
+    if not Path(file).is_file():
+        raise MobeeError(f"{file}: there is no such file; runs of `mobee launch` keep what they learn so.")
+    with ReachStore(file, _part_of(file, part), read_only=True) as store:
+        bound, learners, targets, steps = store.settings(), store.learners(), store.problems(), store.load()
+    learner = learners[-1][1]
+    space = space_from(bound["space"], plant.robot)
+    places = hands_of(space, bound["marker"]) if hands is None else hands
+    model = _model(file, space)
+    agent = ReachAgent(
+        space,
+        plant,
+        model.debiased(),
+        marker=bound["marker"],
+        predictor=_predictor(file, learner["predictor"], Reaches(space.samples, places, bound["scale"])),
+        strategy="greedy",
+        model=model if learner["learns the model"] else None,
+        hands=places,
+        scale=bound["scale"],
+        **{name: learner[name] for name in ("failures", "discount", "penalty", "limit", "seed")},
+    )
+    agent.replay(targets, steps)
+    return agent
+
+
+def _part_of(file: str | Path, part: str | None) -> str:
+    with ReachStore(file, part or "", read_only=True) as store:
+        parts = store.parts()
+    if part is None and len(parts) == 1:
+        return parts[0]
+    if not parts:
+        raise MobeeError(f"{file}: nobody has reached for anything in this run yet; a ReachAgent with a ReachStore on it does.")
+    if part is None:
+        raise MobeeError(f"{file} holds the reaches of several parts: name one of {', '.join(parts)}.")
+    if part not in parts:
+        raise UnknownName("part that learned to reach", part, parts)
+    return part
+
+
+def _model(file: str | Path, space: Space) -> TransitionModel:
+    with TransitionStore(file, space.part, read_only=True) as store:
+        known = space.part in store.agents() and store.settings().get("space") == space.settings
+    return load_learned(file, space.part, space.robot).model if known else TransitionModel(space)
+
+
+def _predictor(file: str | Path, settings: dict[str, Any], reaches: Reaches) -> RewardPredictor:
+    name = settings.get("name")
+    if name not in PREDICTORS:
+        raise UnknownName("predictor on record", name, PREDICTORS)
+    predictor = PREDICTORS[name](reaches)
+    if predictor.settings != settings:
+        raise MobeeError(
+            f"{file}: the predictor on record has the settings {settings}, one made now {predictor.settings}: "
+            "make a ReachAgent with that predictor and this file's ReachStore."
+        )
+    return predictor
