@@ -18,7 +18,7 @@ COLUMNS = ("source", "agent", "n", "s", "a", "s_next", "reward", "settled", "dur
 def write_csv(file: Path, records: Iterable[Record]) -> int:
     """Write one line a transition, lists as JSON, nothing where a record has no such column; returns how many lines."""
     rows = 0
-    with _whole(file) as unfinished, unfinished.open("w", newline="") as sink:
+    with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
         lines = csv.writer(sink)
         lines.writerow(COLUMNS)
         for record in records:
@@ -39,7 +39,7 @@ def write_parquet(file: Path, records: Iterable[Record]) -> int:
     kinds = (name, name, whole, whole, whole, whole, real, arrow.bool_(), real, arrow.list_(real), arrow.list_(arrow.string()), real)
     schema = arrow.schema(list(zip(COLUMNS, kinds, strict=True)))
     rows, settings = 0, []
-    with _whole(file) as unfinished, parquet.ParquetWriter(unfinished, schema) as sink:
+    with written_whole(file) as unfinished, parquet.ParquetWriter(unfinished, schema) as sink:
         for record in records:
             columns = [arrow.array(column, kind) for column, kind in zip(_columns(record), kinds, strict=True)]
             sink.write_table(arrow.Table.from_arrays(columns, schema=schema))
@@ -60,7 +60,7 @@ def _text(value: Any) -> Any:
 
 
 @contextmanager
-def _whole(file: Path) -> Iterator[Path]:
+def written_whole(file: Path) -> Iterator[Path]:
     """A name to write to, which becomes the file's when all is written."""
     unfinished = file.with_name(f"{file.name}.unfinished")
     try:

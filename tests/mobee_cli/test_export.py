@@ -9,6 +9,10 @@ import pytest
 
 from experiments.sweep.cell import Cell
 from experiments.sweep.cell_files import write_cell
+from mobee.learning.reaching.planning import REACH
+from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.tries import Step
+from mobee.reach import ReachTarget
 from mobee.store import STORE, Transition, TransitionStore
 from mobee_cli.__main__ import main
 
@@ -102,3 +106,33 @@ def test_without_pyarrow_the_extra_is_named(run: Path, monkeypatch: pytest.Monke
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     assert main(["export", str(run), "--parquet"]) == 3
     assert "pip install '.[parquet]'" in capsys.readouterr().err
+
+
+def test_what_was_learned_of_reaching_is_a_table_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = ReachTarget(np.array([-0.25, 0.1, 0.05]))
+    steps = [
+        Step(1, 1, 0, 4, 2, 5, True, -10.0, 0.0, 0.0, False, 20.0, (0.5,), ("reach_target",)),
+        Step(2, 1, 0, 5, REACH, 5, False, 0.5, 0.9, 0.01, True, 3.0, (0.25,)),
+    ]
+    with ReachStore(tmp_path / STORE, "torso") as store:
+        for step in steps:
+            store.append(step, [target])
+    assert main(["export", str(tmp_path), "--reaches", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"file": str(tmp_path / "reaches.csv"), "steps": 2}
+    with (tmp_path / "reaches.csv").open(newline="") as file:
+        moved, reached = csv.DictReader(file)
+    assert [moved[name] for name in ("part", "x", "a", "failed", "reward", "touched")] == [
+        "torso",
+        "-0.25",
+        "2",
+        "true",
+        "-10.0",
+        '["reach_target"]',
+    ]
+    assert [reached[name] for name in ("source", "a", "reward", "expected", "missing")] == [STORE, "-1", "0.5", "0.9", "0.01"]
+
+
+def test_a_run_without_reaches_has_no_table_of_them(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(run), "--reaches"]) == 2
+    assert "nobody has learned to reach" in capsys.readouterr().err
+    assert not (run / "reaches.csv").exists()

@@ -9,7 +9,7 @@ from mobee.errors import MobeeError, UnknownName
 from mobee.learning.learned import load_learned
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.store import ReachStore, reaching_parts
 from mobee.learning.reaching.where import hands_of
 from mobee.learning.recorded import space_from
 from mobee.learning.space import Space
@@ -58,12 +58,11 @@ def load_reaches(file: str | Path, plant: ReachPlant, part: str | None = None, h
 
 
 def _part_of(file: str | Path, part: str | None) -> str:
-    with ReachStore(file, part or "", read_only=True) as store:
-        parts = store.parts()
+    parts = reaching_parts(file)
     if part is None and len(parts) == 1:
         return parts[0]
     if not parts:
-        raise MobeeError(f"{file}: nobody has reached for anything in this run yet; a ReachAgent with a ReachStore on it does.")
+        raise MobeeError(f"{file}: nobody has learned to reach in this run yet; a ReachAgent with a ReachStore on it does.")
     if part is None:
         raise MobeeError(f"{file} holds the reaches of several parts: name one of {', '.join(parts)}.")
     if part not in parts:

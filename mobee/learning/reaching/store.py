@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mobee.agent_file import AgentFile
-from mobee.database import explained, transaction
+from mobee.database import explained, opened, transaction
 from mobee.errors import MobeeError
 from mobee.learning.reaching.tries import Step
 from mobee.reach import ReachTarget
@@ -42,7 +44,7 @@ class ReachStore(AgentFile):
         super().__init__(path, part + _SUFFIX, read_only)
         with explained(self.path):
             if read_only:
-                if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'reach_steps'").fetchone():
+                if not _has_reaches(self._db):
                     raise MobeeError(
                         f"{self.path}: nobody has learned to reach in this run yet; a ReachAgent with a ReachStore on it does."
                     )
@@ -82,11 +84,11 @@ class ReachStore(AgentFile):
             self._db.execute(f"INSERT INTO reach_steps VALUES ({', '.join('?' * len(values))})", values)
         self._last, self._problems = step.n, self._problems + len(new)
 
-    def parts(self) -> tuple[str, ...]:
-        """The parts of which reaches are in the file."""
+    def times(self) -> list[float]:
+        """When each step was committed: s since 1970, in order."""
         with explained(self.path):
-            rows = self._db.execute("SELECT DISTINCT agent FROM reach_steps ORDER BY agent").fetchall()
-        return tuple(agent.removesuffix(_SUFFIX) for (agent,) in rows)
+            rows = self._db.execute("SELECT t FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
+        return [t for (t,) in rows]
 
     def problems(self) -> list[ReachTarget]:
         """The target of each problem, in order."""
@@ -102,6 +104,20 @@ class ReachStore(AgentFile):
             if row[0] != expected:
                 raise MobeeError(f"{self.path}: step {expected} of {self.agent} is missing; the file was edited. Restore it from a copy.")
         return [_step(*row) for row in rows]
+
+
+def reaching_parts(file: str | Path) -> tuple[str, ...]:
+    """The parts that have reached for something in a run's file."""
+    path = Path(file)
+    with explained(path), closing(opened(path, read_only=True)) as database:
+        if not _has_reaches(database):
+            return ()
+        rows = database.execute("SELECT DISTINCT agent FROM reach_steps ORDER BY agent").fetchall()
+    return tuple(agent.removesuffix(_SUFFIX) for (agent,) in rows)
+
+
+def _has_reaches(database: sqlite3.Connection) -> bool:
+    return database.execute("SELECT 1 FROM sqlite_master WHERE name = 'reach_steps'").fetchone() is not None
 
 
 def _row(step: Step) -> tuple[Any, ...]:

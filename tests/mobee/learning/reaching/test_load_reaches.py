@@ -74,7 +74,7 @@ def test_what_is_not_there_is_told(tmp_path):
 def test_a_learner_that_has_done_nothing_yet_has_nothing_to_load(tmp_path):
     with ReachStore(tmp_path / "run.sqlite", PART) as store:
         agent(store=store)
-    with pytest.raises(MobeeError, match="nobody has reached for anything"):
+    with pytest.raises(MobeeError, match="nobody has learned to reach"):
         load_reaches(tmp_path / "run.sqlite", plant(), hands=HANDS)
 
 
