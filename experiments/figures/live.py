@@ -1,7 +1,8 @@
 """The picture of the running system: starts the default scenario, opens its page in headless Chromium, takes a screenshot.
 
-`python -m experiments.figures.live` writes docs/figures/live.png in about a minute and a half.  Chromium draws in software
-here and would starve the robot: it runs at the lowest priority and on one core (2 cores are enough for both).
+`python -m experiments.figures.live` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the
+tab of what the agents know.  Chromium draws in software here and would starve the robot: it runs at the lowest priority and on
+one core (2 cores are enough for both).
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ DRAW_IN_SOFTWARE = (
     "--ignore-gpu-blocklist",
 )
 SIZE = {"width": 1280, "height": 800}
-DRAWN = 120_000  # bytes: a page without its scene packs into less
+DRAWN = {"robot": 120_000, "learning": 50_000}  # bytes: a page on which nothing is drawn yet packs into less
 READY = 60.0  # s for the system to come up
 PATIENCE = 120.0  # s for the first picture
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
@@ -42,9 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("live picture: no Chromium. Install it: apt-get install chromium", file=sys.stderr)
         return 1
     options.out.mkdir(parents=True, exist_ok=True)
-    with _attached(options.url) if options.url else _launched(options.scenario, options.set) as url:
+    settings = [f"services.monitor.page={options.page}", *options.set]
+    with _attached(options.url) if options.url else _launched(options.scenario, settings) as url:
         step_back()
-        for path in take(url, chromium, options.out, options.shots, options.gap, options.warm_up):
+        for path in take(url, chromium, options.out, DRAWN[options.page], options.shots, options.gap, options.warm_up):
             print(path)
     return 0
 
@@ -54,6 +56,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--url", default="", help="page of a system that runs already")
     parser.add_argument("--scenario", default="default", help="what to start otherwise")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", help="change a setting of the scenario")
+    parser.add_argument("--page", choices=DRAWN, default="robot", help="the tab that is open (default: robot)")
     parser.add_argument("--shots", type=int, default=1)
     parser.add_argument("--gap", type=float, default=10.0, help="s between two shots")
     parser.add_argument("--warm-up", type=float, default=45.0, help="s from the first picture to the first shot")
@@ -72,8 +75,8 @@ def step_back() -> None:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def take(url: str, chromium: str, folder: Path, shots: int, gap: float, warm_up: float) -> Iterator[Path]:
-    """Screenshots of the page at `url`, `gap` seconds apart."""
+def take(url: str, chromium: str, folder: Path, drawn: int, shots: int, gap: float, warm_up: float) -> Iterator[Path]:
+    """Screenshots of the page at `url`, `gap` seconds apart, once one has that many bytes."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -81,7 +84,7 @@ def take(url: str, chromium: str, folder: Path, shots: int, gap: float, warm_up:
         page = browser.new_page(viewport=SIZE, color_scheme="dark")
         page.goto(f"{url}&renderer=webgl")
         give_up = time.monotonic() + PATIENCE
-        while len(page.screenshot(timeout=0)) < DRAWN:
+        while len(page.screenshot(timeout=0)) < drawn:
             if time.monotonic() > give_up:
                 raise SystemExit(f"live picture: the page at {url} drew no scene within {PATIENCE:g} s")
             time.sleep(2.0)

@@ -56,7 +56,7 @@ def _agent(part: str) -> rrb.Vertical:
         background=rrb.Background(color=BACKGROUND),
     )
     bars = [
-        rrb.BarChartView(origin=f"/learning/{part}/{name}", name=f"{named}: {title}")
+        rrb.BarChartView(origin=f"/learning/{part}/{name}", name=f"{named}: {title}", plot_legend=rrb.PlotLegend(visible=False))
         for name, title in (("tries", "tries of state-actions"), ("reward", "reward, nats"), ("value", "value"))
     ]
     return rrb.Vertical(space, *bars, row_shares=[3, 1, 1, 1])
