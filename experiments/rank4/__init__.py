@@ -23,7 +23,8 @@ from experiments.learning.published import arm_plant, arm_space
 from experiments.learning.trial import begin_anywhere, explore
 from experiments.rank4.felt_plant import FeltPlant, SelfContact
 from experiments.rank4.figure import draw
-from experiments.rank4.findings import ACTIONS, CLAIMS, LEVELS, findings
+from experiments.rank4.findings import CLAIMS, findings
+from experiments.rank4.runs import ACTIONS, LEVELS
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from experiments.matplotlib_figure import new_figure
-from experiments.rank4.findings import NEVER
+from experiments.rank4.runs import NEVER
 from experiments.sensitivity.findings import MOST, RARE, SOME, Row, rows_of
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue

@@ -12,7 +12,7 @@ import numpy as np
 from experiments.claims import Claim
 from experiments.learning.outcomes import ends_of, outcome_counts, visits_of
 from experiments.learning.published import RANK3, RANK4, arm_space
-from experiments.rank4.findings import ASIDE, HARDLY, NEVER
+from experiments.rank4.runs import ASIDE, HARDLY, NEVER
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS
 from experiments.sweep import CellResult
 from mobee.robot.robot import Ints

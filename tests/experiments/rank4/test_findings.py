@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.learning.published import RANK4, arm_space
-from experiments.rank4.findings import Run, contacts_by_pair
+from experiments.rank4.findings import contacts_by_pair
+from experiments.rank4.runs import Run
 
 SPACE = arm_space(RANK4)
 

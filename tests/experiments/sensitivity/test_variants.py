@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.learning.published import arm_plant, robot
-from experiments.rank4.findings import NEVER
+from experiments.rank4.runs import NEVER
 from experiments.sensitivity.findings import Row
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS, normalised
 
