@@ -7,30 +7,25 @@ import time
 from collections.abc import Mapping
 from typing import Literal, NoReturn
 
-import numpy as np
-
 from bus_schema import VERSION, keys
-from bus_schema.messages import Clock, ObjectTruth, Truth
+from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty, PartMeta, Place
 from mobee.errors import MobeeError
-from mobee.kinematics.quaternion import from_matrix
 from mobee.robot.robot import Robot
-from services.common.delivery import DATA
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
-from services.robot_sim.backend import Backend, SolidContact
+from services.robot_sim.backend import Backend
 from services.robot_sim.config import Config
-from services.robot_sim.counters import Counters
 from services.robot_sim.guard import Guard
 from services.robot_sim.lockstep import GATHERING, Lockstep
 from services.robot_sim.meta import part_meta
 from services.robot_sim.sensors import Sensors
 from services.robot_sim.streams import Phases
+from services.robot_sim.watch import Watch
 
 SPREAD = 0.002  # s, a tick shorter than this has its parts read one after the other without waiting between them
 CLOCK_RATE = 100.0  # messages a second of real time on `clock` at most, in free mode: who needs every tick has `tick`
 IDLE = 1.0  # s, lockstep: between looks when there is nothing to do
-NOT_FINITE = 1  # fault bit
 
 
 class Node:
@@ -49,11 +44,8 @@ class Node:
         self._sensors = Sensors(self._bus, robot, self._dt)
         self._clock = self._bus.publisher(keys.CLOCK, Clock, self._bus.control)
         self._clock_period = max(1, round(1.0 / (CLOCK_RATE * self._period)))  # ticks
-        self._truth = self._bus.publisher(keys.SIM_TRUTH, Truth, DATA)
-        self._truth_period = max(1, round(config.rate / config.truth_rate))  # ticks
-        self._deepest = SolidContact()  # since the last truth message
+        self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))
         self._rate = Rate(self._period)
-        self._counters = Counters()
         self._lockstep = Lockstep(service, config.participants, self._guard, config.ticks) if service.locked else None
         service.describe, service.words = self._describe, self._words
         service.mark = self._mark
@@ -73,7 +65,7 @@ class Node:
             deadline = self._rate.next()
             self._service.spin(deadline)
             now = time.monotonic()
-            self._counters.overtime.add((now - deadline) * 1e3)
+            self._watch.counters.overtime.add((now - deadline) * 1e3)
             if now >= router_check:
                 self._service.check_router()
                 router_check = now + 1.0
@@ -104,10 +96,9 @@ class Node:
         self._publish_start()
         self._sensors.digest()
         self._backend.step(self._dt)
-        self._counters.tick_time.add((time.monotonic() - begin) * 1e3)
-        self._count()
-        if self._bus.k % self._truth_period == 0:
-            self._publish_truth()
+        self._watch.counters.tick_time.add((time.monotonic() - begin) * 1e3)
+        self._watch.look()
+        self._watch.tell()
         lockstep.wait(self._bus.k)
 
     def _publish_start(self) -> None:
@@ -123,12 +114,10 @@ class Node:
         self._publish_tick("free")
         self._sensors.begin(backend.motors)
         backend.step(self._dt)
-        self._counters.tick_time.add((time.monotonic() - start) * 1e3)
-        self._count()
-        if not self._read(start):
-            return
-        if bus.k % self._truth_period == 0:
-            self._publish_truth()
+        self._watch.counters.tick_time.add((time.monotonic() - start) * 1e3)
+        self._watch.look()
+        if self._read(start):
+            self._watch.tell()
 
     def _read(self, start: float) -> bool:
         """Read every part in its time; False when the run has ended meanwhile."""
@@ -149,52 +138,10 @@ class Node:
         if (mode != "free" or self._bus.k % self._clock_period == 0) and self._clock.heard:
             self._clock.put(dt=self._dt_ns, mode=mode, rate=self._config.speed)
 
-    def _count(self) -> None:
-        motors, gates = self._backend.motors, self._guard.gates
-        self._counters.count_gates(gates.values())
-        contact = self._backend.contact()
-        self._counters.count_contact(contact)
-        if contact.depth > self._deepest.depth:
-            self._deepest = contact
-        if not np.isfinite(motors.q).all():
-            for gate in gates.values():
-                gate.fail(NOT_FINITE, "the physics has no finite answer any more")
-        self._watch_stops()
-
-    def _watch_stops(self) -> None:
-        now, stops = self._bus.t, self._counters.stops
-        all_q, velocities = self._backend.motors.q, self._backend.motors.motor_velocities
-        for part, gate in self._guard.gates.items():
-            where = self._robot.parts[part].slice
-            q, velocity = all_q[where], velocities[where]
-            if gate.mode != "hold":
-                stops.obeys(part, now, q, velocity)
-                continue
-            stopped = stops.look(part, now, q, velocity)
-            if stopped:
-                self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
-
-    def _publish_truth(self) -> None:
-        gap = self._backend.gap()
-        self._counters.count_gap(gap)
-        if not self._truth.heard:
-            return
-        self._truth.put(
-            q=self._backend.motors.q.tolist(),
-            depth=self._deepest.depth,
-            pair=self._deepest.pair,
-            gap=gap,
-            objects=[
-                ObjectTruth(name=thing.name, position=thing.position.tolist(), quaternion=from_matrix(thing.rotation).tolist())
-                for thing in self._backend.world.objects.values()
-            ],
-        )
-        self._deepest = SolidContact()
-
     def _describe(self) -> tuple[str, Mapping[str, float]]:
         states = [gate.state for gate in self._guard.gates.values()]
         text = f"{self._config.backend} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
-        numbers = self._counters.numbers(self._rate.missed, self._backend.pairs_watched)
+        numbers = self._watch.counters.numbers(self._rate.missed, self._backend.pairs_watched)
         if self._lockstep is None:
             return text, numbers
         speed = self._lockstep.speed(self._dt)
@@ -205,15 +152,14 @@ class Node:
         return {} if self._lockstep is None else {"states": self._sensors.hash}
 
     def _mark(self) -> None:
-        self._counters = Counters()
-        self._counters.missed_before = self._rate.missed
+        self._watch.mark(self._rate.missed)
 
     def _reset(self, request: Empty, key: str) -> Done:
         self._backend.reset(self._config.seed)
         self._bus.run, self._bus.k, self._bus.t = _new_run(), 0, 0
         self._guard.renew()
         self._phases = Phases(tuple(self._robot.parts), self._config.jitter, self._config.seed)
-        self._counters.stops.forget()
+        self._watch.forget()
         self._sensors.forget()
         if self._lockstep is not None:
             self._lockstep.begin()
