@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.chain import Answer, Commands, Order, Tick
+from bus_schema.chain import Order, Tick
 from bus_schema.messages import EStop, Mode
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
@@ -16,14 +17,14 @@ from mobee.control import Forces
 from mobee.control.checked import LARGEST_FORCE
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Robot
-from services.common.figures import Percentiles
 from services.common.fingerprint import robot_hash
 from services.common.inbox import CROWDED_WITH_STOPS
-from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.controller.action import Action, busy_owners
+from services.controller.action import Action
+from services.controller.commanding import Commanding
 from services.controller.config import Config
+from services.controller.counters import Counters
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 from services.controller.telling import Telling
@@ -48,13 +49,8 @@ class ControllerNode:
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._tick: Tick | None = None  # that still waits for its forces
         self._last_k = -1
-        bus = service.bus
-        self._commands = bus.publisher(keys.COMMANDS, Commands, bus.control)
-        self._telling = Telling(bus, robot, self._law, self._actions)
-        self._step_to_answer: tuple[int, bool] | None = None  # lockstep: tick, whether nothing was lacking
-        self._participant = Participant(service)
-        self._drives.answered = self._answer
-        self._jitter = Percentiles()  # ms, of the time between two steps
+        self._telling = Telling(service.bus, robot, self._law, self._actions)
+        self._commanding = Commanding(service, config.ttl, self._actions, self._drives)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
@@ -82,7 +78,8 @@ class ControllerNode:
         if tick.dt / 1e9 >= self._law.max_dt:
             self._service.bus.reject("rate", f"ticks of {tick.dt / 1e6:g} ms: these gains need less than {1e3 * self._law.max_dt:.4g} ms")
             return
-        self._tick, self._step_to_answer = tick, None
+        self._tick = tick
+        self._commanding.forget()
         if self._forces is not None and self._forces.re_k >= tick.k:
             self._step()
         elif tick.mode == "lock":
@@ -112,7 +109,7 @@ class ControllerNode:
 
     def _wait_is_over(self, k: int) -> None:
         if self._tick is not None and self._tick.k == k:
-            self._late_forces += 1
+            self._counters.late_forces += 1
             self._step()
 
     def _step(self) -> None:
@@ -125,51 +122,19 @@ class ControllerNode:
         orders, reference = self._control(tick, fresh) if tick.k > 0 else ({}, self._q)
         if tick.mode == "lock":
             self._telling.tell(tick, self._q, self._forces)  # who hears that it is its turn must have heard where its action stands
-            self._close(tick, fresh, orders, reference)
+            self._commanding.close(tick, self._forces, fresh, orders, reference)
         else:
-            self._command(tick.k, orders, reference)
+            self._commanding.command(tick.k, orders, reference)
             self._telling.tell(tick, self._q, self._forces)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
         """What becomes of each part in this tick."""
         gap, self._last_k = max(tick.k - self._last_k, 1) if self._last_k >= 0 else 1, tick.k
-        self._long_gaps += gap > OLDEST
-        self._watch_period(gap * tick.dt / 1e9 / tick.rate)
-        self._ticks += 1
+        self._counters.ticks += 1
+        self._counters.long_gaps += gap > OLDEST
+        if not self._service.locked:  # in lockstep no tick is due
+            self._counters.watch_period(gap * tick.dt / 1e9 / tick.rate)
         return self._advance(tick, min(gap, OLDEST)) if fresh else (self._starve(tick), self._q)
-
-    def _watch_period(self, due: float) -> None:
-        """How far from due [s] after the tick before this one comes; in lockstep none is due."""
-        before, self._stepped_at = self._stepped_at, time.monotonic()
-        if before > 0.0 and not self._service.locked:
-            self._jitter.add(abs(self._stepped_at - before - due) * 1e3)
-
-    def _close(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
-        """Lockstep: command, and answer the tick in the same message unless a part is being armed; tick 0 when all has begun."""
-        if tick.k == 0 and not (fresh and self._has_begun(tick)):
-            return
-        including = [self._forces.src] if self._forces is not None and self._forces.re_k == tick.k else []
-        self._step_to_answer = tick.k, Answer(fresh, busy_owners(self._actions.values()), including)
-        if tick.k == 0 or not orders or self._drives.asking:
-            self._command(tick.k, orders, reference)
-            self._answer()
-            return
-        self._participant.dawdle()
-        self._command(tick.k, orders, reference, self._step_to_answer[1])
-        self._step_to_answer = None
-
-    def _has_begun(self, tick: Tick) -> bool:
-        """Lockstep, tick 0: whether all is under control that can be, and somebody hears the commands."""
-        ready = (self._drives.armed(part, state) or not self._drives.can_arm(state) for part, state in tick.parts.items())
-        return all(ready) and self._commands.heard
-
-    def _answer(self) -> None:
-        """Lockstep: the tick is answered when no part is being armed any more."""
-        if self._step_to_answer is not None and not self._drives.asking:
-            k, answer = self._step_to_answer
-            self._step_to_answer = None
-            busy = busy_owners(self._actions.values())
-            self._participant.done(k, ok=answer.ok, busy=busy, including=answer.including)
 
     def _are_fresh(self, forces: ForcesMessage, k: int) -> bool:
         """Whether they answer a tick near k, and were formed of states of all parts near that tick: a contact concerns many."""
@@ -186,7 +151,7 @@ class ControllerNode:
                 if action.status != "held":
                     self._held(part, tick.k, lacking or f"gate {state.gate}")
                 self._law.rest(part, self._q[self._where[part]])
-                self._held_ticks += 1
+                self._counters.held_ticks += 1
             elif action.status == "held":
                 self._law.rest(part, self._q[self._where[part]])
                 self._seek_posture(part)
@@ -209,10 +174,6 @@ class ControllerNode:
     def _starve(self, tick: Tick) -> dict[str, Order]:
         """No forces, no motion: tell every part that still obeys to hold."""
         return {part: Order(self._drives.epochs[part], "hold") for part, state in tick.parts.items() if self._drives.armed(part, state)}
-
-    def _command(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
-        if orders:
-            self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._config.ttl, answer=answer)
 
     def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)
@@ -242,25 +203,16 @@ class ControllerNode:
     def _new_run(self) -> None:
         self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare)
         self._drives.forget()
-        self._forces, self._tick, self._last_k, self._step_to_answer = None, None, -1, None
+        self._forces, self._tick, self._last_k = None, None, -1
+        self._commanding.forget()
         self._law.reset(self._robot.home)
         for part, action in self._actions.items():
             action.hold(self._service.bus.k)
             self._goals.clear(part)
 
     def _mark(self) -> None:
-        self._ticks = self._late_forces = self._held_ticks = self._long_gaps = 0
-        self._stepped_at = 0.0  # s, monotonic clock
-        self._jitter.clear()
+        self._counters = Counters()
 
-    def _describe(self) -> tuple[str, dict[str, float]]:
-        numbers: dict[str, float] = {
-            "ticks": self._ticks,
-            "late_forces": self._late_forces,
-            "held_ticks": self._held_ticks,
-            "long_gaps": self._long_gaps,
-            "jitter_ms_p50": self._jitter.at(50),
-            "jitter_ms_p99": self._jitter.at(99),
-        }
+    def _describe(self) -> tuple[str, Mapping[str, float]]:
         under = [part for part, action in self._actions.items() if action.status != "held"]
-        return f"{len(under)} of {len(self._actions)} parts under control", numbers
+        return f"{len(under)} of {len(self._actions)} parts under control", self._counters.numbers()
