@@ -48,8 +48,9 @@ def value_iteration(
         tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the limit.
         start: (S,) values to start from, zero if None.
         relative: the tolerance is in units of the largest |reward| of an action (of 1, if all are 0), else in the reward's own.
-        method: "jacobi": Algorithm 7, every sweep looks at all actions; "modified": modified policy iteration, faster:
-            each such sweep is followed by sweeps over the best action of each state alone.
+        method: "jacobi": Algorithm 7, every sweep looks at all actions, and the values of none may change; "modified": modified
+            policy iteration, faster: each such sweep is followed by sweeps over the best action of each state alone, and the
+            values of the states may not change.
 
     Returns:
         V and Q, with Q = -inf where there is no action.
