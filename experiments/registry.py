@@ -28,6 +28,7 @@ EXPERIMENTS = {
     "planner": "experiments.planner",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
+    "reach": "experiments.reach",
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",

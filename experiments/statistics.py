@@ -88,6 +88,14 @@ def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
     return float((difference > 0.0).mean() + 0.5 * (difference == 0.0).mean())
 
 
+def improvement_interval(first: ArrayLike, second: ArrayLike, seed: int = 0, resamples: int = RESAMPLES) -> tuple[float, float]:
+    """The 95 % bootstrap interval of `probability_of_improvement`, both groups drawn anew."""
+    mine, theirs = _checked(first), _checked(second)
+    labels = np.repeat([0, 1], [len(mine), len(theirs)])
+    both = np.concatenate([mine, theirs])
+    return interval(both, lambda drawn: probability_of_improvement(drawn[: len(mine)], drawn[len(mine) :]), labels, seed, resamples)
+
+
 def _checked(values: ArrayLike) -> Array:
     given = np.asarray(values, dtype=np.float64)
     if given.ndim != 1 or not len(given) or not np.isfinite(given).all():

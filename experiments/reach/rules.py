@@ -1,0 +1,53 @@
+"""Rules by which measured claims are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from numpy.typing import ArrayLike
+
+from experiments.claims import Claim
+from experiments.statistics import (
+    decides,
+    improvement_interval,
+    interquartile_mean,
+    probability_of_improvement,
+    ratio,
+    ratio_interval,
+    told,
+)
+from mobee.robot.robot import Array
+
+Verdicts = list[bool | None]
+
+
+def all_hold(verdicts: Sequence[bool | None]) -> bool | None:
+    """Whether all hold; False if one does not, else None if one is open."""
+    return False if False in verdicts else None if None in verdicts else True
+
+
+def better(
+    values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2
+) -> tuple[str, Verdicts]:
+    """Whether runs of one group are likelier above (or, `worse`, below) those of each rival than not: the text, and a verdict a rival.
+
+    It holds where the interval of the probability of improvement is above one half, and does not where it is below.
+    """
+    parts, verdicts = [f"{name} {told(values[name], digits)}"], Verdicts()
+    for rival in rivals:
+        first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
+        chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
+        parts.append(f"{rival} {told(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
+        verdicts.append(True if low > 0.5 else False if high < 0.5 else None)
+    return ", ".join(parts), verdicts
+
+
+def changes(before: Array, after: Array) -> str:
+    """From what to what, and the mean change of a run."""
+    return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {told(after - before)}"
+
+
+def published_ratio(claim: Claim, above: ArrayLike, below: ArrayLike, bounds: tuple[float, float], note: str = "") -> Claim:
+    """A ratio that is to lie within bounds."""
+    low, high = span = ratio_interval(above, below)
+    return claim.measured(f"{ratio(above, below):.2f} [{low:.2f}, {high:.2f}]{note}", decides(span, *bounds))

@@ -1,0 +1,115 @@
+"""What is measured of the runs of a strategy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.reaching.scene import MARKER, reach_space
+from experiments.reaching.targets import grid
+from experiments.sweep import CellResult
+from mobee.learning.reaching.evaluation import NOWHERE
+from mobee.learning.reaching.where import hands_of
+from mobee.robot.robot import Array, Ints
+
+STRATEGIES = ("intrinsic", "greedy", "random")
+LOOKS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """The runs of one strategy, by seed: values of their cells, and the seconds that each took."""
+
+    values: tuple[Mapping[str, Any], ...]
+    seconds: tuple[float, ...]
+    looks: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def scores(self, look: int) -> Array:
+        """The cumulative reward over the targets, mean of the evaluations, (N,): what figure 8.2 stacks."""
+        at = self.looks.index(look)
+        return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
+
+    def chosen(self, look: int) -> Array:
+        """From which states the evaluations reached, as shares, (N, S): figures 8.4 to 8.6."""
+        at = self.looks.index(look)
+        return np.array([_shares(one["states_grid"][at]) for one in self.values])
+
+    def agreement(self, look: int) -> Array:
+        """How much of its choices each run shares with another, on average, (N,), 0 to 1: the overlap of their distributions."""
+        chosen = self.chosen(look)
+        overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
+        others = max(len(self) - 1, 1)
+        shared: Array = (overlaps.sum(axis=1) - overlaps.diagonal()) / others
+        return shared
+
+    def favourites(self, look: int) -> Array:
+        """From how many states a run reached in half of its reaches, the most frequent first, (N,)."""
+        ordered = -np.sort(-self.chosen(look), axis=1)
+        return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1 for one in ordered], dtype=np.float64)
+
+    def height(self, look: int) -> Array:
+        """How much higher than the mean of all states the palm is in the states that it reached from, (N,) m."""
+        heights = palms()[:, 2]
+        return self.chosen(look) @ heights - heights.mean()
+
+    def tried(self, tries: int) -> Array:
+        """Which share of all pairs of a state and a target was tried in the first so many problem-tries, (N,)."""
+        return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
+
+    def exploration(self, tries: int) -> Array:
+        """How often each state was reached from for each target in the first so many problem-tries, mean of the runs, (27, S): fig. 8.7."""
+        return np.mean([_tried(one, slice(tries)) for one in self.values], axis=0)
+
+    def concentration(self, first: int, last: int) -> Array:
+        """Which share of the problem-tries after the first so many reached from the two most frequent states, (N,)."""
+        sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
+        return np.array([one[:2].sum() / one.sum() for one in sums])
+
+    def failures(self) -> Array:
+        """How many negative rewards each run got while it explored, (N,)."""
+        return np.array([float(one["failures"].sum()) for one in self.values])
+
+    def hours(self) -> Array:
+        """How long the robot would have explored, (N,) h."""
+        return np.array([float(one["duration"].sum()) / 3600.0 for one in self.values])
+
+    def actions(self) -> Array:
+        """Actions a problem-try, (N,)."""
+        return np.array([float(one["actions"].mean()) for one in self.values])
+
+
+def palms() -> Array:
+    """Where the palm is in each state, (S, 3) m."""
+    return hands_of(reach_space(), MARKER)
+
+
+def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
+    """The runs by strategy, in the order of the seeds."""
+    ordered = sorted(found.values(), key=lambda result: result.cell.seed)
+    runs = {}
+    for strategy in STRATEGIES:
+        mine = [result for result in ordered if result.cell.settings["strategy"] == strategy]
+        if mine:
+            looks = tuple(mine[0].cell.settings["looks"])
+            runs[strategy] = Runs(tuple(one.values for one in mine), tuple(one.seconds for one in mine), looks)
+    return runs
+
+
+def _shares(states: Ints) -> Array:
+    counts = np.bincount(states[states != NOWHERE], minlength=len(reach_space())).astype(np.float64)
+    shares: Array = counts / max(counts.sum(), 1.0)
+    return shares
+
+
+def _tried(one: Mapping[str, Any], part: slice) -> Ints:
+    tried = np.zeros((len(grid()), len(reach_space())), dtype=np.intp)
+    state, problem = one["reach_state"][part], one["problem"][part]
+    reached = state != NOWHERE
+    np.add.at(tried, (problem[reached], state[reached]), 1)
+    return tried
