@@ -29,6 +29,7 @@ EXPERIMENTS = {
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.reach",
+    "reach-predictors": "experiments.reach_predictors",
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",

@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.matplotlib_figure import new_figure
 from experiments.reach.poses import draw_poses
-from experiments.reach.runs import STRATEGIES, Runs, runs_of
+from experiments.reach.runs import Runs, runs_of
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue

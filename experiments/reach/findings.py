@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.reach.rules import all_hold, better, changes, published_ratio
+from experiments.reach.rules import all_hold, better, changes, published_ratio, rises
 from experiments.reach.runs import STRATEGIES, Runs, runs_of
 from experiments.statistics import decides, interquartile_mean, interval, told
 from experiments.sweep import CellResult
@@ -33,23 +33,35 @@ BETTER = {
 WEAK = Claim(_SCORES, "the intrinsically motivated agent is less competent than the others after 100 problem-tries", "figure only")
 STEADY = Claim(_SCORES, "it improves steadily, from 100 to 3200 problem-tries", "figure only")
 FALLS = Claim(
-    "our prototype of thesis 8.4", "it falls back from 3200 to 6400 problem-tries, as negative rewards spread over all targets", "6.5 of 7.9"
+    "our prototype of thesis 8.4",
+    "it falls back from 3200 to 6400 problem-tries, as negative rewards spread over all targets",
+    "6.5 of 7.9",
 )
 DECREASES = Claim("thesis 8.4.2", "the randomly exploring agent's score decreases from 100 to 400 problem-tries", "figure only")
-AGREE = Claim(_CHOICES, "the runs of the intrinsic agent come to agree on the states to reach from, more than those of the others", "figures only")
+AGREE = Claim(
+    _CHOICES, "the runs of the intrinsic agent come to agree on the states to reach from, more than those of the others", "figures only"
+)
 FEW = Claim(_CHOICES, "it settles on few favourite states, fewer than the others", "2 are pictured in fig. 8.3")
 HIGH = Claim(_CHOICES, "the randomly exploring agent comes to prefer states with the hand high", "figure only")
 COMBINATIONS = Claim(
-    "thesis 8.4.3, fig. 8.7", "after 3200 problem-tries the intrinsic agent has tried almost all pairs of a state and a target", "almost all 2187"
+    "thesis 8.4.3, fig. 8.7",
+    "after 3200 problem-tries the intrinsic agent has tried almost all pairs of a state and a target",
+    "almost all 2187",
 )
-REGIONS = Claim("thesis 8.4.3, fig. 8.7", "the greedy agent leaves large regions untried, more than the intrinsic one (after 1600)", "figure only")
+REGIONS = Claim(
+    "thesis 8.4.3, fig. 8.7", "the greedy agent leaves large regions untried, more than the intrinsic one (after 1600)", "figure only"
+)
 LINES = Claim(
-    "thesis 8.4.3, fig. 8.7", "from 1600 problem-tries on the greedy agent reaches nearly always from two states", "all its time, two red lines"
+    "thesis 8.4.3, fig. 8.7",
+    "from 1600 problem-tries on the greedy agent reaches nearly always from two states",
+    "all its time, two red lines",
 )
 NEGATIVE = Claim("thesis 8.4.4, fig. 8.8", "the random explorer gets many more negative rewards than the other two", "figure only")
 TIME = Claim("thesis 8.4.4", "random exploration takes about twice the robot's time of intrinsic motivation", "207 against 113 h: 1.83")
 TIME_GREEDY = Claim("thesis 8.4.4", "greedy exploration takes about as long as intrinsic motivation", "109 against 113 h: 0.96")
-SPEED = Claim("aim of this reproduction", f"all {RUNS * 3} runs of figure 8.2 take less than {MINUTES:.0f} minutes on {CORES} cores", "429 h")
+SPEED = Claim(
+    "aim of this reproduction", f"all {RUNS * 3} runs of figure 8.2 take less than {MINUTES:.0f} minutes on {CORES} cores", "429 h"
+)
 CLAIMS = (
     *BETTER.values(),
     WEAK,
@@ -115,12 +127,12 @@ def _scores(runs: Mapping[str, Runs]) -> list[Claim]:
     mine, random = runs["intrinsic"], runs["random"]
     steps = [mine.scores(later) - mine.scores(sooner) for sooner, later in pairwise(look for look in mine.looks if look <= 3200)]
     whole = mine.scores(3200) - mine.scores(100)
-    falls = [interval(step)[1] < 0.0 for step in steps]
+    falls = [rises(step) is False for step in steps]
     text = f"{changes(mine.scores(100), mine.scores(3200))}; significant falls between looks: {sum(falls)}"
-    found.append(STEADY.measured(text, all_hold([decides(interval(whole), least=0.0), not any(falls)])))
+    found.append(STEADY.measured(text, all_hold([rises(whole), not any(falls)])))
     for claim, runner, (sooner, later) in ((FALLS, mine, (3200, 6400)), (DECREASES, random, (100, 400))):
         before, after = runner.scores(sooner), runner.scores(later)
-        found.append(claim.measured(changes(before, after), decides(interval(after - before), most=0.0)))
+        found.append(claim.measured(changes(before, after), rises(before - after)))
     return found
 
 
@@ -128,13 +140,15 @@ def _choices(runs: Mapping[str, Runs]) -> list[Claim]:
     last = {name: mine.agreement(6400) for name, mine in runs.items()}
     mine = runs["intrinsic"]
     text, verdicts = better(last, "intrinsic", RIVALS)
-    grown = decides(interval(mine.agreement(6400) - mine.agreement(100)), least=0.0)
-    agree = AGREE.measured(f"overlap of two runs' choices {changes(mine.agreement(100), mine.agreement(6400))}; {text}", all_hold([grown, *verdicts]))
+    grown = rises(mine.agreement(6400) - mine.agreement(100))
+    agree = AGREE.measured(
+        f"overlap of two runs' choices {changes(mine.agreement(100), mine.agreement(6400))}; {text}", all_hold([grown, *verdicts])
+    )
     text, verdicts = better({name: one.favourites(6400) for name, one in runs.items()}, "intrinsic", RIVALS, worse=True, digits=1)
     favourite = np.argsort(-mine.chosen(6400).mean(axis=0))[:2].tolist()
     few = FEW.measured(f"states of half the reaches: {text}; the two most frequent: {favourite[0]}, {favourite[1]}", all_hold(verdicts))
     height = runs["random"].height(6400)
-    return [agree, few, HIGH.measured(f"{told(100.0 * height, 1)} cm above the mean of all states", decides(interval(height), least=0.0))]
+    return [agree, few, HIGH.measured(f"{told(100.0 * height, 1)} cm above the mean of all states", rises(height))]
 
 
 def _exploration(runs: Mapping[str, Runs]) -> list[Claim]:

@@ -37,7 +37,9 @@ def _pose(axes: Any, state: int) -> None:
             ends = _axis(shape.position, shape.rotation, shape.size[-1] if len(shape.size) > 1 else 0.0)
             placed = ends @ pose.transforms[shape.link][:3, :3].T + pose.transforms[shape.link][:3, 3]
             width = 200.0 * shape.size[0] if shape.kind in ("sphere", "capsule", "cylinder") else 2.0
-            axes.plot(*placed.T, color="tab:red" if shape.part == PART else "0.6", linewidth=min(width, 14.0), alpha=0.5, solid_capstyle="round")
+            axes.plot(
+                *placed.T, color="tab:red" if shape.part == PART else "0.6", linewidth=min(width, 14.0), alpha=0.5, solid_capstyle="round"
+            )
     axes.plot(*pose.position(MARKER), "k*", markersize=10.0)
     axes.plot(*grid().T, "o", color="tab:green", markersize=5.0, alpha=0.6)
     axes.set(xlabel="x", ylabel="y", zlabel="z", xlim=(-0.45, 0.25), ylim=(-0.2, 0.5), zlim=(-0.15, 0.55))

@@ -11,6 +11,7 @@ from experiments.statistics import (
     decides,
     improvement_interval,
     interquartile_mean,
+    interval,
     probability_of_improvement,
     ratio,
     ratio_interval,
@@ -26,9 +27,7 @@ def all_hold(verdicts: Sequence[bool | None]) -> bool | None:
     return False if False in verdicts else None if None in verdicts else True
 
 
-def better(
-    values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2
-) -> tuple[str, Verdicts]:
+def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> tuple[str, Verdicts]:
     """Whether runs of one group are likelier above (or, `worse`, below) those of each rival than not: the text, and a verdict a rival.
 
     It holds where the interval of the probability of improvement is above one half, and does not where it is below.
@@ -40,6 +39,12 @@ def better(
         parts.append(f"{rival} {told(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
         verdicts.append(True if low > 0.5 else False if high < 0.5 else None)
     return ", ".join(parts), verdicts
+
+
+def rises(change: ArrayLike) -> bool | None:
+    """Whether a change of the runs is above 0, or below; None where its interval holds 0."""
+    low, high = interval(change)
+    return True if low > 0.0 else False if high < 0.0 else None
 
 
 def changes(before: Array, after: Array) -> str:

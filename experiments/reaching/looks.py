@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.evaluation import NOWHERE, Evaluation
+from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Try
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Ints

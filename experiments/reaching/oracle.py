@@ -22,7 +22,7 @@ class Known:
     """A predictor that says the true mean rewards (S,) of each of the targets that were measured."""
 
     def __init__(self, truth: Truth, scale: float) -> None:
-        self._rewards = dict(zip((place.tobytes() for place in truth.places), truth.rewards(scale), strict=True))
+        self._rewards = dict(zip(((place + 0.0).tobytes() for place in truth.places), truth.rewards(scale), strict=True))
         self.settings: dict[str, Any] = {"name": "known", "scale": scale}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
@@ -30,7 +30,7 @@ class Known:
 
     def mean(self, target: Array) -> Array:
         """The true mean rewards, shape (S,); raises InvalidValue for a target that was not measured."""
-        rewards = self._rewards.get(np.ascontiguousarray(target, dtype=np.float64).tobytes())
+        rewards = self._rewards.get((np.asarray(target, dtype=np.float64) + 0.0).tobytes())
         if rewards is None:
             raise InvalidValue(f"nothing is known of a target at {target} m: measure its truth first.")
         return rewards
@@ -47,9 +47,7 @@ class Known:
 def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
     """An agent that needs not learn: `evaluate` it on targets that were measured."""
     known = Known(truth, scale)
-    agent = ReachAgent(
-        space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed
-    )
+    agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)
     for place, blocked in zip(truth.places, truth.blocked, strict=True):
         for state, action in np.argwhere(np.nan_to_num(blocked) >= BLOCKED).tolist():
             agent.failures.add(state, action, place, agent.penalty)
