@@ -10,6 +10,7 @@ COMMANDS = "commands"
 ESTOP = "estop"
 ESTOP_RESET = "estop/rpc/reset"
 MODEL_FORCES = "model/forces"
+MODEL_TARGETS = "model/targets"
 MODEL_POSE = "model/pose"
 MODEL_CONTACTS = "model/contacts"
 MODEL_JACOBIAN = "model/rpc/jacobian"
@@ -50,6 +51,11 @@ def motion(part: str) -> str:
     return f"{chunk(part)}/motion"
 
 
+def reach(part: str) -> str:
+    """How far a reach of a part has come: controller to model and who reaches."""
+    return f"{chunk(part)}/reach"
+
+
 def done(who: str) -> str:
     """Lockstep: a participant has answered a tick."""
     return f"done/{chunk(who)}"
@@ -71,7 +77,7 @@ def drive(part: str, verb: str) -> str:
 
 
 def goal(part: str, verb: str) -> str:
-    """Ownership of a part's attractor at the controller, and its use: take, release, goal, force."""
+    """Ownership of a part's attractor at the controller, and its use: take, release, goal, force, reach."""
     return f"{part if part == '*' else chunk(part)}/rpc/{chunk(verb)}"
 
 

@@ -23,6 +23,8 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]  # differences of two still fit int
 Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
 MotionStatus = Literal["idle", "moving", "settled", "timeout", "held"]
+ReachPhase = Literal["reaching", "returning", "over", "interrupted"]
+Aim = Literal["centre", "surface"]
 Role = Literal["obstacle", "target", "ghost"]
 GeometryKind = Literal["sphere", "capsule", "cylinder", "box"]
 
@@ -100,6 +102,29 @@ class Motion(Message, frozen=True, kw_only=True):
     ddq: PartVector  # rad/s^2, the controller's own acceleration
     goal: PartVector  # rad, attractor q*
     touched: list[Name]  # world objects in contact
+
+
+class Reach(Message, frozen=True, kw_only=True):
+    """How far a part's action that is a reach has come."""
+
+    action_id: Text  # that of Motion
+    phase: ReachPhase  # the force acts; it has ended and the attractor draws back; the action has ended, with or without an outcome
+    marker: Name
+    object: Name  # of the model's world, the target
+    end_k: Count  # tick at which the force ended, or now while it acts; what follows is of that tick
+    target: Vector3  # m, where it is
+    q: PartVector  # rad, encoders
+    position: Vector3  # m, of the marker
+    missing: float  # m, from where the marker is to be
+    settled: bool  # the force ended because the part had settled
+    touched: list[Name]  # world objects in contact
+
+
+class Targets(Message, frozen=True, kw_only=True):
+    """Where the objects that are reached for are at tick re_k; one that is not named is not known any more."""
+
+    re_k: Count
+    positions: dict[Name, Vector3]  # m
 
 
 class Forces(Message, frozen=True, kw_only=True):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from bus_schema.messages import Count, GateState, Geometry, Name, PartVector, Quaternion, RobotVector, Role, Text, Vector3
+from bus_schema.messages import Aim, Count, GateState, Geometry, Name, PartVector, Quaternion, RobotVector, Role, Text, Vector3
 
 
 class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -48,6 +48,20 @@ class Force(Request, frozen=True, kw_only=True):
     f: PartVector | None = None  # rad/s^2
     marker: Name | None = None
     push: Vector3 | None = None  # unit mass times m/s^2 at the marker
+
+
+class ReachFor(Request, frozen=True, kw_only=True):
+    """Draw a marker to an object of the model's world, and let it go when the part has settled (thesis 8.2): an action."""
+
+    epoch: Count
+    action_id: Name
+    marker: Name
+    object: Name
+    position: Vector3  # m, where it is; from then on where the model has it
+    radius: Annotated[float, Meta(gt=0)]  # m
+    aim: Aim
+    normal: Vector3 | None = None  # where the marker's normal is to point
+    stay: bool = False  # the part is not drawn back
 
 
 class Place(Request, frozen=True, kw_only=True):

@@ -10,10 +10,12 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import Clock, Motion, Turn
-from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
+from bus_schema.rpc import Done, Goal, ReachFor, Request, Started, Take, Taken, WithEpoch
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.plant import Outcome
+from mobee.reach import Aim, ReachOutcome, ReachTarget
 from mobee.robot.robot import Array, Robot
+from services.common.bus_reach import ReachClient
 from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -24,7 +26,7 @@ OWNED = 3.0  # s for which a goal may belong to somebody else: the tokens of the
 
 
 class BusPlant:
-    """A Plant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile.
+    """A ReachPlant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile.
 
     In lockstep it takes part for its service: a tick of which the controller says that this service may have something to decide is
     answered when the service waits again, so what it decides falls into that tick however long it takes.
@@ -48,6 +50,7 @@ class BusPlant:
         else:
             service.on_clock(self._note_clock)
         service.on_run(self._new_run)
+        self._reaches = ReachClient(service, parts)
 
     def measure(self, part: str) -> Array:
         """The part's motor positions, (n_part,) rad, as soon as the part is under control and its goal is ours."""
@@ -60,20 +63,49 @@ class BusPlant:
 
     def act(self, part: str, target: Array) -> Outcome:
         """See mobee.plant.Plant."""
+        action_id = self._perform(part, "goal", Goal, q=[float(x) for x in target])
+        return self._outcome(part, action_id)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """See mobee.reach.ReachPlant; raises ActionInterrupted while the model does not answer."""
+        self._reaches.present(target)
+
+    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
+        """What is reached for is an object of the model's world, wherever it goes; returns where it is now.
+
+        Raises UnknownName, and InvalidValue if it is no target; ActionInterrupted as `present`.
+        """
+        return self._reaches.present_object(name, aim, normal)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """See mobee.reach.ReachPlant."""
+        self.robot.marker(marker)
+        action_id = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
+        after = self._outcome(part, action_id)
+        return self._reaches.outcome(part, self._motion[part], after, self._tick)
+
+    def _perform(self, part: str, verb: str, request: type[Request], **fields: object) -> str:
+        """Have an action done; returns its id when its end is known.  Raises ActionInterrupted, or InvalidValue if it is refused."""
         if part not in self._epochs:
             self.measure(part)
         elif part in self._motion and not self._owns(part):
             del self._epochs[part]
             raise ActionInterrupted(f"{part}: its goal is not ours any more, so where it is must be measured anew")
         run, action_id = self._runs, uuid.uuid4().hex
-        asked = self._ask(part, action_id, target)
+        asked = self._ask(part, verb, request, action_id=action_id, **fields)
+
+        def is_known() -> bool:
+            return self._is_over(part, action_id, asked) and (
+                verb == "goal" or self._is_broken_off(part, action_id) or self._reaches.is_told(part, action_id)
+            )
+
         while True:
             self._service.check_router()
-            self._wait(lambda: run != self._runs or self._is_over(part, action_id, asked))
+            self._wait(lambda: run != self._runs or is_known())
             if run != self._runs:
                 raise ActionInterrupted(f"{part}: robot_sim started a new run")
-            if self._is_over(part, action_id, asked):
-                return self._outcome(part, action_id)
+            if is_known():
+                return action_id
             if not self._owns(part) or not self._service.alive.get("controller"):
                 self._epochs.pop(part, None)
                 raise ActionInterrupted(f"{part}: the controller is gone")
@@ -88,6 +120,7 @@ class BusPlant:
         """Give back all goals and, in lockstep, take part no longer."""
         for part in list(self._epochs):
             self.release(part)
+        self._reaches.leave()
         self._participant.done(self._service.bus.k, last=True)
 
     def _wait(self, enough: Callable[[], bool]) -> None:
@@ -113,15 +146,12 @@ class BusPlant:
         self._tick = turn.dt * 1e-9
         self._to_answer = turn.k
 
-    def _ask(self, part: str, action_id: str, target: Array) -> int:
+    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
         """Start the action; returns the tick at which it began."""
-        q = [float(x) for x in target]
         try:
-            reply = self._service.call(
-                keys.goal(part, "goal"), Goal, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, q=q
-            )
+            reply = self._service.call(keys.goal(part, verb), request, Started, tries=TRIES, epoch=self._epochs[part], **fields)
         except CallFailed as error:
-            if error.code == "limits":
+            if error.code in ("limits", "reach"):
                 raise InvalidValue(str(error)) from None
             if error.code == "epoch":
                 del self._epochs[part]
@@ -130,7 +160,7 @@ class BusPlant:
 
     def _outcome(self, part: str, action_id: str) -> Outcome:
         motion = self._motion[part]
-        if motion.action_id != action_id or motion.status == "held":
+        if self._is_broken_off(part, action_id):
             raise ActionInterrupted(f"{part}: in hold before the action ended")
         duration = (motion.since_k - motion.start_k) * self._tick
         return Outcome(np.array(motion.q), motion.status == "settled", duration, tuple(motion.touched))
@@ -140,6 +170,10 @@ class BusPlant:
         if motion is None or motion.k <= asked:
             return False
         return motion.action_id != action_id or motion.status != "moving"
+
+    def _is_broken_off(self, part: str, action_id: str) -> bool:
+        motion = self._motion[part]
+        return motion.action_id != action_id or motion.status == "held"
 
     def _is_free(self, part: str) -> bool:
         motion = self._motion.get(part)

@@ -1,7 +1,7 @@
 """The MoBeE controller as a process: goals and forces in, motor commands out.
 
-Reads: clock, {part}/state, model/forces.
-Writes: {part}/cmd, {part}/motion.
-Answers: {part}/rpc/{take,release,goal,force}.
+Reads: tick, model/forces, model/targets, estop.
+Writes: commands, {part}/motion, {part}/reach.
+Answers: {part}/rpc/{take,release,goal,force,reach}.
 Calls: {part}/rpc/drive/{take,arm} of robot_sim.
 """

@@ -33,6 +33,10 @@ class Action:
     def start(self, action_id: str, k: int, t: float) -> None:
         """A goal was set at tick k."""
         self.id, self.start_k = action_id, k
+        self.go_on(k, t)
+
+    def go_on(self, k: int, t: float) -> None:
+        """The same action has to settle once more, from tick k on."""
         self._test = SettleTest(self._settle, t)
         self._become("moving", k)
 

@@ -1,4 +1,4 @@
-"""What agents may ask: own a part's goal, set it, force the part."""
+"""What agents may ask: own a part's goal, set it, force the part, reach with it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from bus_schema import VERSION, keys
-from bus_schema.rpc import Done, Force, Goal, Reply, Request, Started, Take, Taken, WithEpoch
+from bus_schema.rpc import Done, Force, Goal, ReachFor, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
 from mobee.collision.touch import links_moved
 from mobee.control.checked import LARGEST_FORCE
@@ -17,6 +17,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
+from services.controller.reaches import Reaches
 
 DONE = Done(v=VERSION)
 
@@ -31,8 +32,19 @@ def _by_part(handler: Callable[[str, _Q], Reply]) -> Callable[[_Q, str], Reply]:
 class GoalDesk:
     """Serves the goals of all parts; an epoch belongs to one owner, and dies with its token."""
 
-    def __init__(self, service: Service, robot: Robot, law: Controller, actions: dict[str, Action], rest: Callable[[str], None]) -> None:
-        self._service, self._robot, self._law, self._actions, self._rest = service, robot, law, actions, rest
+    def __init__(
+        self,
+        service: Service,
+        robot: Robot,
+        law: Controller,
+        actions: dict[str, Action],
+        reaches: Reaches,
+        rest: Callable[[str], None],
+        hurry: Callable[[str], None],
+    ) -> None:
+        """`rest` has a part stay, `hurry` has what was asked of it commanded before the next tick."""
+        self._service, self._robot, self._law, self._actions = service, robot, law, actions
+        self._reaches, self._rest, self._hurry = reaches, rest, hurry
         self._forces = np.zeros(len(robot.motors))
         self._pushes: dict[str, dict[str, Array]] = {}  # part -> marker -> (3,)
         self._epoch = time.time_ns() // 1_000_000  # newer than any epoch of a controller that died
@@ -40,6 +52,7 @@ class GoalDesk:
         service.on_request(keys.goal("*", "release"), WithEpoch, _by_part(self._release), part_of_key=True)
         service.on_request(keys.goal("*", "goal"), Goal, _by_part(self._goal), part_of_key=True)
         service.on_request(keys.goal("*", "force"), Force, _by_part(self._force), part_of_key=True)
+        service.on_request(keys.goal("*", "reach"), ReachFor, _by_part(self._reach), part_of_key=True)
         service.on_alive(self._note)
 
     def _take(self, part: str, request: Take) -> Taken:
@@ -61,11 +74,24 @@ class GoalDesk:
         self._check_epoch(part, request.epoch)
         target = np.array(request.q)
         self._check_limits(part, target)
-        action = self._actions[part]
-        if action.status == "held":
-            raise CallRefused("held", f"{part} is in hold; wait until its motion says otherwise")
+        self._check_free(part)
+        self._reaches.drop(part)
         self._law.set_attractor(part, target)
-        action.start(request.action_id, self._service.bus.k, self._service.bus.t * 1e-9)
+        return self._start(part, request.action_id)
+
+    def _reach(self, part: str, request: ReachFor) -> Started:
+        self._check_epoch(part, request.epoch)
+        self._check_free(part)
+        try:
+            self._reaches.begin(part, request)
+        except MobeeError as error:
+            raise CallRefused("reach", str(error)) from None
+        started = self._start(part, request.action_id)
+        self._hurry(part)
+        return started
+
+    def _start(self, part: str, action_id: str) -> Started:
+        self._actions[part].start(action_id, self._service.bus.k, self._service.bus.t * 1e-9)
         return Started(v=VERSION, k=self._service.bus.k)
 
     def _force(self, part: str, request: Force) -> Done:
@@ -96,8 +122,13 @@ class GoalDesk:
             self._forces[self._robot.part(part).slice] = request.f
         self._exert()
 
+    def end(self, part: str) -> None:
+        """The part's client has lost it: its forces end, and its reach; those of the others go on."""
+        self._reaches.drop(part)
+        self.clear(part)
+
     def clear(self, part: str) -> None:
-        """End the forces of one part's client; those of the others go on."""
+        """End the forces of one part's client, but a reach; those of the others go on."""
         self._forces[self._robot.part(part).slice] = 0.0
         self._pushes.pop(part, None)
         self._exert()
@@ -112,6 +143,11 @@ class GoalDesk:
                 at_marker[marker] = at_marker.get(marker, 0.0) + push
         for marker, push in at_marker.items():
             self._law.push(marker, push)
+        self._reaches.exert()
+
+    def _check_free(self, part: str) -> None:
+        if self._actions[part].status == "held":
+            raise CallRefused("held", f"{part} is in hold; wait until its motion says otherwise")
 
     def _check_epoch(self, part: str, epoch: int) -> None:
         owner = self._actions[part].owner
@@ -136,5 +172,5 @@ class GoalDesk:
 
     def _drop(self, part: str) -> None:
         self._actions[part].drop(self._service.bus.k)
-        self.clear(part)
+        self.end(part)
         self._rest(part)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.chain import Order, Tick
-from bus_schema.messages import EStop, Mode
+from bus_schema.messages import EStop, Mode, Targets
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
@@ -27,6 +27,7 @@ from services.controller.config import Config
 from services.controller.counters import Counters
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
+from services.controller.reaches import Reaches
 from services.controller.telling import Telling
 
 BAD_INPUT = 2  # exit code: the same again would not help
@@ -49,14 +50,17 @@ class ControllerNode:
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._tick: Tick | None = None  # that still waits for its forces
         self._last_k = -1
+        self._last: tuple[Tick, dict[str, Order], Array] | None = None  # step that commanded: its orders, and the law's state before
         self._telling = Telling(service.bus, robot, self._law, self._actions)
         self._commanding = Commanding(service, config.ttl, self._actions, self._drives)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
-        self._goals = GoalDesk(service, robot, self._law, self._actions, self._stay)
+        self._reaches = Reaches(service.bus, robot, self._law, self._actions, lambda: self._q)
+        self._goals = GoalDesk(service, robot, self._law, self._actions, self._reaches, self._stay, self._amend)
         service.on_run(self._new_run)
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
+        service.on_newest(keys.MODEL_TARGETS, Targets, self._reaches.aim)
         service.on_each(keys.ESTOP, EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_tick(self._begin)
         if service.locked:
@@ -119,6 +123,7 @@ class ControllerNode:
         self._q = np.array(tick.q)
         fresh = self._forces is not None and self._are_fresh(self._forces, tick.k)
         self._supervise(tick, fresh)
+        self._last = None
         orders, reference = self._control(tick, fresh) if tick.k > 0 else ({}, self._q)
         if tick.mode == "lock":
             self._telling.tell(tick, self._q, self._forces)  # who hears that it is its turn must have heard where its action stands
@@ -126,6 +131,7 @@ class ControllerNode:
         else:
             self._commanding.command(tick.k, orders, reference)
             self._telling.tell(tick, self._q, self._forces)
+            self._reaches.tell(tick)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
         """What becomes of each part in this tick."""
@@ -160,16 +166,29 @@ class ControllerNode:
     def _advance(self, tick: Tick, ticks: int) -> tuple[dict[str, Order], Array]:
         """Step the law over the ticks that have passed, and command what is armed."""
         for _ in range(ticks):
+            before = self._law.state.copy()
             command = self._law.step(self._q, tick.dt / 1e9, self._acting)
         modality: Mode = self._config.modality
         velocity, acceleration = self._law.velocity, self._law.acceleration
+        touched = self._forces.touched if self._forces is not None else {}
         orders = {}
         for part, action in self._actions.items():
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
                 action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where])
+                self._reaches.look(part, tick, touched.get(part, []))
+        self._last = tick, orders, before
         return orders, getattr(command, modality)
+
+    def _amend(self, part: str) -> None:
+        """Free mode: what was asked between two ticks is not to wait for the next; the last step is made anew and commanded."""
+        if self._service.locked or self._tick is not None or self._last is None or part not in self._last[1]:
+            return
+        tick, orders, before = self._last
+        self._law.state[:] = before
+        command = self._law.step(self._q, tick.dt / 1e9, self._acting)
+        self._commanding.command(tick.k, orders, getattr(command, self._config.modality))
 
     def _starve(self, tick: Tick) -> dict[str, Order]:
         """No forces, no motion: tell every part that still obeys to hold."""
@@ -177,13 +196,14 @@ class ControllerNode:
 
     def _held(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)
-        self._goals.clear(part)
+        self._goals.end(part)
         self._service.bus.event("warning", "held", f"{part} is in hold ({why})", epoch=float(self._drives.epochs[part]))
 
     def _stay(self, part: str) -> None:
         """Its owner is gone: brake and stay where it is, or go to its posture if one is given."""
         if self._last_k >= 0:
             self._law.hold(part, self._q[self._where[part]])
+            self._last = None
             self._seek_posture(part)
 
     def _seek_posture(self, part: str) -> None:
@@ -203,12 +223,12 @@ class ControllerNode:
     def _new_run(self) -> None:
         self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare)
         self._drives.forget()
-        self._forces, self._tick, self._last_k = None, None, -1
+        self._forces, self._tick, self._last_k, self._last = None, None, -1, None
         self._commanding.forget()
         self._law.reset(self._robot.home)
         for part, action in self._actions.items():
             action.hold(self._service.bus.k)
-            self._goals.clear(part)
+            self._goals.end(part)
 
     def _mark(self) -> None:
         self._counters = Counters()

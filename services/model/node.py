@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 
 from bus_schema import VERSION, keys
 from bus_schema.chain import Tick
-from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose
+from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model, load_world
 from mobee.collision.contact import Contact
@@ -44,18 +45,43 @@ class ModelNode:
         self._participant = Participant(service)
         self._pose = bus.publisher(keys.MODEL_POSE, Pose, LATEST)
         self._contacts = bus.publisher(keys.MODEL_CONTACTS, Contacts, LATEST)
+        self._targets = bus.publisher(keys.MODEL_TARGETS, Targets, bus.control)
+        self._reaches: dict[str, Reach] = {}  # of the parts that reach now
         self._last_k = -1
         self._time = Percentiles()
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         service.on_request(keys.MODEL_JACOBIAN, JacobianAt, lambda r, _: self._jacobian(r))
         service.on_run(self._new_run)
+        service.on_alive(self._note_alive)
+        for part in robot.parts:
+            service.on_newest(keys.reach(part), Reach, partial(self._note_reach, part), part=part)
         service.on_tick(self._tick)
         constraint_forces(self._desk.pose, self._gains, config.propagate)  # what is built once is built before the robot moves
 
     def _new_run(self) -> None:
         self._desk.forget()
+        self._forget_reaches()
         self._last_k = -1
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        if who == "controller" and not up:
+            self._forget_reaches()
+
+    def _forget_reaches(self) -> None:
+        self._reaches.clear()
+        self._model.reaching = None
+
+    def _note_reach(self, part: str, reach: Reach) -> None:
+        """The link of the marker that reaches does not feel the targets."""
+        if reach.marker not in self._robot.markers:
+            self._service.bus.reject("value", f"a reach of {part} with {reach.marker!r}: this robot has no such marker")
+            return
+        if reach.phase == "reaching":
+            self._reaches[part] = reach
+        else:
+            self._reaches.pop(part, None)
+        self._model.reaching = next((one.marker for one in self._reaches.values()), None)
 
     def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
@@ -64,6 +90,8 @@ class ModelNode:
         pose = self._desk.pose = self._track.evaluate(self._q)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         touching = {part: list(names) for part, names in touched(pose).items() if names}
+        if self._reaches:
+            self._targets.put(re_k=tick.k, positions=self._desk.positions({reach.object for reach in self._reaches.values()}))
         self._forces.put(
             re_k=tick.k,
             limits=forces.limits.tolist(),

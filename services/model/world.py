@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mobee.collision import geometry
 from mobee.collision.world import placed
 from mobee.errors import InvalidValue, MobeeError
 from mobee.kinematics.quaternion import from_matrix, to_matrix
+from mobee.reach import TARGET
 from mobee.robot.robot import Array
 from services.common.service import CallRefused, Service
 
@@ -29,6 +30,8 @@ class WorldDesk:
         self._service, self._model = service, model
         self.pose = model.evaluate(model.robot.home)  # the newest, for what is attached to a link
         self._expiry: dict[str, int] = {}  # of what only perception put there, ns of the bus clock
+        self._presenter = ""  # the service whose target is there
+        service.on_alive(self._note_alive)
         service.on_each(keys.ALL_WORLD, WorldObject, self._perceive)
         service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._add(w, r)))
         service.on_request(keys.world_rpc("move"), MoveObject, lambda r, _: self._edit(lambda w: self._move(w, r)))
@@ -43,6 +46,11 @@ class WorldDesk:
         for name in [name for name, until in self._expiry.items() if until < t]:
             self._remove(self._model.world, name)
             self._service.bus.event("info", "expired", f"{name} was not seen again in time")
+
+    def positions(self, names: Collection[str]) -> dict[str, list[float]]:
+        """Where those of the objects are that are known, in m in the root frame."""
+        known = self._model.world.objects
+        return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 
     def forget(self) -> None:
         """A new run: what was perceived in the last one is not known any more."""
@@ -68,8 +76,23 @@ class WorldDesk:
         return DONE
 
     def _add(self, world: World, request: AddObject) -> None:
+        if request.name == TARGET:
+            self._require_presenter(request.who)
         self._put(world, request)
         self._expiry.pop(request.name, None)  # whoever added it removes it
+
+    def _require_presenter(self, who: str) -> None:
+        """Two who reach at a time would each move the other's target."""
+        other = self._presenter
+        if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
+            raise InvalidValue(f"{TARGET!r} is there for {other}: {who} can present one when that is taken away, or {other} has ended.")
+        self._presenter = who
+
+    def _note_alive(self, who: str, instance: str, up: bool) -> None:
+        """A target goes with who presented it."""
+        if not up and who == self._presenter and not self._service.alive.get(who) and TARGET in self._model.world.objects:
+            self._remove(self._model.world, TARGET)
+            self._service.bus.event("info", "target_gone", f"{TARGET} is taken away: {who}, who presented it, is gone")
 
     def _attach(self, world: World, request: Attach) -> None:
         world.attach(request.name, request.link)

@@ -1,0 +1,117 @@
+"""What a plant on the bus presents to the model, and what it says when that cannot be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bus_schema import VERSION
+from bus_schema.messages import Geometry
+from bus_schema.rpc import Done, ObjectState, World
+from mobee import ActionInterrupted, InvalidValue, ReachTarget, UnknownName
+from mobee.reach import TARGET
+from services.common.bus_reach import ReachClient
+from services.common.rpc import CallFailed
+
+UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+AT = [-0.3, 0.2, 0.1]
+
+
+class FakeService:
+    """Takes note of the calls to the model, and answers or fails."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[str, dict[str, Any]]] = []
+        self.failure: CallFailed | None = None
+        self.objects: list[ObjectState] = []
+        self.alive = lambda who, instance, up: None
+
+    def on_newest(self, *_: Any, **__: Any) -> None:
+        """No stream comes."""
+
+    def on_alive(self, handler: Any) -> None:
+        self.alive = handler
+
+    def call(self, key: str, request: type, reply: type, *, tries: int, **fields: Any) -> Any:
+        self.calls.append((key.rpartition("/")[2], fields))
+        if self.failure is not None:
+            raise self.failure
+        return World(v=VERSION, objects=self.objects) if reply is World else Done(v=VERSION)
+
+
+@pytest.fixture
+def service() -> FakeService:
+    return FakeService()
+
+
+@pytest.fixture
+def client(service: FakeService) -> ReachClient:
+    return ReachClient(service, ("right_arm",))  # type: ignore[arg-type]  # a service without a bus
+
+
+def thing(name: str, kind: str, size: list[float], role: str = "target") -> ObjectState:
+    return ObjectState(name=name, geometry=Geometry(kind=kind, size=size), position=AT, quaternion=UPRIGHT, role=role, link="")
+
+
+def test_a_target_is_put_moved_and_taken_away(service: FakeService, client: ReachClient) -> None:
+    client.present(ReachTarget(np.array(AT), radius=0.04))
+    client.present(ReachTarget(np.zeros(3), radius=0.04))
+    client.present(None)
+    client.present(None)
+    assert [verb for verb, _ in service.calls] == ["add", "add", "remove"]
+    added = service.calls[0][1]
+    assert (added["name"], added["position"], added["geometry"].size, added["role"]) == (TARGET, AT, [0.04], "target")
+
+
+def test_what_is_asked_for_is_what_was_presented(client: ReachClient) -> None:
+    with pytest.raises(InvalidValue, match=r"nothing is presented .* present\(ReachTarget"):
+        client.asked()
+    client.present(ReachTarget(np.array(AT), aim="surface", normal=np.array([0.0, 0.0, 2.0])))
+    expected = {"object": TARGET, "position": AT, "radius": 0.05, "aim": "surface", "normal": [0.0, 0.0, 1.0]}
+    assert client.asked() == expected
+
+
+def test_a_new_model_is_presented_the_target_again(service: FakeService, client: ReachClient) -> None:
+    client.present(ReachTarget(np.array(AT)))
+    client.asked()
+    assert len(service.calls) == 1
+    service.alive("model", "m2", True)
+    client.asked()
+    client.asked()
+    assert [verb for verb, _ in service.calls] == ["add", "add"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "radius"),
+    [("sphere", [0.03], 0.03), ("box", [0.1, 0.2, 0.06], 0.03), ("cylinder", [0.04, 0.06], 0.03), ("capsule", [0.02, 0.3], 0.02)],
+)
+def test_an_object_is_reached_for_as_the_sphere_in_its_middle(
+    service: FakeService, client: ReachClient, kind: str, size: list[float], radius: float
+) -> None:
+    service.objects = [thing("cup", kind, size)]
+    target = client.present_object("cup", "surface")
+    assert (target.position.tolist(), target.radius, target.aim) == (AT, pytest.approx(radius), "surface")
+    assert client.asked()["object"] == "cup"
+    assert [verb for verb, _ in service.calls] == ["list"]
+
+
+def test_what_is_no_target_of_the_world_is_refused_with_what_is_valid(service: FakeService, client: ReachClient) -> None:
+    service.objects = [thing("table", "box", [0.6, 1.5, 0.5], "obstacle"), thing("ball", "sphere", [0.03])]
+    with pytest.raises(UnknownName, match="Did you mean 'ball'.*Valid: ball, table"):
+        client.present_object("bal")
+    with pytest.raises(InvalidValue, match="'table' is an obstacle .* model/rpc/world/role"):
+        client.present_object("table")
+
+
+def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeService, client: ReachClient) -> None:
+    service.failure = CallFailed("world", "'reach_target' is there for agent_left_arm")
+    with pytest.raises(InvalidValue, match="there for agent_left_arm"):
+        client.present(ReachTarget(np.array(AT)))
+    service.failure = CallFailed("no_answer", "nobody answers")
+    with pytest.raises(ActionInterrupted, match="the model does not answer"):
+        client.present(ReachTarget(np.array(AT)))
+    with pytest.raises(ActionInterrupted, match="does not say what there is"):
+        client.present_object("ball")
+    client.leave()  # nobody need hear of it

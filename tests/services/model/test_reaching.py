@@ -1,0 +1,134 @@
+"""While a part reaches, its link does not feel the targets, and the controller is told where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bus_schema import keys
+from bus_schema.messages import Reach, Targets
+from bus_schema.rpc import AddObject, Done, MoveObject, OneName
+from mobee.reach import TARGET
+from services.common.bus import Publisher
+from services.common.delivery import LATEST
+from services.common.rpc import CallFailed
+from tests.services.harness import wait_for
+from tests.services.model.stage import BALL, UPRIGHT, Stage, library
+
+
+@dataclass
+class Reacher:
+    """One who presents a target at the left palm, and tells of reaches as the controller does."""
+
+    stage: Stage
+    at: list[float]
+    targets: list[Targets]
+    instance: str = "n1"
+    streams: dict[str, Publisher[Any]] = field(default_factory=dict)
+
+    def present(self, who: str = "agent_left_arm", position: list[float] | None = None) -> None:
+        fields = {"name": TARGET, "geometry": BALL, "position": position or self.at, "quaternion": UPRIGHT, "role": "target"}
+        self.stage.rig.call(keys.world_rpc("add"), AddObject, Done, who=who, **fields)
+
+    def tell(self, phase: str, part: str = "left_arm", marker: str = "left_palm") -> None:
+        bus = self.stage.rig.bus
+        stream = self.streams.setdefault(part, bus.publisher(keys.reach(part), Reach, LATEST))
+        q = [0.0] * bus.part_sizes[part]
+        told = {"action_id": "a", "marker": marker, "object": TARGET, "end_k": bus.k, "target": self.at, "position": self.at}
+        stream.put(phase=phase, q=q, missing=0.0, settled=False, touched=[], **told)
+
+    def is_felt(self) -> bool:
+        """By the hand; the forearm feels it always."""
+        self.stage.tick()
+        felt = {contact.first for contact in self.stage.contacts[-1].contacts if contact.second == TARGET}
+        assert "l_forearm_field" in felt
+        return "l_palm_field" in felt
+
+    def comes_to(self, felt: bool) -> None:
+        wait_for(lambda: self.is_felt() == felt, f"felt: {felt}")
+
+
+@pytest.fixture
+def reacher(run: Stage) -> Iterator[Reacher]:
+    at = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
+    made = Reacher(run, at, run.rig.record(keys.MODEL_TARGETS, Targets))
+    run.rig.token("agent_left_arm", made.instance)
+    yield made
+    if ("agent_left_arm", made.instance) in run.rig.alive:
+        run.rig.drop_token("agent_left_arm", made.instance)
+    wait_for(lambda: TARGET not in run.world(), "the target to be taken away")
+
+
+def test_the_reaching_hand_alone_does_not_feel_the_target_and_only_while_it_reaches(reacher: Reacher) -> None:
+    reacher.present()
+    assert reacher.is_felt()
+    reacher.tell("reaching")
+    reacher.comes_to(felt=False)
+    reacher.tell("returning")
+    reacher.comes_to(felt=True)
+    reacher.tell("reaching", "right_arm", "right_palm")
+    wait_for(lambda: reacher.targets, "the reach to be known")
+    assert reacher.is_felt()
+    reacher.tell("over", "right_arm", "right_palm")
+
+
+def test_where_the_target_is_is_told_in_every_tick_while_somebody_reaches_for_it(reacher: Reacher) -> None:
+    reacher.present()
+    reacher.stage.tick()
+    assert reacher.targets == []
+    reacher.tell("reaching")
+    reacher.comes_to(felt=False)
+    k = reacher.stage.tick().re_k
+    wait_for(lambda: reacher.targets[-1].re_k == k, "the target")
+    assert reacher.targets[-1].positions == {TARGET: reacher.at}
+    there = [-0.3, 0.2, 0.1]
+    reacher.stage.edit("move", MoveObject, name=TARGET, position=there)
+    k = reacher.stage.tick().re_k
+    wait_for(lambda: reacher.targets[-1].re_k == k, "the target")
+    assert reacher.targets[-1].positions == {TARGET: there}
+    reacher.stage.edit("remove", OneName, name=TARGET)
+    k = reacher.stage.tick().re_k
+    wait_for(lambda: reacher.targets[-1].re_k == k, "the word that it is gone")
+    assert reacher.targets[-1].positions == {}
+    reacher.tell("over")
+
+
+def test_a_reach_ends_with_the_controller_and_with_the_run(reacher: Reacher) -> None:
+    rig = reacher.stage.rig
+    rig.token("controller", "c1")
+    reacher.present()
+    reacher.tell("reaching")
+    reacher.comes_to(felt=False)
+    rig.drop_token("controller", "c1")
+    reacher.comes_to(felt=True)
+    reacher.tell("reaching")
+    reacher.comes_to(felt=False)
+    reacher.stage.sim.new_run()
+    assert reacher.is_felt()
+
+
+def test_the_target_is_taken_away_when_who_presented_it_is_gone(reacher: Reacher) -> None:
+    reacher.present()
+    reacher.stage.rig.drop_token("agent_left_arm", reacher.instance)
+    wait_for(lambda: TARGET not in reacher.stage.world(), "the target to be taken away")
+
+
+def test_a_second_who_presents_a_target_is_told_to_wait(reacher: Reacher) -> None:
+    reacher.present()
+    with pytest.raises(CallFailed, match="there for agent_left_arm: agent_right_arm can present one when") as caught:
+        reacher.present("agent_right_arm")
+    assert caught.value.code == "world"
+    reacher.present(position=[-0.3, 0.2, 0.1])
+    np.testing.assert_allclose(reacher.stage.world()[TARGET].position, [-0.3, 0.2, 0.1])
+
+
+def test_a_reach_with_an_unknown_marker_is_refused_and_counted(reacher: Reacher) -> None:
+    reacher.present()
+    before = reacher.stage.rig.stat("model").rejected.get("value", 0)
+    reacher.tell("reaching", marker="left_plam")
+    wait_for(lambda: reacher.stage.rig.stat("model").rejected.get("value", 0) == before + 1, "the refusal")
+    assert reacher.is_felt()

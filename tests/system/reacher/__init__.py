@@ -1,0 +1,1 @@
+"""A service that acts and reaches by a fixed script, the same on every plant."""

@@ -1,0 +1,12 @@
+from __future__ import annotations
+
+from services.common.config import ServiceConfig
+
+
+class Config(ServiceConfig, frozen=True, kw_only=True):
+    """What the script is told."""
+
+    run_dir: str = ""
+    """Folder for what came of it."""
+    in_vain: bool = False
+    """Reach for what is out of reach, for ever."""

@@ -1,0 +1,75 @@
+"""Reaching with all services: as the offline plant reaches, to the bit; and what is left when who reaches is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bus_schema import decode, keys
+from bus_schema.messages import Reach
+from bus_schema.rpc import Empty, World
+from experiments.launched import summary_of
+from mobee import Gains, Model, OfflinePlant, load_robot, load_world
+from mobee.reach import TARGET
+from services.common import rpc
+from tests.services.harness import ROOT
+from tests.system.live import Watcher, running, until
+from tests.system.reacher.script import PART, perform
+
+pytestmark = pytest.mark.system
+
+SCENARIO = Path(__file__).with_name("reaching.toml")
+SEED, TICK = 3, 0.02
+TICKS = 1200  # the script is over before
+
+
+@pytest.mark.untimed
+def test_live_reaches_in_lockstep_are_those_of_the_offline_plant_to_the_bit(tmp_path: Path) -> None:
+    scenario = tmp_path / "reaching.toml"
+    scenario.write_text(f'{SCENARIO.read_text()}\n[services.reacher]\nmodule = "tests.system.reacher"\n')
+    settings = ["shared.mode=lock", "shared.patience=20", "services.robot_sim.rate=50"]
+    summary = summary_of(str(scenario), settings, ticks=TICKS, runs=tmp_path / "runs")
+    assert summary["lockstep"]["repeatable"]
+    live = json.loads((Path(summary["run"]) / "reaches.json").read_text())
+    robot, world = load_robot("icub"), load_world("table")
+    world.remove("ball")  # live, nobody sees it without cameras
+    plant = OfflinePlant(Model(robot, world), seed=SEED, gains=Gains.named("published_2014"), dt=TICK)
+    offline = list(perform(plant))
+    assert live == offline
+    print("mm missing:", [round(1e3 * outcome["missing"]) for outcome in offline if "missing" in outcome])
+
+
+def test_when_who_reaches_is_killed_the_arm_brakes_and_the_target_is_gone(tmp_path: Path) -> None:
+    with running(tmp_path, str(SCENARIO)) as (system, watcher):
+        told: list[Reach] = []
+        kept = watcher.session.declare_subscriber(
+            keys.reach(PART), lambda sample: told.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
+        )
+        argv = [sys.executable, "-m", "tests.system.reacher", "--endpoint", system.endpoint, "--in-vain"]
+        reacher = subprocess.Popen(argv, cwd=ROOT, env=dict(os.environ))
+        try:
+            until(lambda: told and watcher.speed(PART) > 0.1, 30.0, "the reach")
+            assert TARGET in objects(watcher)
+            reacher.kill()
+            until(lambda: told[-1].phase == "interrupted", 2.0, "the end of the reach")
+        finally:
+            reacher.kill()
+            reacher.wait()
+        k = told[-1].k
+        until(lambda: watcher.motions[PART][-1].status == "idle", 2.0, "the part without an action")
+        assert watcher.motions[PART][-1].epoch == 0
+        until(lambda: watcher.k > k + 100, 5.0, "a second to pass")
+        assert watcher.speed(PART) < 0.02
+        assert TARGET not in objects(watcher)
+        assert told[-1].phase == "interrupted"
+        kept.undeclare()
+
+
+def objects(watcher: Watcher) -> set[str]:
+    """What is in the model's world."""
+    return {thing.name for thing in rpc.call(watcher.session, "test", keys.world_rpc("list"), Empty, World, timeout=2.0).objects}
