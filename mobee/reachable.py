@@ -1,0 +1,79 @@
+"""Whether a marker could be put somewhere: how near kinematics alone lets it come, and what of the robot is there already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.collision.geometry import sphere
+from mobee.collision.touch import links_moved
+from mobee.collision.world import World
+from mobee.errors import InvalidValue
+from mobee.model import Model
+from mobee.robot.robot import Array, Ints
+
+POINT = 1e-3  # m, radius of what stands for a place
+STEPS, STARTS = 60, 24
+DAMPING = 0.02  # m, below which errors are no longer damped away
+STEP = 0.3  # rad, a motor's longest in one step
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest:
+    """The posture (n,) rad whose marker is nearest to a place, where the marker is then, (3,) m, and how far from the place [m]."""
+
+    q: Array
+    position: Array
+    distance: float
+
+
+def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
+    """The posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
+
+    Damped least squares within the motors' limits, from q and from random postures: nothing keeps it from touching, and what it
+    finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker.
+    """
+    robot, where = model.robot, np.asarray(position, dtype=np.float64)
+    motors = _movers(model, part, marker)
+    low, high = robot.limits[motors].T
+    rng = np.random.default_rng(seed)
+    at = np.repeat(np.clip(q, *robot.limits.T)[None, :], STARTS, axis=0)
+    at[1:, motors] = rng.uniform(low, high, (STARTS - 1, len(motors)))
+    for _ in range(STEPS):
+        error = where - model.evaluate(at).position(marker)
+        rows = model.jacobian(at, marker)[:, :3, motors]
+        push = np.einsum("bij,bi->bj", rows, error)
+        kept = ((at[:, motors] <= low) & (push < 0.0)) | ((at[:, motors] >= high) & (push > 0.0))
+        rows = np.where(kept[:, None, :], 0.0, rows)
+        damping = np.minimum((error**2).sum(axis=1), DAMPING**2) + 1e-9
+        inner = np.einsum("bij,bkj->bik", rows, rows) + damping[:, None, None] * np.eye(3)
+        step = np.einsum("bij,bi->bj", rows, np.linalg.solve(inner, error[..., None])[..., 0])
+        step *= np.minimum(1.0, STEP / np.maximum(np.abs(step).max(axis=1, keepdims=True), STEP))
+        at[:, motors] = np.clip(at[:, motors] + step, low, high)
+    there = model.evaluate(at).position(marker)
+    distance = np.linalg.norm(where - there, axis=1)
+    best = int(distance.argmin())
+    return Nearest(at[best], there[best], float(distance[best]))
+
+
+def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
+    """The link in whose solid shapes `position` (3,) m lies in the posture q (n,) rad, of those that the part does not move; or None."""
+    robot, world = model.robot, World()
+    world.add("place", sphere(POINT), position=position)
+    table = Model(robot, world).evaluate(q).table
+    moved = links_moved(robot)[part]
+    inside = [int(link) for link in table.first_link[(table.second_link < 0) & (table.kind == 0)] if int(link) not in moved]
+    return robot.links[inside[0]] if inside else None
+
+
+def _movers(model: Model, part: str, marker: str) -> Ints:
+    """The part's motors that move the marker."""
+    robot = model.robot
+    where = robot.part(part)
+    rows = np.abs(model.jacobian(np.stack([robot.home, robot.limits.mean(axis=1)]), marker)).max(axis=(0, 1))
+    motors = where.start + np.flatnonzero(rows[where.slice] > 0.0)
+    if not len(motors):
+        able = [name for name in robot.markers if robot.markers[name].link in links_moved(robot)[part]]
+        raise InvalidValue(f"{part} does not move the marker {marker!r}. Valid: {', '.join(able) or 'none'}.")
+    return motors

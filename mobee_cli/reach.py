@@ -1,0 +1,122 @@
+"""`mobee reach`: put a hand on a place, on the robot that runs or offline."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.errors import ActionInterrupted, MobeeError
+from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
+from mobee.reachable import body_at, nearest_posture
+from mobee.robot.robot import Array, Robot
+from mobee.store import STORE
+from mobee_cli.connect import add_endpoint
+from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.reach_learned import go_to_pre_reach
+from mobee_cli.reach_result import ON, Result, lines
+from mobee_cli.reach_stage import Stage, offline
+
+_NOTES = f"""Places are in m in the root frame: x backwards, y right, z up, from the waist.
+Without --run the hand is drawn there from where the robot is; with it, what the
+agent of that run has learned says from which posture, and the way there.
+Reached is a hand within {100 * ON:g} cm of the target's surface, when its force ends.
+Exit code: 0 reached, 1 not reached, 2 bad input, 3 no system is running."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to reach for, with what, where."""
+    parser.epilog = _NOTES
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the place [m]")
+    what.add_argument("--object", metavar="NAME", help="a target of the model's world, wherever it goes; as vision's ball")
+    parser.add_argument("--part", default="right_arm", help="what reaches (default: %(default)s)")
+    parser.add_argument("--marker", metavar="NAME", help="what is put there (default: the part's palm)")
+    parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="of the target [m] (default: %(default)g)")
+    parser.add_argument("--aim", choices=AIMS, default=AIMS[0], help="where on it the marker is to come (default: %(default)s)")
+    parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that learned to reach, or its file {STORE}")
+    parser.add_argument("--stay", action="store_true", help="stay there, instead of being drawn back")
+    parser.add_argument("--offline", action="store_true", help="on the offline plant, the iCub at its table")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+    add_endpoint(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reach, and tell how it went."""
+    try:
+        with _stage(arguments) as stage:
+            result = _reach(arguments, stage)
+    except ActionInterrupted as interruption:
+        raise UserError(f"the reach was broken off: {interruption}. `mobee status` says how the robot is.", FAILED) from None
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    print(json.dumps(result.as_json(), indent=2) if arguments.json else "\n".join(lines(result)))
+    return 0 if result.reached else FAILED
+
+
+def _stage(arguments: argparse.Namespace) -> AbstractContextManager[Stage]:
+    if arguments.target is not None:
+        ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)  # a mistake in it needs no robot
+    if arguments.offline:
+        return offline()
+    from mobee_cli.reach_live import live
+
+    return live(arguments.endpoint, arguments.part)
+
+
+def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
+    part = arguments.part
+    agent = _learned(arguments, stage)
+    marker = arguments.marker or (_palm(stage.robot, part) if agent is None else agent.marker)
+    stage.robot.marker(marker)
+    if agent is not None and marker != agent.marker:
+        raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
+    if arguments.object is None:
+        target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)
+        _require_outside(stage, part, target.position)
+        stage.plant.present(target)
+    else:
+        target = stage.present_object(arguments.object, arguments.aim)
+    found = nearest_posture(stage.model, part, marker, target.position, stage.q())
+    stage.plant.measure(part)
+    way: dict[str, Any] = {}
+    if agent is not None:
+        way["path"], way["avoided"], way["expected"] = go_to_pre_reach(agent, target)
+    outcome = stage.plant.reach(part, marker, arguments.stay)
+    return Result(
+        **way,
+        part=part,
+        marker=marker,
+        target=target,
+        outcome=outcome,
+        nearest=found,
+        reward=reward_of(outcome.missing),
+        first_motion=stage.first_motion(),
+    )
+
+
+def _learned(arguments: argparse.Namespace, stage: Stage) -> ReachAgent | None:
+    if arguments.run is None:
+        return None
+    file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
+    return load_reaches(file, stage.plant, arguments.part)
+
+
+def _require_outside(stage: Stage, part: str, position: Array) -> None:
+    link = body_at(stage.model, part, position, stage.q())
+    if link is not None:
+        at = ", ".join(f"{x:g}" for x in position)
+        raise UserError(f"({at}) m is inside the robot's own {link}: choose a place outside its body", BAD_INPUT)
+
+
+def _palm(robot: Robot, part: str) -> str:
+    """The palm that a part moves: its own, or for the torso the right one."""
+    robot.part(part)
+    side = "left" if part.startswith("left") else "right"
+    return f"{side}_palm"

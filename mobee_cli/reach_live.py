@@ -1,0 +1,126 @@
+"""The robot that runs, as `mobee reach` sees it."""
+
+from __future__ import annotations
+
+import json
+import logging
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.chain import Commands, Tick
+from bus_schema.rpc import Config, Empty
+from mobee.errors import ActionInterrupted, MobeeError
+from mobee.reach import Aim, ReachOutcome, ReachTarget
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array, Robot
+from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+from mobee_cli.reach_stage import Stage
+from services.common import rpc
+from services.common.bus_plant import BusPlant
+from services.common.config import ServiceConfig
+from services.common.service import Service
+from services.common.session import BusUnreachable, open_client
+
+WHO = "mobee_reach"
+PATIENCE = 0.3  # s for a system that runs to answer
+CONTROL = 8.0  # s for the part to come under control and its goal to be free
+LONGEST = 300.0  # s of the clock on the wall for a reach, whatever the robot does
+MOVES = 5e-3  # rad/s by which a command differs from those before the request
+
+
+class LivePlant(BusPlant):
+    """A BusPlant that is never waited for in vain, and that sees when its reaches begin to move the robot."""
+
+    def __init__(self, service: Service, robot: Robot, part: str) -> None:
+        super().__init__(service, robot, (part,))
+        self._link, self._where = service, robot.part(part).slice
+        self._q: Array | None = None
+        self._before: Array | None = None  # the newest command before the request
+        self._asked, self._moved = 0.0, 0.0  # s, monotonic clock
+        service.on_newest(keys.TICK, Tick, self._note_tick)
+        service.on_each(keys.COMMANDS, Commands, self._note_commands)
+
+    def q(self) -> Array:
+        """All motors, (n,) rad, as the encoders say."""
+        give_up = time.monotonic() + CONTROL
+        self._link.spin(give_up, lambda: self._q is not None)
+        if self._q is None:
+            raise UserError(f"no tick of the robot in {CONTROL:g} s: `mobee status` says whether robot_sim runs", ENVIRONMENT)
+        return self._q
+
+    def measure(self, part: str) -> Array:
+        """As a BusPlant, but with an end: raises UserError while somebody holds the part."""
+        waiting = [True]
+        self._end_after(CONTROL, waiting, f"{part} is in hold: `mobee status` says why, `mobee estop --reset` ends an emergency stop")
+        try:
+            return super().measure(part)
+        except ActionInterrupted:
+            raise
+        except MobeeError as error:
+            raise UserError(f"{error}. `mobee launch reach` starts a system in which nobody owns it.", FAILED) from None
+        finally:
+            waiting.clear()
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """As a BusPlant, but with an end."""
+        waiting = [True]
+        self._end_after(LONGEST, waiting, f"{part} has not come to rest in {LONGEST:g} s: is the robot paused? See `mobee status`")
+        self._asked, self._moved = time.monotonic(), 0.0
+        try:
+            return super().reach(part, marker, stay)
+        finally:
+            waiting.clear()
+
+    def first_motion(self) -> float | None:
+        """From the last request to the first command that moves, in s; None if none came."""
+        return self._moved - self._asked if self._moved else None
+
+    def _end_after(self, patience: float, waiting: list[bool], why: str) -> None:
+        def end() -> None:
+            if waiting:
+                raise UserError(why, ENVIRONMENT)
+
+        self._link.inbox.at(time.monotonic() + patience, end)
+
+    def _note_tick(self, tick: Tick) -> None:
+        self._q = np.array(tick.q)
+
+    def _note_commands(self, commands: Commands) -> None:
+        """The sender's clock is this machine's."""
+        ref, sent = np.array(commands.ref[self._where]), commands.tw * 1e-9
+        if self._asked == 0.0 or sent < self._asked:
+            self._before = ref
+        elif not self._moved and self._before is not None and np.abs(ref - self._before).max() > MOVES:
+            self._moved = sent
+
+
+@contextmanager
+def live(endpoint: str, part: str) -> Iterator[Stage]:
+    """The robot of the system at `endpoint`; its part is taken, and given back at the end.  Raises UserError where there is none."""
+    try:
+        session = open_client(endpoint, patience=PATIENCE)
+    except BusUnreachable as error:
+        raise UserError(str(error), ENVIRONMENT) from None
+    try:
+        settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=3).config)
+    except rpc.CallFailed as failed:
+        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
+        raise UserError(f"no controller answers at {endpoint} ({failed}): `mobee status` says what runs", ENVIRONMENT) from None
+    robot = load_robot(settings["robot"])
+    robot.part(part)
+    with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the reach, and that the verb has to tell
+        logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
+        plant = LivePlant(service, robot, part)
+        service.ready()
+
+        def present_object(name: str, aim: Aim) -> ReachTarget:
+            return plant.present_object(name, aim)
+
+        yield Stage(robot, plant, plant.q, present_object, plant.first_motion)
+        plant.leave()
