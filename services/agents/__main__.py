@@ -8,6 +8,7 @@ from mobee import load_robot
 from mobee.learning.value_iteration import load_planning
 from services.agents.config import Config
 from services.agents.node import AgentNode
+from services.agents.reach_node import ReachNode
 from services.common.config import load_config
 from services.common.entry import explained
 from services.common.service import Service
@@ -21,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         robot.part(config.part)
         load_planning()  # before the bus hears of it: planning is compiled, and who loads it in the first plan seems frozen
         with Service(f"agent_{config.part}", config, robot) as service:
-            AgentNode(service, config, robot).run()
+            (ReachNode if config.targets else AgentNode)(service, config, robot).run()
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.reach import RADIUS
 from services.common.config import ServiceConfig
 
 Explorer = Literal["curious", "random", "least_tried", "nearest_untried", "count_bonus", "posterior_sampling", "depleting"]
@@ -48,3 +49,19 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Folder of the run, where its transitions are kept and found again; empty: they are not kept."""
     transitions: Annotated[int, Meta(ge=0)] = 0
     """End after so many in all; 0: go on for ever."""
+    targets: tuple[tuple[float, float, float], ...] = ()
+    """Places to learn to reach for, m, root frame; empty: it learns its space."""
+    target_radius: Annotated[float, Meta(gt=0)] = RADIUS
+    """Of what is presented there, m."""
+    marker: str = ""
+    """What is to come there; empty: its palm."""
+    predictor: str = "weighted"
+    """Of the rewards of reaching."""
+    strategy: str = "intrinsic"
+    """What it pursues while it learns to reach."""
+    failures: Literal["spread", "local"] = "spread"
+    """How transitions that failed are remembered: for all targets, or for those nearby."""
+    learned: str = ""
+    """Folder of a run whose transitions it plans its ways to reaches with; empty: it believes that most actions work."""
+    tries: Annotated[int, Meta(ge=0)] = 0
+    """End after so many problem-tries in all; 0: go on for ever."""

@@ -1,0 +1,121 @@
+"""An agent with targets as a process: the test plays the controller and the model."""
+
+from __future__ import annotations
+
+import signal
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bus_schema import VERSION, keys
+from bus_schema.messages import Event, Reach
+from bus_schema.rpc import AddObject, Done, OneName, ReachFor, Started
+from mobee import load_robot
+from mobee.reach import TARGET
+from mobee.store import STORE
+from services.common.delivery import LATEST
+from tests.services.fake_controller import FakeController
+from tests.services.harness import Program, Refusal, Rig, rig, wait_for
+
+ROBOT = load_robot("icub")
+PLACES = ("-0.3", "0.2", "0.1", "-0.3", "0.3", "0.2")
+MISSING = 0.02  # m
+
+
+class FakeReaches(FakeController):
+    """A controller whose reaches all end as near, and a model that takes targets."""
+
+    def __init__(self, rig: Rig, part: str) -> None:
+        self.reaches: list[ReachFor] = []
+        self.presented: list[list[float]] = []
+        self._reach = rig.bus.publisher(keys.reach(part), Reach, LATEST)
+        rig.serve(keys.goal("*", "reach"), ReachFor, self._asked)
+        rig.serve(keys.world_rpc("add"), AddObject, self._added)
+        rig.serve(keys.world_rpc("remove"), OneName, lambda *_: Done(v=VERSION))
+        super().__init__(rig, part)
+
+    def _added(self, request: AddObject, key: str) -> Done:
+        assert (request.name, request.role) == (TARGET, "target")
+        self.presented.append(request.position)
+        return Done(v=VERSION)
+
+    def _asked(self, request: ReachFor, key: str) -> Started:
+        with self._lock:
+            if request.epoch != self.epoch:
+                raise Refusal("epoch")
+            self.reaches.append(request)
+            self.action_id, self._target, self.start_k = request.action_id, self.q, self.rig.bus.k
+            self._become("moving")
+            return Started(v=VERSION, k=self.rig.bus.k)
+
+    def _become(self, status: str) -> None:
+        super()._become(status)
+        if status == "settled" and self.reaches and self.reaches[-1].action_id == self.action_id:
+            asked, k = self.reaches[-1], self.rig.bus.k
+            told = {"action_id": asked.action_id, "phase": "over", "marker": asked.marker, "object": asked.object, "settled": True}
+            q, at = self.q.tolist(), asked.position
+            self._reach.put(end_k=k - 1, target=at, q=q, position=at, missing=MISSING, touched=["table"], **told)
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Iterator[tuple[Rig, FakeReaches]]:
+    with rig(tmp_path, ROBOT) as made:
+        controller = FakeReaches(made, "right_arm")
+        (tmp_path / "run").mkdir()
+        try:
+            yield made, controller
+        finally:
+            controller.close()
+
+
+def agent(made: Rig, *arguments: str) -> Program:
+    given = ("--part", "right_arm", "--run-dir", str(made.folder / "run"), "--targets", *PLACES)
+    return made.start("services.agents", "agent_right_arm", *given, *arguments)
+
+
+def steps(made: Rig) -> list[dict[str, Any]]:
+    with sqlite3.connect(made.folder / "run" / STORE, timeout=10.0) as database:
+        database.row_factory = sqlite3.Row
+        return [dict(row) for row in database.execute("SELECT * FROM reach_steps ORDER BY n")]
+
+
+def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: tuple[Rig, FakeReaches]) -> None:
+    made, controller = stage
+    stored: list[int] = []
+    controller.on_goal = lambda goal: stored.append(len(steps(made)))
+    assert agent(made, "--tries", "4").wait(30.0) == 0
+    kept = steps(made)
+    assert len(kept) == len(controller.goals) + len(controller.reaches)
+    moves = [row["n"] - 1 for row in kept if row["a"] >= 0]
+    assert stored == moves
+    reached = [row for row in kept if row["a"] < 0]
+    assert [row["problem"] for row in reached] in ([0, 1, 0, 1], [0, 1, 1, 0])
+    assert all(row["missing"] == MISSING and row["reward"] == pytest.approx(1.0 / 3.0) for row in reached)
+    assert {(asked.marker, asked.object, asked.stay) for asked in controller.reaches} == {("right_palm", TARGET, False)}
+    assert [asked.position for asked in controller.reaches] == controller.presented
+
+
+def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeReaches]) -> None:
+    made, controller = stage
+    events = made.record(keys.event("agent_right_arm"), Event)
+    first = agent(made)
+    wait_for(lambda: len(controller.reaches) >= 3, "three reaches")
+    assert first.stop(signal.SIGKILL) == -signal.SIGKILL
+    before = steps(made)
+    assert agent(made, "--tries", "6").wait(30.0) == 0
+    assert steps(made)[: len(before)] == before
+    assert sum(row["a"] < 0 for row in steps(made)) == 6
+    assert [event.code for event in events] == ["resumed"]
+
+
+def test_a_predictor_that_there_is_none_of_is_told_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:
+    made, _ = stage
+    program = made.spawn(
+        "-m", "services.agents", "--endpoint", made.endpoint, "--part", "right_arm", "--targets", *PLACES, "--predictor", "wieghted"
+    )
+    assert program.wait(20.0) == 2
+    assert "Did you mean 'weighted'?" in program.says
+    assert "Traceback" not in program.says
