@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mobee.collision.world import World, link_pose
 from mobee.collision.world_object import seen_from
 from mobee.engine import engine_of
+from mobee.engine.hands import MOST, hands, links_of
 from mobee.errors import InvalidValue, UnknownName
 from mobee.pose import Engine, Pose
 from mobee.robot.robot import Array, Robot
@@ -37,23 +38,31 @@ class Model:
         self.world = World() if world is None else world
         self._engine = _engine(robot, engine)
         self._motors = len(robot.motor_table)
-        self._reaching: str | None = None
-        self._reaching_link = -1
+        self._reaching: str | tuple[str, ...] | None = None
+        self._hands = hands()
 
     @property
-    def reaching(self) -> str | None:
-        """The marker that reaches for the targets, so that its link does not feel them; None: no reach is active."""
+    def reaching(self) -> str | tuple[str, ...] | None:
+        """The marker that reaches for the targets, or some, so that their links and all that these carry do not feel them; None: nobody."""
         return self._reaching
 
     @reaching.setter
-    def reaching(self, marker: str | None) -> None:
-        self._reaching_link = -1 if marker is None else self.robot.marker(marker).link
+    def reaching(self, marker: str | tuple[str, ...] | None) -> None:
+        markers = () if marker is None else (marker,) if isinstance(marker, str) else tuple(marker)
+        if len(markers) > MOST:
+            raise InvalidValue(f"{len(markers)} markers reach at once: {', '.join(markers)}; at most {MOST} may")
+        self._hands = hands(*(self.robot.marker(one).link for one in markers))
         self._reaching = marker
+
+    @property
+    def reaching_links(self) -> tuple[int, ...]:
+        """The links of the markers that reach."""
+        return links_of(self._hands)
 
     def evaluate(self, q: ArrayLike) -> Pose:
         """The pose at q, (n,) or (..., n) rad in the order of robot.motors; raises InvalidValue for any other shape or NaN."""
         value = self._checked(q)
-        pose = Pose(self.robot, self._engine, value, self.world.snapshot, self._reaching_link)
+        pose = Pose(self.robot, self._engine, value, self.world.snapshot, self._hands)
         if value.ndim == 1:
             self.world.follow(pose)
         return pose

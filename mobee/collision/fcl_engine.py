@@ -30,7 +30,7 @@ class FclEngine:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._pairs: tuple[Snapshot | None, int, tuple[Ints, Ints, Ints] | None] = None, -1, None
+        self._pairs: tuple[Snapshot | None, int, tuple[Ints, Ints, Ints] | None] = None, 0, None
 
     def transforms(self, q: Array) -> Array:
         """Every link in the poses q (B, n), (B, L, 4, 4)."""
@@ -45,7 +45,7 @@ class FclEngine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n).
 
-        `reaching`: link that spares the targets, -1 for none; `cut`: a motor feels only what happens to links of its own part.
+        `reaching`: links that spare the targets, see `hands`; `cut`: a motor feels only what happens to links of its own part.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)

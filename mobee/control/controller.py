@@ -11,15 +11,15 @@ from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
 from mobee.control.layout import ACTIVE, FEEDFORWARD, I_ACTIVE, OWN_ACCELERATION, OWN_VELOCITY
-from mobee.control.load import law
+from mobee.control.load import law, reach_law
 from mobee.control.modality import Command, Modality
 from mobee.control.pack import Law, pack
-from mobee.control.reach_law import Reaching, reach_torque
+from mobee.control.packed_reaches import Arrays, PackedReaches
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
 from mobee.kinematics.tables import tables
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Ints
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
@@ -115,12 +115,17 @@ class Controller:
     @property
     def pushed(self) -> bool:
         """Whether forces act on markers, which depend on the pose."""
-        return bool(self._pushes or self._reaches)
+        return bool(self._pushes)
+
+    @property
+    def reaches(self) -> Arrays:
+        """The reaches as compiled code reads them, and keeps its memory: no copy."""
+        return self._reaches.arrays
 
     def client_force(self, q: Array) -> Array:
         """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
         total = np.zeros(len(q))
-        if self.pushed or self._client.any():
+        if self._pushes or self._client.any():
             self._add_client(q, total)
         return total
 
@@ -145,28 +150,26 @@ class Controller:
         """End all forces of the client."""
         self._client = np.zeros(len(self.robot.motors))
         self._pushes: dict[str, Array] = {}
-        self._reaches: dict[str, Reaching] = {}
+        self._reaches = PackedReaches(self.robot)
 
     def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
         """Draw a marker to a target with the motors of one part, against its attractor, until the next, `end_reach` or `clear` (8.2).
 
         Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
         """
-        link = self.robot.marker(marker).link
-        integers = self._packed.integers
-        moving = np.zeros(len(self.robot.motors), dtype=bool)
-        moving[integers[integers[I_ACTIVE] :][: integers[ACTIVE]]] = True
-        moving &= (self.robot.coupling[0][tables(self.robot).ancestry[link]] != 0.0).any(axis=0)
-        where = self.robot.part(part)
-        motors = where.start + np.flatnonzero(moving[where.slice])
-        if not len(motors):
-            raise InvalidValue(f"{part} cannot reach with {marker} on {self.robot.links[link]}: none of the motors that it may move does")
-        self._reaches[part] = Reaching(marker, target, motors)
+        if self._reaches.marker(part) != marker:
+            self._reaches.begin(part, marker, self._drawn(part, marker))
+        self._reaches.aim(part, target)
 
     def end_reach(self, part: str) -> None:
         """End the pull on a part's marker, if there is one."""
         self.robot.part(part)
-        self._reaches.pop(part, None)
+        self._reaches.end(part)
+
+    def still_nears(self, part: str) -> bool:
+        """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
+        row = self._reaches.row(part)
+        return row is not None and bool(reach_law().nears_still(self._packed.integers, self._state, row, *self._reaches.arrays))
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
@@ -210,11 +213,24 @@ class Controller:
             forces = self.forces(self._track.evaluate(q))
         total = checked_force("forces", forces.total, n) + self.client_force(q)
         packed = self._packed
+        if self._reaches:
+            reach_law().add_reaches(packed.integers, packed.floats, q, self._attractor, dt, total, *self._reaches.arrays)
         if self.modality == "torque":
             self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
         commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
         self.last_forces = forces
         return Command(*commands)
+
+    def _drawn(self, part: str, marker: str) -> Ints:
+        """The motors of a part that may be moved and that move a marker."""
+        link, where, integers = self.robot.marker(marker).link, self.robot.part(part).slice, self._packed.integers
+        moving = np.zeros(len(self.robot.motors), dtype=bool)
+        moving[integers[integers[I_ACTIVE] :][: integers[ACTIVE]]] = True
+        moving &= (self.robot.coupling[0][tables(self.robot).ancestry[link]] != 0.0).any(axis=0)
+        motors: Ints = where.start + np.flatnonzero(moving[where])
+        if not len(motors):
+            raise InvalidValue(f"{part} cannot reach with {marker} on {self.robot.links[link]}: none of the motors that it may move does")
+        return motors
 
     def _at_rest(self, q: Array) -> Array:
         state: Array = self._compiled.at_rest(self._packed.integers, self._packed.floats, q)
@@ -227,5 +243,3 @@ class Controller:
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
             self._compiled.add_client(integers, floats, projected, total)
-        for reaching in self._reaches.values():
-            self._compiled.add_client(integers, floats, reach_torque(self.model, reaching, q), total)

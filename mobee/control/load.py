@@ -15,3 +15,14 @@ def law() -> ModuleType:
     from mobee.control import law as compiled
 
     return compiled
+
+
+@cache
+def reach_law() -> ModuleType:
+    """The module `mobee.control.reach_law`, in the same way."""
+    from mobee.engine.load import load
+
+    load()
+    from mobee.control import reach_law as compiled
+
+    return compiled

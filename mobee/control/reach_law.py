@@ -1,43 +1,126 @@
-"""The reach law: a marker of a part is drawn to a target through the Jacobian transpose, against the part's attractor (thesis 8.2)."""
+"""The reach laws: a marker is drawn to a target by the motors of a part, against its attractor (thesis 8.2).  Compiled.
+
+Published: J^T f with f as strong as the marker is far, bounded as a client's force; the spring pulls back all the while.
+Default: see `reacher`; the spring gives way while the reach lasts.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
 
-import numpy as np
-
+from mobee.control.client import share
+from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, MAX_CLIENT, MOTOR, PUBLISHED
+from mobee.control.marker import PackedReach, miss, place_marker
+from mobee.control.reach_layout import (
+    COLUMN,
+    ERROR,
+    FACING,
+    FORCE,
+    MISSING,
+    MOVED,
+    TURNED,
+    WANTED,
+)
+from mobee.control.reach_pull import add_release, nears, pull_marker
+from mobee.control.squash import squash
+from mobee.engine.compiled import entry_exact, inner_exact
 from mobee.robot.robot import Array, Ints
 
-if TYPE_CHECKING:
-    from mobee.model import Model
-    from mobee.reach import ReachTarget
-
-FORCE_GAIN = np.deg2rad(5000.0)  # rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
-TORQUE_GAIN = np.deg2rad(5000.0)  # the same, of a distance of 1 m to a normal that points the other way
+FORCE_GAIN = math.radians(5000.0)  # rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
+TORQUE_GAIN = math.radians(5000.0)  # the same, half of it at a right angle, all of it where the normal points the other way
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reaching:
-    """A marker on its way to a target; `motors`: those that are pulled."""
+@inner_exact
+def published_force(reach: PackedReach) -> None:
+    """J^T f, before it is bounded, in rad/s^2."""
+    real, motors = reach.real, reach.motors
+    twist = 0.0
+    if reach.whole[TURNED] == 1:
+        along = real[FACING] * real[WANTED] + real[FACING + 1] * real[WANTED + 1] + real[FACING + 2] * real[WANTED + 2]
+        twist = TORQUE_GAIN * real[MISSING] * 0.5 * (1.0 - along)
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        force = 0.0
+        for row in range(3):
+            force += FORCE_GAIN * motors[COLUMN + row, i] * real[ERROR + row] + twist * motors[COLUMN + 3 + row, i] * real[ERROR + 3 + row]
+        motors[FORCE, i] = force
 
-    marker: str
-    target: ReachTarget
-    motors: Ints
+
+@inner_exact
+def add_bounded(integers: Ints, floats: Array, reach: PackedReach, total: Array) -> None:
+    """Add L(f) as of a client (see `add_client_force`), of the motors that are pulled."""
+    force, count = reach.motors[FORCE], reach.whole[MOVED]
+    if integers[DIRECTION] == 0:
+        for k in range(count):
+            i = reach.pulled[k]
+            o = F_MOTOR + i * MOTOR
+            total[i] += squash(force[i], floats[o + MAX_CLIENT], floats[o + CLIENT_SLOPE])
+        return
+    squares = 0.0
+    for k in range(count):
+        squares += force[reach.pulled[k]] * force[reach.pulled[k]]
+    length, most = math.sqrt(squares), math.inf
+    for k in range(count):
+        most = min(most, share(floats, reach.pulled[k], length))
+    for k in range(count):
+        total[reach.pulled[k]] += most * force[reach.pulled[k]]
 
 
-def reach_torque(model: Model, reaching: Reaching, q: Array) -> Array:
-    """J^T f at q (n,) rad before it is bounded, shape (n,) in [rad/s^2]."""
-    target = reaching.target
-    pose, jacobian = model.evaluate(q), model.jacobian(q, reaching.marker)[:, reaching.motors]
-    way = target.position - pose.position(reaching.marker)
-    distance = float(np.linalg.norm(way))
-    if target.aim == "surface":
-        way = way * max(0.0, 1.0 - target.radius / distance) if distance > 0.0 else way
-    torque = np.zeros(len(q))
-    torque[reaching.motors] = FORCE_GAIN * jacobian[:3].T @ way
-    if target.normal is not None:
-        normal = pose.normal(reaching.marker)
-        turn = TORQUE_GAIN * np.linalg.norm(way) * 0.5 * (1.0 - normal @ target.normal) * np.cross(normal, target.normal)
-        torque[reaching.motors] += jacobian[3:].T @ turn
-    return torque
+@inner_exact
+def add_reach(integers: Ints, floats: Array, reach: PackedReach, q: Array, attractor: Array, dt: float, total: Array) -> None:
+    """Add the force of a reach at the measured q (n,) rad to `total` (n,) in rad/s^2."""
+    place_marker(reach, q)
+    miss(reach)
+    if integers[PUBLISHED] == 1:
+        published_force(reach)
+        add_bounded(integers, floats, reach, total)
+        return
+    nudged = pull_marker(floats, reach, q, dt)
+    add_bounded(integers, floats, reach, total)
+    add_release(floats, reach, nudged, q, attractor, total)
+
+
+@inner_exact
+def still_nears(integers: Ints, reach: PackedReach, state: Array) -> bool:
+    """Whether a reach goes on although its part has settled; never under the published law."""
+    return integers[PUBLISHED] == 0 and nears(reach, state)
+
+
+@inner_exact
+def reach_of(r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> PackedReach:
+    """Reach r of those in the arrays of `reach_layout`."""
+    return PackedReach(whole[r], pulled[r], driven[r], real[r], chain[r], motors[r])
+
+
+@entry_exact(
+    "void(int64[::1], float64[::1], float64[::1], float64[::1], float64, float64[::1], "
+    "int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])"
+)
+def add_reaches(
+    integers: Ints,
+    floats: Array,
+    q: Array,
+    attractor: Array,
+    dt: float,
+    total: Array,
+    whole: Ints,
+    pulled: Ints,
+    driven: Ints,
+    real: Array,
+    chain: Array,
+    motors: Array,
+) -> None:
+    """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2; the last six: see `reach_layout`."""
+    for r in range(len(whole)):
+        add_reach(integers, floats, reach_of(r, whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
+
+
+@entry_exact(
+    "boolean(int64[::1], float64[:,::1], int64, "
+    "int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])"
+)
+def nears_still(
+    integers: Ints, state: Array, r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array
+) -> bool:
+    """`still_nears` of reach r."""
+    return still_nears(integers, reach_of(r, whole, pulled, driven, real, chain, motors), state)

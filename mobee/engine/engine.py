@@ -38,7 +38,7 @@ class Engine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
 
-        `reaching`: link that spares the targets, -1 for none; `cut`: see `project`.
+        `reaching`: links that spare the targets, see `hands`; `cut`: see `project`.
         """
         here = self.scene_of(snapshot)
         packed, own = here.packed, len(self.robot.shapes)

@@ -16,6 +16,7 @@ MODULES = (
     "mobee.engine.scene",
     "mobee.engine.neighbours",
     "mobee.control.law",
+    "mobee.control.reach_law",
     "mobee.simulation.noise",
     "mobee.simulation.drive",
     "mobee.simulation.loop",

@@ -6,9 +6,10 @@ import numpy as np
 
 from mobee.engine.compiled import inlined, inner
 from mobee.engine.forces import push
+from mobee.engine.hands import BITS
 from mobee.engine.layout import SLOT
 from mobee.engine.narrow.dispatch import overlap
-from mobee.engine.pack import I_LINK, I_NAME, I_ROLE, SHAPES, UInts
+from mobee.engine.pack import I_LINK, I_NAME, I_PARENT, I_ROLE, SHAPES, UInts
 from mobee.engine.scene import CELLS, COUNT, W_START
 from mobee.robot.robot import Array, Ints
 
@@ -31,6 +32,19 @@ def _name(integers: UInts, name: np.uint64, i: np.uint64, own_shapes: int, carri
     """Index into the names: the robot's shapes, then the objects of the snapshot."""
     given = np.int64(integers[name + i])
     return given if given < own_shapes else own_shapes + carried[given - own_shapes]
+
+
+@inlined
+def spares(integers: UInts, link: int, reaching: int) -> bool:
+    """Whether a link is one of those that reach (see `hands`), or carried by one; what carries a link has a smaller number."""
+    while reaching > 0:
+        hand, at = (reaching & ((1 << BITS) - 1)) - 1, link
+        while at > hand:
+            at = np.int64(integers[np.int64(integers[I_PARENT]) + at - 1])
+        if at == hand:
+            return True
+        reaching >>= BITS
+    return False
 
 
 @inner
@@ -74,7 +88,7 @@ def write_contact(
     reals: Array,
     row: np.uint64,
 ) -> np.uint64:
-    """Write the contact of the slots at a and b to a row; returns 1, or 0 if a target is spared by the link that reaches."""
+    """Write the contact of the slots at a and b to a row; returns 1, or 0 if it is a target, spared by what reaches."""
     shapes, link, name, role = integers[SHAPES], integers[I_LINK], integers[I_NAME], integers[I_ROLE]
     i, j = a // _SLOT, b // _SLOT
     n, r = row * _NUMBERS, row * _REALS
@@ -88,7 +102,7 @@ def write_contact(
             _swap(numbers, n, out)
     else:
         order = np.uint64(W_START) + world[CELLS] * world[CELLS + 1] * world[CELLS + 2] + _1
-        if world[order + world[COUNT] + (j - shapes)] == _1 and np.int64(integers[link + i]) == reaching:
+        if world[order + world[COUNT] + (j - shapes)] == _1 and spares(integers, np.int64(integers[link + i]), reaching):
             return _0
         numbers[n + _3] = own_shapes + np.int64(world[order + (j - shapes)])
         numbers[n + _5] = -1

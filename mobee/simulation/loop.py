@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mobee.control.law import advance, constraint_forces, settle_look
-from mobee.control.layout import MOVING, OWN_VELOCITY
+from mobee.control.layout import MOVING, OWN_VELOCITY, SETTLED
 from mobee.control.layout import REFERENCE as OWN_REFERENCE
+from mobee.control.reach_law import add_reach, reach_of, still_nears
+from mobee.control.reach_layout import FIRST as REACHES_FROM
 from mobee.engine.compiled import entry_exact, inner_exact
 from mobee.engine.feel import feel
 from mobee.engine.memory import Memory, memory_of
@@ -38,6 +40,17 @@ class Law(NamedTuple):
     client: Array
     forces: Array
     total: Array
+
+
+class Reaches(NamedTuple):
+    """The reaches under way, see `reach_layout`."""
+
+    whole: Ints
+    pulled: Ints
+    driven: Ints
+    real: Array
+    chain: Array
+    motors: Array
 
 
 class Body(NamedTuple):
@@ -95,12 +108,15 @@ def feel_pose(here: Around, memory: Memory, q: Array, torque: Array) -> np.uint6
 
 
 @inner_exact
-def respond(law: Law, body: Body, k: int, dt: float, q: Array, torque: Array) -> None:
+def respond(law: Law, reaches: Reaches, body: Body, k: int, dt: float, q: Array, torque: Array) -> None:
     """Form the command of tick k."""
     constraint_forces(law.integers, law.floats, q, torque, law.forces[0], law.forces[1], law.forces[2])
     for index in range(len(body.living)):
         i = body.living[index]
         law.total[i] = law.forces[0, i] + law.forces[1, i] + law.forces[2, i] + law.client[i]
+    for r in range(len(reaches.whole)):
+        reach = reach_of(r, reaches.whole, reaches.pulled, reaches.driven, reaches.real, reaches.chain, reaches.motors)
+        add_reach(law.integers, law.floats, reach, q, law.attractor, dt, law.total)
     command = body.commands[k % len(body.commands)]
     advance(law.integers, law.floats, q, dt, law.attractor, law.total, law.state, command)
     if body.mode != TORQUE:
@@ -119,13 +135,25 @@ def move(body: Body, dt: float) -> None:
 
 
 @inner_exact
-def judge(law: Law, parts: Ints, tests: Array, sampled: float) -> bool:
+def goes_on(law: Law, reaches: Reaches, first: int) -> bool:
+    """Whether the part that begins with that motor is reaching, and not there yet although it has settled."""
+    for r in range(len(reaches.whole)):
+        if reaches.whole[r, REACHES_FROM] == first:
+            reach = reach_of(r, reaches.whole, reaches.pulled, reaches.driven, reaches.real, reaches.chain, reaches.motors)
+            return still_nears(law.integers, reach, law.state)
+    return False
+
+
+@inner_exact
+def judge(law: Law, reaches: Reaches, parts: Ints, tests: Array, sampled: float) -> bool:
     """Whether an action has ended, by what the encoders said at time `sampled` [s]."""
     ended = False
     for p in range(len(parts)):
         if parts[p, ACTING] == 0:
             continue
         verdict = settle_look(law.settle, tests[p], sampled, law.state, parts[p, FIRST], parts[p, STOP])
+        if verdict == SETTLED and goes_on(law, reaches, parts[p, FIRST]):
+            continue
         if verdict != MOVING:
             parts[p, ACTING], parts[p, VERDICT] = 0, verdict
             ended = True
@@ -151,6 +179,8 @@ def write(body: Body, law: Law, memory: Memory, count: np.uint64, q: Array, row:
     "float64, boolean, uint64[::1], float64[::1], float64[::1], uint64[::1], int64[::1], boolean[::1], boolean, "
     # Law
     "int64[::1], float64[::1], float64[::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], "
+    # Reaches
+    "int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1], "
     # Body
     "int64[::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1], int64, int64, uint64, float64, "
     # the rest
@@ -183,6 +213,12 @@ def run(
     attractor: Array,
     client: Array,
     forces: Array,
+    reach_whole: Ints,
+    reach_pulled: Ints,
+    reach_driven: Ints,
+    reach_real: Array,
+    reach_chain: Array,
+    reach_motors: Array,
     living: Ints,
     whole: Ints,
     fixed: Array,
@@ -212,6 +248,7 @@ def run(
     here = Around(integers, floats, wide, vertices, world, places, wide_places, carried, own_shapes, reaching, skin, cut, common, slots)
     memory = memory_of(integers, world, reals_memory, pairs_memory, ints, flags)
     law = Law(law_integers, law_floats, settle, law_state, attractor, client, forces, np.empty(len(q)))
+    reaches = Reaches(reach_whole, reach_pulled, reach_driven, reach_real, reach_chain, reach_motors)
     body = Body(living, whole, fixed, state, line, at, commands, mode, substeps, np.uint64(seed), noise)
     count = np.uint64(0)
     for done in range(most):
@@ -221,10 +258,10 @@ def run(
             return done, LOST
         if felt:
             count = feel_pose(here, memory, q, torque)
-        respond(law, body, k, dt, q, torque)
+        respond(law, reaches, body, k, dt, q, torque)
         move(body, dt)
         if len(record) > 0:
             write(body, law, memory, count, q, record[done])
-        if judge(law, parts, tests, k * dt - dt):
+        if judge(law, reaches, parts, tests, k * dt - dt):
             return done + 1, ENDED
     return most, LIMIT

@@ -69,12 +69,9 @@ class Reaches:
         """Begin to draw the marker."""
         if self._target is None:
             raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
-        others = {reach.name for other, reach in self._under_way.items() if reach.end is None and other != part} - {marker}
-        if others:
-            raise InvalidValue(f"{part} cannot reach with {marker} while {', '.join(others)} reaches: one link at a time spares the target")
         self._controller.reach_toward(part, marker, self._target)
-        self._model.reaching = marker
         self._under_way[part] = Reach(marker, stay)
+        self._tell()
 
     def ended(self, part: str, end: Outcome, q: Array) -> bool:
         """Note that a part has settled or timed out, at q (n,) rad; whether it is to be drawn back now."""
@@ -82,7 +79,8 @@ class Reaches:
         if reach.end is None and self._target is not None:
             reach.end, reach.marker = end, self._model.evaluate(q).position(reach.name)
             reach.missing = self._target.missing(reach.marker)
-            self._release(part)
+            self._controller.end_reach(part)
+            self._tell()
             if not reach.stay:
                 return True
             self._controller.set_attractor(part, end.q)
@@ -99,13 +97,14 @@ class Reaches:
     def drop(self, part: str) -> None:
         """Forget a part's reach, if there is one, and end its force."""
         if part in self._under_way:
-            self._release(part)
             del self._under_way[part]
+            self._controller.end_reach(part)
+            self._tell()
 
-    def _release(self, part: str) -> None:
-        self._controller.end_reach(part)
-        if not any(reach.end is None for other, reach in self._under_way.items() if other != part):
-            self._model.reaching = None
+    def _tell(self) -> None:
+        """Tell the model who reaches."""
+        markers = tuple(dict.fromkeys(reach.name for reach in self._under_way.values() if reach.end is None))
+        self._model.reaching = markers[0] if len(markers) == 1 else markers or None
 
 
 def _outcome(reach: Reach, after: Outcome) -> ReachOutcome:

@@ -5,6 +5,7 @@ Joints that none of them drives are gone, and their links one with what carries 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,16 +15,18 @@ from mobee.kinematics import link_transforms
 from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
 
 
-def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True) -> Robot:
+def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True, apart: Sequence[int] = ()) -> Robot:
     """The robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
 
     Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding, and to the
-    last bit if all are alive.  `keep_parts`: links of different parts stay apart, so that forces can be cut between them.
-    `solids` False: fields alone, for solids exert no forces.  Markers, masses and what is carried are left out.
+    last bit if all are alive.  `keep_parts`: links of different parts stay apart, so that forces can be cut between them.  `apart`:
+    links that stay apart from what carries them.  `solids` False: fields alone, for solids exert no forces.  Markers, masses and what
+    is carried are left out.
     """
     kept = (robot.coupling[0][:, alive] != 0.0).any(axis=1)
     if keep_parts:
         kept |= _borders(robot)
+    kept[[link - 1 for link in apart if link > 0]] = True
     brought = _brought(robot, kept)
     link = np.zeros(len(robot.links), dtype=np.intp)  # what each link has become
     joint = np.cumsum(kept) - 1  # and each joint

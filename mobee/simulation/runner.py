@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mobee.control import Controller, Forces
 from mobee.control.layout import FEEDFORWARD, MODALITY, POSITION, REFERENCE, TORQUE
 from mobee.engine import engine_of
+from mobee.engine.hands import hands
 from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array, Ints
@@ -33,6 +34,7 @@ class Runner:
         self._fields = self._neighbours(solids=False)
         self._solids: Neighbours | None = None  # where they are asked for
         self._whole: Neighbours | None = None
+        self._reaching: dict[tuple[int, ...], tuple[Neighbours, int]] = {}  # for links that have reached, with their `hands`
         self._mode = int(controller.law.integers[MODALITY])
         self._commands = np.zeros((command_age, n))
         if self._mode == POSITION:
@@ -59,6 +61,7 @@ class Runner:
         done, why = self._loop.run(
             *self._scene(solids), controller.contact_forces or solids,
             controller.law.integers, controller.law.floats, controller.law.settle, controller.state, controller.goal, client, self._forces,
+            *controller.reaches,
             motors.living, motors.whole, motors.fixed, motors.state, motors.line, motors.at, self._commands, self._mode,
             self._substeps, self._seed, self._noise, parts, tests, self.q, self._torque, record, ticks, self._dt, most,
         )  # fmt: skip
@@ -70,16 +73,28 @@ class Runner:
         """The robot in the world of now, and its memory; with all its links where a link is meant by its name."""
         model = self._controller.model
         snapshot = model.world.snapshot
-        near, reaching = self._fields, -1
-        if snapshot.attached or model.reaching is not None:
+        near, reaching = self._fields, hands()
+        if snapshot.attached:
             near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN)
-            reaching = -1 if model.reaching is None else model.robot.marker(model.reaching).link
+            reaching = hands(*model.reaching_links)
+        elif model.reaching_links:
+            near, reaching = self._sparing(model.reaching_links, solids)
         elif solids:
             near = self._solids = self._solids or self._neighbours(solids=True)
         return (*near.scene(snapshot, reaching, self._cut), *near.memory)
 
     def _neighbours(self, solids: bool) -> Neighbours:
         return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN)
+
+    def _sparing(self, links: tuple[int, ...], solids: bool) -> tuple[Neighbours, int]:
+        """Those of a robot whose reaching links are apart from what carries them, and their `hands`."""
+        known = self._reaching.get((*links, solids))
+        if known is None:
+            robot = self._controller.robot
+            stiff = stiffened(robot, self._alive, self._cut, solids, apart=links)
+            known = Neighbours(engine_of(stiff), SKIN), hands(*(stiff.links.index(robot.links[link]) for link in links))
+            self._reaching[*links, solids] = known
+        return known
 
     def _pose_forces(self, q: Array) -> Array:
         """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""

@@ -1,0 +1,111 @@
+"""The reaches that are under way, as the compiled law reads them (see `reach_layout`)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.control import reach_layout as at
+from mobee.kinematics.tables import tables
+from mobee.robot.robot import Array, Ints, Marker, Robot
+
+if TYPE_CHECKING:
+    from mobee.reach import ReachTarget
+
+Integers = NDArray[np.int64]
+Arrays = tuple[Integers, Integers, Integers, Array, Array, Array]
+
+
+class PackedReaches:
+    """One for each part that reaches; the law keeps its memory in their arrays."""
+
+    __slots__ = ("_markers", "_robot", "arrays")
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._markers: dict[str, str] = {}  # of each part that reaches, in the order of the arrays' rows
+        self.arrays: Arrays = self._stacked([])
+
+    def __bool__(self) -> bool:
+        return bool(self._markers)
+
+    def begin(self, part: str, marker: str, motors: Ints) -> None:
+        """Let a part's motors draw a marker, to nowhere yet; the part's reach before is forgotten."""
+        self.end(part)
+        self._markers[part] = marker
+        self.arrays = self._stacked([*self._rows(), _packed(self._robot, part, self._robot.marker(marker), motors)])
+
+    def aim(self, part: str, target: ReachTarget) -> None:
+        """Tell a part's reach where to."""
+        row = list(self._markers).index(part)
+        whole, real = self.arrays[0][row], self.arrays[3][row]
+        whole[at.SURFACE], whole[at.TURNED] = target.aim == "surface", target.normal is not None
+        real[at.TARGET : at.TARGET + 3], real[at.RADIUS] = target.position, target.radius
+        real[at.WANTED : at.WANTED + 3] = 0.0 if target.normal is None else target.normal
+
+    def end(self, part: str) -> None:
+        """Forget a part's reach, if there is one."""
+        if part in self._markers:
+            rows = self._rows()
+            del rows[list(self._markers).index(part)], self._markers[part]
+            self.arrays = self._stacked(rows)
+
+    def marker(self, part: str) -> str | None:
+        """The marker that a part draws."""
+        return self._markers.get(part)
+
+    def row(self, part: str) -> int | None:
+        """Where a part's reach is in the arrays."""
+        return list(self._markers).index(part) if part in self._markers else None
+
+    def _rows(self) -> list[Arrays]:
+        a, b, c, d, e, f = self.arrays
+        return [(a[r], b[r], c[r], d[r], e[r], f[r]) for r in range(len(a))]
+
+    def _stacked(self, rows: list[Arrays]) -> Arrays:
+        """One reach a row, those with fewer joints or motors filled up."""
+        count, n, drives = len(rows), len(self._robot.motors), _drives(self._robot)
+        joints, tall = max((len(row[2]) for row in rows), default=0), max((len(row[5]) for row in rows), default=0)
+        stacked = (
+            np.zeros((count, at.WHOLE), dtype=np.int64),
+            np.zeros((count, n), dtype=np.int64),
+            np.zeros((count, joints, at.DRIVEN_BY + drives), dtype=np.int64),
+            np.zeros((count, at.REAL)),
+            np.zeros((count, joints, at.LINK + 2 * drives)),
+            np.zeros((count, tall, n)),
+        )
+        for r, row in enumerate(rows):
+            for whole, one in zip(stacked, row, strict=True):
+                whole[r][tuple(slice(0, length) for length in one.shape)] = one
+        return stacked
+
+
+def _drives(robot: Robot) -> int:
+    """The most motors that drive one joint."""
+    return int((robot.coupling[0] != 0.0).sum(axis=1).max(initial=1))
+
+
+def _packed(robot: Robot, part: str, marker: Marker, motors: Ints) -> Arrays:
+    """The arrays of one reach, without a target."""
+    links = tables(robot).ancestry[marker.link]
+    matrix, offset = robot.coupling
+    drives, own, n = _drives(robot), robot.part(part).slice, len(robot.motors)
+    driven = np.zeros((len(links), at.DRIVEN_BY + drives), dtype=np.int64)
+    chain = np.zeros((len(links), at.LINK + 2 * drives))
+    chain[:, at.ANGLE] = np.nan  # no pose yet
+    for k, j in enumerate(links):
+        joint, by = robot.joints[j], np.flatnonzero(matrix[j])
+        pulled = np.isin(by, motors)
+        driven[k, at.SLIDES], driven[k, at.PULLED] = joint.kind == "prismatic", pulled.any()
+        driven[k, at.DRIVEN_BY : at.DRIVEN_BY + len(by)] = by
+        chain[k, at.AXIS : at.AXIS + 3], chain[k, at.PIVOT : at.PIVOT + 3], chain[k, at.OFFSET] = joint.axis, joint.point, offset[j]
+        chain[k, at.LINK : at.LINK + len(by)] = matrix[j, by]
+        chain[k, at.LINK + drives : at.LINK + drives + len(by)] = matrix[j, by] * pulled
+    chain[:1, at.FRAME : at.FRAME + 9] = np.eye(3).ravel()
+    used = 1 + int(np.flatnonzero(driven[:, at.PULLED])[-1])
+    whole = np.array([own.start, own.stop, len(motors), len(links), used, 0, 0], dtype=np.int64)
+    real = np.zeros(at.REAL)
+    real[at.POINT : at.POINT + 3], real[at.NORMAL : at.NORMAL + 3] = marker.position, marker.normal
+    return whole, np.pad(motors, (0, n - len(motors))).astype(np.int64), driven, real, chain, np.zeros((at.ROWS + len(motors), n))

@@ -1,0 +1,299 @@
+"""The default reach law: the marker comes nearer at one RATE in every direction, wherever the arm is.  Compiled.
+
+J^T control swings where commands are late and stops in singular poses (thesis 5.1); see `reacher` for why, and for what is done.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mobee.control.layout import (
+    CLIENT_SLOPE,
+    DAMPING,
+    F_MOTOR,
+    HIGH,
+    LIMIT_WIDTH,
+    LOW,
+    MAX_SPRING,
+    MOTOR,
+    OWN_VELOCITY,
+    STIFFNESS,
+)
+from mobee.control.marker import PackedReach, miss, place_marker
+from mobee.control.reach_layout import (
+    BEFORE,
+    BEGUN,
+    BEST,
+    COLUMN,
+    CURVE,
+    EASE,
+    ERROR,
+    FORCE,
+    GIVE,
+    MOVED,
+    PUSH,
+    SEEN,
+    SINCE,
+    SLOPE,
+    SOLVED,
+    TURNED,
+    WAY,
+)
+from mobee.control.squash import squash
+from mobee.engine.compiled import inner_exact
+from mobee.robot.robot import Array
+
+ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
+RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
+LONGEST = 0.2  # m: beyond it the pull grows no more
+SOFT = 0.1  # of the size of J E J^T: damping
+TOLERANCE = 2e-3  # m
+WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
+NUDGE = 0.1  # rad, out of a singular pose
+BEND = 1e-3  # of the size of J E J^T: curvature that counts
+SMOOTH = 0.25  # s, over which the error is averaged before it is judged
+PATIENCE = 3.0  # s without coming nearer by the tolerance
+NEARING = 2.5e-3  # m/s: a marker that comes nearer faster has not arrived
+PROBE = 1e-4  # rad
+TURNS = 60  # of the power iteration
+NOTHING = 1e-12  # m^2/s, what a marker gives that nothing moves
+
+
+@inner_exact
+def weight(row: int) -> float:
+    """What a row of the Jacobian counts [m]: 1 for positions, ARM for normals."""
+    return 1.0 if row < 3 else ARM
+
+
+@inner_exact
+def slopes(reach: PackedReach) -> None:
+    """J^T error: how fast half the square of the error falls along each motor that is pulled, m^2/rad."""
+    real, motors = reach.real, reach.motors
+    rows = 3 + 3 * reach.whole[TURNED]
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        motors[SLOPE, i] = 0.0
+        for row in range(rows):
+            motors[SLOPE, i] += weight(row) * weight(row) * motors[COLUMN + row, i] * real[ERROR + row]
+
+
+@inner_exact
+def ease_motors(floats: Array, reach: PackedReach, q: Array) -> None:
+    """How fast each motor goes for a torque of 1: slope of the squash over damping; 0 for one that a limit keeps."""
+    motors = reach.motors
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        o = F_MOTOR + i * MOTOR
+        room = 0.5 * floats[o + LIMIT_WIDTH]
+        low, high, way = floats[o + LOW] + room, floats[o + HIGH] - room, motors[SLOPE, i]
+        kept = (q[i] < low and way < 0.0) or (q[i] > high and way > 0.0)
+        motors[EASE, i] = 0.0 if kept else floats[o + CLIENT_SLOPE] / floats[o + DAMPING]
+
+
+@inner_exact
+def give(reach: PackedReach) -> float:
+    """Fill J E J^T, as it counts; its size."""
+    real, motors = reach.real, reach.motors
+    rows = 3 + 3 * reach.whole[TURNED]
+    squares = 0.0
+    for a in range(rows):
+        for b in range(rows):
+            total = 0.0
+            for k in range(reach.whole[MOVED]):
+                i = reach.pulled[k]
+                total += motors[COLUMN + a, i] * motors[EASE, i] * motors[COLUMN + b, i]
+            total *= weight(a) * weight(b)
+            real[GIVE + 6 * a + b] = total
+            squares += total * total
+    return max(math.sqrt(squares), NOTHING)
+
+
+@inner_exact
+def solve(real: Array, rows: int, size: float, soft: float) -> None:
+    """Replace PUSH by the solution of (J E J^T / size + soft) x = PUSH (Cholesky)."""
+    for a in range(rows):
+        for b in range(a + 1):
+            total = real[GIVE + 6 * a + b] / size + (soft if a == b else 0.0)
+            for c in range(b):
+                total -= real[SOLVED + 6 * a + c] * real[SOLVED + 6 * b + c]
+            real[SOLVED + 6 * a + b] = math.sqrt(total) if a == b else total / real[SOLVED + 6 * b + b]
+    for a in range(rows):
+        for c in range(a):
+            real[PUSH + a] -= real[SOLVED + 6 * a + c] * real[PUSH + c]
+        real[PUSH + a] /= real[SOLVED + 6 * a + a]
+    for a in range(rows - 1, -1, -1):
+        for c in range(a + 1, rows):
+            real[PUSH + a] -= real[SOLVED + 6 * c + a] * real[PUSH + c]
+        real[PUSH + a] /= real[SOLVED + 6 * a + a]
+
+
+@inner_exact
+def push_marker(reach: PackedReach, size: float, scale: float) -> None:
+    """The force on the marker: as much in every direction as gives RATE, less where the bend of its path would make it swing.
+
+    For joints i before j the path's second derivative is the axis of i times the column of j: no more than the sizes of both.
+    """
+    real, motors = reach.real, reach.motors
+    rows = 3 + 3 * reach.whole[TURNED]
+    levers, axes = 0.0, 0.0
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        for row in range(3):
+            levers += motors[COLUMN + row, i] * motors[COLUMN + row, i] * motors[EASE, i]
+            axes += motors[COLUMN + 3 + row, i] * motors[COLUMN + 3 + row, i] * motors[EASE, i]
+    soft = SOFT
+    while True:
+        for row in range(rows):
+            real[PUSH + row] = RATE * scale * weight(row) * real[ERROR + row] / size
+        solve(real, rows, size, soft)
+        force, twist = 0.0, 0.0
+        for row in range(3):
+            force += real[PUSH + row] * real[PUSH + row]
+            if rows == 6:
+                twist += real[PUSH + 3 + row] * real[PUSH + 3 + row]
+        if math.sqrt(force * levers * axes) + ARM * math.sqrt(twist) * axes < RATE:
+            return
+        soft *= 2.0
+
+
+@inner_exact
+def curve(floats: Array, reach: PackedReach, q: Array) -> float:
+    """Fill how half the square of the error curves along pairs of motors, as they give way; its size."""
+    motors, moved = reach.motors, reach.whole[MOVED]
+    for k in range(moved):
+        i = reach.pulled[k]
+        here = q[i]
+        for side in range(2):
+            q[i] = here + (PROBE if side == 0 else -PROBE)
+            place_marker(reach, q)
+            miss(reach)
+            slopes(reach)
+            for m in range(moved):
+                j = reach.pulled[m]
+                motors[CURVE + k, j] = motors[SLOPE, j] if side == 0 else (motors[SLOPE, j] - motors[CURVE + k, j]) / (2.0 * PROBE)
+        q[i] = here
+    squares = 0.0
+    for k in range(moved):
+        i = reach.pulled[k]
+        for m in range(k + 1):
+            j = reach.pulled[m]
+            both = 0.5 * (motors[CURVE + k, j] + motors[CURVE + m, i]) * math.sqrt(motors[EASE, i] * motors[EASE, j])
+            motors[CURVE + k, j] = motors[CURVE + m, i] = both
+            squares += both * both if k == m else 2.0 * both * both
+    place_marker(reach, q)
+    miss(reach)
+    slopes(reach)
+    return math.sqrt(squares)
+
+
+@inner_exact
+def find_way(floats: Array, reach: PackedReach, q: Array, size: float) -> bool:
+    """From a pose that the pull does not move: the way (WAY) along which the error falls on both sides; False if there is none.
+
+    The eigenvector of the least eigenvalue, by power iteration.
+    """
+    motors, moved = reach.motors, reach.whole[MOVED]
+    shift = curve(floats, reach, q)
+    for k in range(moved):
+        i = reach.pulled[k]
+        motors[BEFORE, i] = motors[WAY, i]
+        motors[WAY, i] = 1.0 + 0.1 * k
+    least = 0.0
+    for _ in range(TURNS):
+        squares = 0.0
+        for k in range(moved):
+            i = reach.pulled[k]
+            motors[FORCE, i] = shift * motors[WAY, i]
+            for m in range(moved):
+                motors[FORCE, i] -= motors[CURVE + k, reach.pulled[m]] * motors[WAY, reach.pulled[m]]
+            squares += motors[FORCE, i] * motors[FORCE, i]
+        length = math.sqrt(squares)
+        least = shift - length
+        for k in range(moved):
+            i = reach.pulled[k]
+            motors[WAY, i] = motors[FORCE, i] / length if length > 0.0 and motors[EASE, i] > 0.0 else 0.0
+    if least > -BEND * size:
+        for k in range(moved):
+            motors[WAY, reach.pulled[k]] = 0.0
+        return False
+    before, middle = 0.0, 0.0
+    for k in range(moved):
+        i = reach.pulled[k]
+        o = F_MOTOR + i * MOTOR
+        before += motors[WAY, i] * motors[BEFORE, i]
+        middle += motors[WAY, i] * (0.5 * (floats[o + LOW] + floats[o + HIGH]) - q[i])
+    if before < 0.0 or (before == 0.0 and middle < 0.0):
+        for k in range(moved):
+            motors[WAY, reach.pulled[k]] = -motors[WAY, reach.pulled[k]]
+    return True
+
+
+@inner_exact
+def note_missing(reach: PackedReach, dt: float) -> float:
+    """Average the error over SMOOTH, keep for how long it has not become less; what is missing [m]."""
+    real = reach.real
+    share = min(1.0, dt / SMOOTH) if real[BEGUN] == 1.0 else 1.0
+    squares = 0.0
+    for row in range(3 + 3 * reach.whole[TURNED]):
+        real[SEEN + row] += (weight(row) * real[ERROR + row] - real[SEEN + row]) * share
+        squares += real[SEEN + row] * real[SEEN + row]
+    missing = math.sqrt(squares)
+    if real[BEGUN] == 0.0 or missing < real[BEST] - TOLERANCE:
+        real[BEST], real[SINCE] = missing, 0.0
+    real[BEGUN] = 1.0
+    real[SINCE] += dt
+    return missing
+
+
+@inner_exact
+def pull_marker(floats: Array, reach: PackedReach, q: Array, dt: float) -> bool:
+    """Fill the force on the motors (FORCE), before it is bounded, of a marker that is in place; whether WAY leads out of this pose."""
+    real, motors, moved = reach.real, reach.motors, reach.whole[MOVED]
+    rows = 3 + 3 * reach.whole[TURNED]
+    missing = note_missing(reach, dt)
+    slopes(reach)
+    ease_motors(floats, reach, q)
+    size = give(reach)
+    squares, arriving = 0.0, 0.0
+    for row in range(rows):
+        squares += weight(row) * real[ERROR + row] * weight(row) * real[ERROR + row]
+    for k in range(moved):
+        i = reach.pulled[k]
+        arriving += motors[SLOPE, i] * motors[EASE, i] * motors[SLOPE, i]
+    weak = arriving < WEAK * WEAK * size * squares
+    nudged = weak and missing > TOLERANCE and real[SINCE] <= PATIENCE and find_way(floats, reach, q, size)
+    fading = missing / (missing + 0.5 * TOLERANCE)  # so that at the target the encoders' noise is not followed
+    push_marker(reach, size, fading / (1.0 + math.sqrt(squares) / LONGEST))
+    for k in range(moved):
+        i = reach.pulled[k]
+        motors[FORCE, i] = 0.0
+        for row in range(rows):
+            motors[FORCE, i] += weight(row) * motors[COLUMN + row, i] * real[PUSH + row]
+    return nudged
+
+
+@inner_exact
+def add_release(floats: Array, reach: PackedReach, nudged: bool, q: Array, attractor: Array, total: Array) -> None:
+    """Take the springs of the motors that are pulled away from `total` (n,) in rad/s^2, for others a little way along WAY.
+
+    The attractor itself stays, and draws back when the reach has ended.
+    """
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        o = F_MOTOR + i * MOTOR
+        total[i] -= squash(attractor[i] - q[i], floats[o + MAX_SPRING], floats[o + STIFFNESS])
+        if nudged:
+            total[i] += squash(NUDGE * reach.motors[WAY, i], floats[o + MAX_SPRING], floats[o + STIFFNESS])
+
+
+@inner_exact
+def nears(reach: PackedReach, state: Array) -> bool:
+    """Whether the marker still comes nearer, by the law's own velocity: then the reach is not over, however slow its motors are."""
+    real = reach.real
+    squares, speed = 0.0, 0.0
+    for row in range(3 + 3 * reach.whole[TURNED]):
+        squares += weight(row) * real[ERROR + row] * weight(row) * real[ERROR + row]
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        speed += reach.motors[SLOPE, i] * state[OWN_VELOCITY, i]
+    return speed > NEARING * math.sqrt(squares)
