@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.collision.geometry import sphere
+from mobee.collision.snapshot import EMPTY
 from mobee.collision.world import World, link_pose
 from mobee.collision.world_object import seen_from
 from mobee.engine import engine_of
-from mobee.engine.hands import MOST, hands, links_of
+from mobee.engine.hands import MOST, Hand, hands, hands_of
 from mobee.errors import InvalidValue, UnknownName
 from mobee.pose import Engine, Pose
 from mobee.robot.robot import Array, Robot
@@ -40,10 +42,11 @@ class Model:
         self._motors = len(robot.motor_table)
         self._reaching: str | tuple[str, ...] | None = None
         self._hands = hands()
+        self._hand_of: dict[str, Hand] = {}
 
     @property
     def reaching(self) -> str | tuple[str, ...] | None:
-        """The marker that reaches for the targets, or some, so that their links and all that these carry do not feel them; None: nobody."""
+        """The marker that reaches for the targets, or some, so that their hands do not feel them; None: nobody."""
         return self._reaching
 
     @reaching.setter
@@ -51,13 +54,45 @@ class Model:
         markers = () if marker is None else (marker,) if isinstance(marker, str) else tuple(marker)
         if len(markers) > MOST:
             raise InvalidValue(f"{len(markers)} markers reach at once: {', '.join(markers)}; at most {MOST} may")
-        self._hands = hands(*(self.robot.marker(one).link for one in markers))
+        self._hands = hands(*(self.hand(one) for one in markers))
         self._reaching = marker
 
     @property
-    def reaching_links(self) -> tuple[int, ...]:
-        """The links of the markers that reach."""
-        return links_of(self._hands)
+    def hands(self) -> tuple[Hand, ...]:
+        """Those of the markers that reach."""
+        return hands_of(self._hands)
+
+    def hand(self, marker: str) -> Hand:
+        """What does not feel the targets while that marker reaches: its link with all that this carries.
+
+        And the fields of the links of the same part before it, from the first one on that has the marker inside a field at home.
+        """
+        known = self._hand_of.get(marker)
+        if known is None:
+            known = self._hand_of[marker] = self._found_hand(self.robot.marker(marker).link, marker)
+        return known
+
+    def _found_hand(self, link: int, marker: str) -> Hand:
+        home = self.robot.home
+        speck = World()
+        speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, hands()).position(marker))
+        table, _ = self._engine.contacts(home[None], speck.snapshot, hands())
+        around = set(table.first_link[(table.kind == 1) & (table.second_link < 0)].tolist())
+        fields = here = link
+        part = self._part_of(link)
+        while here > 0 and self._part_of(here) == part:
+            fields = here if here in around else fields
+            here = self.robot.joints[here - 1].parent
+        return Hand(link, fields)
+
+    def _part_of(self, link: int) -> str | None:
+        """Which part moves a link, by the nearest motor before it."""
+        while link > 0:
+            driven = np.flatnonzero(self.robot.coupling[0][link - 1])
+            if driven.size:
+                return self.robot.motor_table[int(driven[0])].part
+            link = self.robot.joints[link - 1].parent
+        return None
 
     def evaluate(self, q: ArrayLike) -> Pose:
         """The pose at q, (n,) or (..., n) rad in the order of robot.motors; raises InvalidValue for any other shape or NaN."""

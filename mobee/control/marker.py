@@ -22,6 +22,7 @@ from mobee.control.reach_layout import (
     JOINTS,
     LINK,
     MISSING,
+    MOTION,
     MOVED,
     NORMAL,
     OFFSET,
@@ -154,19 +155,15 @@ def place_marker(reach: PackedReach, q: Array) -> None:
             chain, j, chain[j, SEEN_FROM] - chain[j, PIVOT], chain[j, SEEN_FROM + 1] - chain[j, PIVOT + 1],
             chain[j, SEEN_FROM + 2] - chain[j, PIVOT + 2],
         )  # fmt: skip
+        if reach.driven[j, SLIDES] == 1:
+            chain[j, MOTION], chain[j, MOTION + 1], chain[j, MOTION + 2] = u, v, w
+        else:
+            chain[j, MOTION], chain[j, MOTION + 1], chain[j, MOTION + 2] = v * f - w * e, w * d - u * f, u * e - v * d
+            chain[j, MOTION + 3], chain[j, MOTION + 4], chain[j, MOTION + 5] = u, v, w
         for k in range(drives):
             i, scale = reach.driven[j, DRIVEN_BY + k], chain[j, LINK + drives + k]
-            if reach.driven[j, SLIDES] == 1:
-                motors[COLUMN, i] += scale * u
-                motors[COLUMN + 1, i] += scale * v
-                motors[COLUMN + 2, i] += scale * w
-                continue
-            motors[COLUMN, i] += scale * (v * f - w * e)
-            motors[COLUMN + 1, i] += scale * (w * d - u * f)
-            motors[COLUMN + 2, i] += scale * (u * e - v * d)
-            motors[COLUMN + 3, i] += scale * u
-            motors[COLUMN + 4, i] += scale * v
-            motors[COLUMN + 5, i] += scale * w
+            for row in range(6):
+                motors[COLUMN + row, i] += scale * chain[j, MOTION + row]
 
 
 @inner_exact

@@ -81,9 +81,9 @@ def add_reach(integers: Ints, floats: Array, reach: PackedReach, q: Array, attra
 
 
 @inner_exact
-def still_nears(integers: Ints, reach: PackedReach, state: Array) -> bool:
+def still_nears(integers: Ints, reach: PackedReach) -> bool:
     """Whether a reach goes on although its part has settled; never under the published law."""
-    return integers[PUBLISHED] == 0 and nears(reach, state)
+    return integers[PUBLISHED] == 0 and nears(reach)
 
 
 @inner_exact
@@ -115,12 +115,7 @@ def add_reaches(
         add_reach(integers, floats, reach_of(r, whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
 
 
-@entry_exact(
-    "boolean(int64[::1], float64[:,::1], int64, "
-    "int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])"
-)
-def nears_still(
-    integers: Ints, state: Array, r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array
-) -> bool:
+@entry_exact("boolean(int64[::1], int64, int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])")
+def nears_still(integers: Ints, r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> bool:
     """`still_nears` of reach r."""
-    return still_nears(integers, reach_of(r, whole, pulled, driven, real, chain, motors), state)
+    return still_nears(integers, reach_of(r, whole, pulled, driven, real, chain, motors))

@@ -11,23 +11,24 @@ WHOLE = 7
 TARGET, RADIUS, WANTED, POINT, NORMAL = 0, 3, 4, 7, 10
 # Of the last tick: marker and normal, root frame; what is missing, toward the target, in m (6,), and its length [m].
 AT, FACING, ERROR, MISSING = 13, 16, 19, 25
-# What the default law remembers: what is missing without the encoders' noise (6,), whether it has begun to, the least so far [m], and
-# for how long [s].
-SEEN, BEGUN, BEST, SINCE = 26, 32, 33, 34
+# What the default law remembers: what is missing without the encoders' noise (6,), whether it has begun to, the least so far [m] and
+# for how long [s], and what is left [m].
+SEEN, BEGUN, BEST, SINCE, LEFT = 26, 32, 33, 34, 35
 # Its working space: J E J^T and what is made of it (6, 6) each, and the force on the marker (6,).
-GIVE, SOLVED, PUSH = 35, 71, 107
-REAL = 113
+GIVE, SOLVED, PUSH = 36, 72, 108
+REAL = 114
 
 # The joints between base and marker, integers (reaches, joints, 2 + drives): whether it slides, whether a motor that is pulled drives
 # it, and the motors that do.
 SLIDES, PULLED, DRIVEN_BY = range(3)
 # Floats (reaches, joints, LINK + 2 drives): the line it turns about, at zero pose, and its angle at home.  Of the last tick: angle, sine,
-# cosine, the marker in the frame of what carries the joint (3,), and that frame (9,), row by row.  Then how much each motor drives
-# it; and again, 0 for motors that are not pulled.
-AXIS, PIVOT, OFFSET, ANGLE, SINE, COSINE, SEEN_FROM, FRAME = 0, 3, 6, 7, 8, 9, 10, 13
-LINK = 22
+# cosine, the marker in the frame of what carries the joint (3,), and that frame (9,), row by row; how the joint moves the marker and turns
+# it (6,), root frame.  Then how much each motor drives it; and again, 0 for motors that are not pulled.
+AXIS, PIVOT, OFFSET, ANGLE, SINE, COSINE, SEEN_FROM, FRAME, MOTION = 0, 3, 6, 7, 8, 9, 10, 13, 22
+LINK = 28
 
 # Floats (reaches, ROWS + moved, n): the marker's Jacobian of the last tick (6,), 0 for motors that are not pulled; J^T error; how much
-# each motor gives way; the force; the way out of a singular pose, and before; and how J^T error changes with each motor.
-COLUMN, SLOPE, EASE, FORCE, WAY, BEFORE, CURVE = 0, 6, 7, 8, 9, 10, 11
-ROWS = 11
+# each motor gives way; the force; the way out of a singular pose, and the one before; the way along which the path bends most; which
+# of those pulled it is; and a matrix (moved, n): how J^T of the error, or of the force, changes with each motor.
+COLUMN, SLOPE, EASE, FORCE, WAY, BEFORE, BENT, SPARE, CURVE = 0, 6, 7, 8, 9, 10, 11, 12, 13
+ROWS = 13

@@ -16,27 +16,34 @@ from mobee.control.layout import (
     LOW,
     MAX_SPRING,
     MOTOR,
-    OWN_VELOCITY,
     STIFFNESS,
 )
 from mobee.control.marker import PackedReach, miss, place_marker
 from mobee.control.reach_layout import (
     BEFORE,
     BEGUN,
+    BENT,
     BEST,
     COLUMN,
     CURVE,
+    DRIVEN_BY,
     EASE,
     ERROR,
     FORCE,
     GIVE,
+    LEFT,
+    LINK,
+    MOTION,
     MOVED,
+    PULLED,
     PUSH,
     SEEN,
     SINCE,
     SLOPE,
     SOLVED,
+    SPARE,
     TURNED,
+    USED,
     WAY,
 )
 from mobee.control.squash import squash
@@ -46,16 +53,17 @@ from mobee.robot.robot import Array
 ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
 RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
 LONGEST = 0.2  # m: beyond it the pull grows no more
-SOFT = 0.1  # of the size of J E J^T: damping
+SOFT = 0.03  # of the size of J E J^T: damping
 TOLERANCE = 2e-3  # m
 WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
 NUDGE = 0.1  # rad, out of a singular pose
 BEND = 1e-3  # of the size of J E J^T: curvature that counts
 SMOOTH = 0.25  # s, over which the error is averaged before it is judged
-PATIENCE = 3.0  # s without coming nearer by the tolerance
-NEARING = 2.5e-3  # m/s: a marker that comes nearer faster has not arrived
+PATIENCE = 3.0  # s without coming nearer: no way out is tried any more
+WAIT = 0.6  # s: what has come nearer since has not arrived
+BETTER = 5e-4  # m, that count as nearer
 PROBE = 1e-4  # rad
-TURNS = 60  # of the power iteration
+TURNS, FEW_TURNS = 60, 12  # of the power iteration
 NOTHING = 1e-12  # m^2/s, what a marker gives that nothing moves
 
 
@@ -128,30 +136,103 @@ def solve(real: Array, rows: int, size: float, soft: float) -> None:
 
 
 @inner_exact
-def push_marker(reach: PackedReach, size: float, scale: float) -> None:
-    """The force on the marker: as much in every direction as gives RATE, less where the bend of its path would make it swing.
-
-    For joints i before j the path's second derivative is the axis of i times the column of j: no more than the sizes of both.
-    """
+def bend_at_most(reach: PackedReach) -> float:
+    """No less than `bend`, at little cost: for joints i before j the path's second derivative is the axis of i times the motion of j."""
     real, motors = reach.real, reach.motors
-    rows = 3 + 3 * reach.whole[TURNED]
-    levers, axes = 0.0, 0.0
+    levers, axes, force, twist = 0.0, 0.0, 0.0, 0.0
     for k in range(reach.whole[MOVED]):
         i = reach.pulled[k]
         for row in range(3):
             levers += motors[COLUMN + row, i] * motors[COLUMN + row, i] * motors[EASE, i]
             axes += motors[COLUMN + 3 + row, i] * motors[COLUMN + 3 + row, i] * motors[EASE, i]
+    for row in range(3):
+        force += real[PUSH + row] * real[PUSH + row]
+        if reach.whole[TURNED] == 1:
+            twist += real[PUSH + 3 + row] * real[PUSH + 3 + row]
+    return math.sqrt(force * levers * axes) + ARM * math.sqrt(twist) * axes
+
+
+@inner_exact
+def bend_of(reach: PackedReach, a: int, b: int) -> float:
+    """What the force is times the second derivative of the marker's pose along joints a, the nearer to the base, and b."""
+    real, chain = reach.real, reach.chain
+    u, v, w = chain[a, MOTION + 3], chain[a, MOTION + 4], chain[a, MOTION + 5]
+    found = 0.0
+    for part in range(2 if reach.whole[TURNED] == 1 and a != b else 1):
+        o = MOTION + 3 * part
+        x, y, z = chain[b, o], chain[b, o + 1], chain[b, o + 2]
+        p, q, r = real[PUSH + 3 * part], real[PUSH + 3 * part + 1], real[PUSH + 3 * part + 2]
+        found += (1.0 if part == 0 else 0.5 * ARM) * (p * (v * z - w * y) + q * (w * x - u * z) + r * (u * y - v * x))
+    return found
+
+
+@inner_exact
+def bend(reach: PackedReach) -> float:
+    """What the bend of the marker's path adds to the stiffness of the force at most, along any motion, as the motors give way."""
+    motors, moved, chain = reach.motors, reach.whole[MOVED], reach.chain
+    drives = reach.driven.shape[1] - DRIVEN_BY
+    for k in range(moved):
+        for m in range(moved):
+            motors[CURVE + k, reach.pulled[m]] = 0.0
+        motors[SPARE, reach.pulled[k]] = k
+    for a in range(reach.whole[USED]):
+        for b in range(a, reach.whole[USED]):
+            if reach.driven[a, PULLED] == 0 or reach.driven[b, PULLED] == 0:
+                continue
+            along = bend_of(reach, a, b)
+            for c in range(drives):
+                for d in range(drives):
+                    i, j = reach.driven[a, DRIVEN_BY + c], reach.driven[b, DRIVEN_BY + d]
+                    both = chain[a, LINK + drives + c] * chain[b, LINK + drives + d]
+                    if both != 0.0:
+                        add_pair(motors, i, j, -along * both * math.sqrt(motors[EASE, i] * motors[EASE, j]), a != b)
+    squares = 0.0
+    for k in range(moved):
+        for m in range(moved):
+            squares += motors[CURVE + k, reach.pulled[m]] * motors[CURVE + k, reach.pulled[m]]
+        motors[BENT, reach.pulled[k]] = 1.0 + 0.1 * k
+    return largest(reach, math.sqrt(squares), 1.0, BENT, FEW_TURNS)
+
+
+@inner_exact
+def add_pair(motors: Array, i: int, j: int, value: float, twice: bool) -> None:
+    """Add to the matrix at (i, j), and at (j, i) where that is another pair of joints."""
+    motors[CURVE + int(motors[SPARE, i]), j] += value
+    if twice:
+        motors[CURVE + int(motors[SPARE, j]), i] += value
+
+
+@inner_exact
+def largest(reach: PackedReach, shift: float, sign: float, row: int, turns: int) -> float:
+    """The largest eigenvalue of the matrix times `sign`, all of them within +-`shift`; its vector in that row, where it starts."""
+    motors, moved = reach.motors, reach.whole[MOVED]
+    length = 0.0
+    for _ in range(turns):
+        squares = 0.0
+        for k in range(moved):
+            i = reach.pulled[k]
+            motors[FORCE, i] = shift * motors[row, i]
+            for m in range(moved):
+                motors[FORCE, i] += sign * motors[CURVE + k, reach.pulled[m]] * motors[row, reach.pulled[m]]
+            squares += motors[FORCE, i] * motors[FORCE, i]
+        length = math.sqrt(squares)
+        for k in range(moved):
+            i = reach.pulled[k]
+            motors[row, i] = motors[FORCE, i] / length if length > 0.0 and motors[EASE, i] > 0.0 else 0.0
+    return length - shift
+
+
+@inner_exact
+def push_marker(reach: PackedReach, size: float, scale: float) -> None:
+    """The force on the marker: as much in every direction as gives RATE, less where the bend of its path would make it swing."""
+    real = reach.real
+    rows = 3 + 3 * reach.whole[TURNED]
     soft = SOFT
     while True:
         for row in range(rows):
             real[PUSH + row] = RATE * scale * weight(row) * real[ERROR + row] / size
         solve(real, rows, size, soft)
-        force, twist = 0.0, 0.0
-        for row in range(3):
-            force += real[PUSH + row] * real[PUSH + row]
-            if rows == 6:
-                twist += real[PUSH + 3 + row] * real[PUSH + 3 + row]
-        if math.sqrt(force * levers * axes) + ARM * math.sqrt(twist) * axes < RATE:
+        if bend_at_most(reach) < RATE or bend(reach) < RATE:
             return
         soft *= 2.0
 
@@ -188,31 +269,14 @@ def curve(floats: Array, reach: PackedReach, q: Array) -> float:
 
 @inner_exact
 def find_way(floats: Array, reach: PackedReach, q: Array, size: float) -> bool:
-    """From a pose that the pull does not move: the way (WAY) along which the error falls on both sides; False if there is none.
-
-    The eigenvector of the least eigenvalue, by power iteration.
-    """
+    """From a pose that the pull does not move: the way (WAY) along which the error falls on both sides; False if there is none."""
     motors, moved = reach.motors, reach.whole[MOVED]
     shift = curve(floats, reach, q)
     for k in range(moved):
         i = reach.pulled[k]
         motors[BEFORE, i] = motors[WAY, i]
         motors[WAY, i] = 1.0 + 0.1 * k
-    least = 0.0
-    for _ in range(TURNS):
-        squares = 0.0
-        for k in range(moved):
-            i = reach.pulled[k]
-            motors[FORCE, i] = shift * motors[WAY, i]
-            for m in range(moved):
-                motors[FORCE, i] -= motors[CURVE + k, reach.pulled[m]] * motors[WAY, reach.pulled[m]]
-            squares += motors[FORCE, i] * motors[FORCE, i]
-        length = math.sqrt(squares)
-        least = shift - length
-        for k in range(moved):
-            i = reach.pulled[k]
-            motors[WAY, i] = motors[FORCE, i] / length if length > 0.0 and motors[EASE, i] > 0.0 else 0.0
-    if least > -BEND * size:
+    if largest(reach, shift, -1.0, WAY, TURNS) < BEND * size:
         for k in range(moved):
             motors[WAY, reach.pulled[k]] = 0.0
         return False
@@ -238,10 +302,11 @@ def note_missing(reach: PackedReach, dt: float) -> float:
         real[SEEN + row] += (weight(row) * real[ERROR + row] - real[SEEN + row]) * share
         squares += real[SEEN + row] * real[SEEN + row]
     missing = math.sqrt(squares)
-    if real[BEGUN] == 0.0 or missing < real[BEST] - TOLERANCE:
+    if real[BEGUN] == 0.0 or missing < real[BEST] - BETTER:
         real[BEST], real[SINCE] = missing, 0.0
     real[BEGUN] = 1.0
     real[SINCE] += dt
+    real[LEFT] = missing
     return missing
 
 
@@ -287,13 +352,7 @@ def add_release(floats: Array, reach: PackedReach, nudged: bool, q: Array, attra
 
 
 @inner_exact
-def nears(reach: PackedReach, state: Array) -> bool:
-    """Whether the marker still comes nearer, by the law's own velocity: then the reach is not over, however slow its motors are."""
-    real = reach.real
-    squares, speed = 0.0, 0.0
-    for row in range(3 + 3 * reach.whole[TURNED]):
-        squares += weight(row) * real[ERROR + row] * weight(row) * real[ERROR + row]
-    for k in range(reach.whole[MOVED]):
-        i = reach.pulled[k]
-        speed += reach.motors[SLOPE, i] * state[OWN_VELOCITY, i]
-    return speed > NEARING * math.sqrt(squares)
+def nears(reach: PackedReach) -> bool:
+    """Whether the marker is not there yet and still comes nearer: then the reach is not over, however slow its motors are."""
+    goes_on: bool = reach.real[LEFT] > 0.75 * TOLERANCE and reach.real[SINCE] < WAIT
+    return goes_on

@@ -15,6 +15,7 @@ from mobee.robot.robot import Array, Ints
 
 NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
 
+_LINK = (1 << BITS) - 1
 _0, _1, _2, _3, _4, _5, _6 = (np.uint64(k) for k in range(7))
 _SLOT, _NUMBERS, _REALS = np.uint64(SLOT), np.uint64(NUMBERS), np.uint64(REALS)
 
@@ -35,15 +36,21 @@ def _name(integers: UInts, name: np.uint64, i: np.uint64, own_shapes: int, carri
 
 
 @inlined
-def spares(integers: UInts, link: int, reaching: int) -> bool:
-    """Whether a link is one of those that reach (see `hands`), or carried by one; what carries a link has a smaller number."""
+def carried_by(integers: UInts, link: int, carrier: int) -> bool:
+    """Whether a link is that one, or mounted on it; what carries a link has a smaller number."""
+    while link > carrier:
+        link = np.int64(integers[np.int64(integers[I_PARENT]) + link - 1])
+    return link == carrier
+
+
+@inlined
+def spares(integers: UInts, link: int, field: bool, reaching: int) -> bool:
+    """Whether a volume of a link is one of those that reach, see `hands`."""
     while reaching > 0:
-        hand, at = (reaching & ((1 << BITS) - 1)) - 1, link
-        while at > hand:
-            at = np.int64(integers[np.int64(integers[I_PARENT]) + at - 1])
-        if at == hand:
+        hand, fields = (reaching & _LINK) - 1, (reaching >> BITS & _LINK) - 1
+        if carried_by(integers, link, hand) or (field and carried_by(integers, link, fields)):
             return True
-        reaching >>= BITS
+        reaching >>= 2 * BITS
     return False
 
 
@@ -102,7 +109,9 @@ def write_contact(
             _swap(numbers, n, out)
     else:
         order = np.uint64(W_START) + world[CELLS] * world[CELLS + 1] * world[CELLS + 2] + _1
-        if world[order + world[COUNT] + (j - shapes)] == _1 and spares(integers, np.int64(integers[link + i]), reaching):
+        if world[order + world[COUNT] + (j - shapes)] == _1 and spares(
+            integers, np.int64(integers[link + i]), integers[role + i] == _1, reaching
+        ):
             return _0
         numbers[n + _3] = own_shapes + np.int64(world[order + (j - shapes)])
         numbers[n + _5] = -1

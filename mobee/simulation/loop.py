@@ -140,7 +140,7 @@ def goes_on(law: Law, reaches: Reaches, first: int) -> bool:
     for r in range(len(reaches.whole)):
         if reaches.whole[r, REACHES_FROM] == first:
             reach = reach_of(r, reaches.whole, reaches.pulled, reaches.driven, reaches.real, reaches.chain, reaches.motors)
-            return still_nears(law.integers, reach, law.state)
+            return still_nears(law.integers, reach)
     return False
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mobee.control import Controller, Forces
 from mobee.control.layout import FEEDFORWARD, MODALITY, POSITION, REFERENCE, TORQUE
 from mobee.engine import engine_of
-from mobee.engine.hands import hands
+from mobee.engine.hands import Hand, hands
 from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array, Ints
@@ -34,7 +34,7 @@ class Runner:
         self._fields = self._neighbours(solids=False)
         self._solids: Neighbours | None = None  # where they are asked for
         self._whole: Neighbours | None = None
-        self._reaching: dict[tuple[int, ...], tuple[Neighbours, int]] = {}  # for links that have reached, with their `hands`
+        self._reaching: dict[tuple[tuple[Hand, ...], bool], tuple[Neighbours, int]] = {}  # for hands that have reached, with these
         self._mode = int(controller.law.integers[MODALITY])
         self._commands = np.zeros((command_age, n))
         if self._mode == POSITION:
@@ -76,9 +76,9 @@ class Runner:
         near, reaching = self._fields, hands()
         if snapshot.attached:
             near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN)
-            reaching = hands(*model.reaching_links)
-        elif model.reaching_links:
-            near, reaching = self._sparing(model.reaching_links, solids)
+            reaching = hands(*model.hands)
+        elif model.hands:
+            near, reaching = self._sparing(model.hands, solids)
         elif solids:
             near = self._solids = self._solids or self._neighbours(solids=True)
         return (*near.scene(snapshot, reaching, self._cut), *near.memory)
@@ -86,14 +86,15 @@ class Runner:
     def _neighbours(self, solids: bool) -> Neighbours:
         return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN)
 
-    def _sparing(self, links: tuple[int, ...], solids: bool) -> tuple[Neighbours, int]:
-        """Those of a robot whose reaching links are apart from what carries them, and their `hands`."""
-        known = self._reaching.get((*links, solids))
+    def _sparing(self, reaching: tuple[Hand, ...], solids: bool) -> tuple[Neighbours, int]:
+        """Those of a robot whose hands are apart from what carries them, and their `hands`."""
+        known = self._reaching.get((reaching, solids))
         if known is None:
             robot = self._controller.robot
-            stiff = stiffened(robot, self._alive, self._cut, solids, apart=links)
-            known = Neighbours(engine_of(stiff), SKIN), hands(*(stiff.links.index(robot.links[link]) for link in links))
-            self._reaching[*links, solids] = known
+            stiff = stiffened(robot, self._alive, self._cut, solids, apart=[link for hand in reaching for link in (hand.link, hand.fields)])
+            new = {robot.links.index(name): index for index, name in enumerate(stiff.links)}
+            known = Neighbours(engine_of(stiff), SKIN), hands(*(Hand(new[hand.link], new[hand.fields]) for hand in reaching))
+            self._reaching[reaching, solids] = known
         return known
 
     def _pose_forces(self, q: Array) -> Array:

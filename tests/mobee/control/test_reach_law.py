@@ -1,0 +1,217 @@
+"""The compiled reach law against the Jacobian of the model and against what it is to do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mobee.control import Controller, Gains, Settle
+from mobee.control import reach_layout as at
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model import Model
+from mobee.reach import ReachTarget
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array, Part, Robot
+from mobee.simulation import MotorParameters, OfflinePlant
+from tests.mobee.control.two_parts import two_part_arm
+from tests.mobee.planar import planar_arm, tree
+
+ICUB = load_robot("icub_2014")
+PUBLISHED = Gains.published_2014()
+SEEDS = st.integers(0, 2**32 - 1)
+BOTH = pytest.mark.parametrize("gains", [Gains.default(), PUBLISHED], ids=lambda g: g.law)
+
+
+def poses(robot: Robot, seed: int, count: int = 3) -> Array:
+    return np.random.default_rng(seed).uniform(*robot.limits.T, size=(count, len(robot.motors)))
+
+
+def felt(controller: Controller, q: Array) -> Array:
+    """What a reach adds to the acceleration in one tick from rest, (n,) rad/s^2: the difference it makes to the velocity."""
+    still = Controller(controller.model, controller.gains)
+    for one in (controller, still):
+        one.reset(q)
+    dt = 1e-5  # nothing is at its bound
+    return (controller.step(q, dt).velocity - still.step(q, dt).velocity) / dt
+
+
+def reference(model: Model, part: str, marker: str, target: ReachTarget, q: Array) -> Array:
+    """The published law in NumPy: J^T f of the part's motors, bounded by its norm (degrees as in the 2014 program)."""
+    pose, where = model.evaluate(q), model.robot.part(part).slice
+    jacobian = model.jacobian(q, marker)[:, where] * (Gains.published_2014().weight(model.robot.motors)[where] > 0)
+    error = target.position - pose.position(marker)
+    if target.aim == "surface":
+        error *= max(0.0, 1.0 - target.radius / np.linalg.norm(error))
+    f = 5000.0 * jacobian[:3].T @ error
+    if target.normal is not None:
+        normal = pose.normal(marker)
+        turn = 5000.0 * np.linalg.norm(error) * (1.0 - normal @ target.normal) / 2.0 * np.cross(normal, target.normal)
+        f += jacobian[3:].T @ turn
+    found = np.zeros(len(q))
+    found[where] = np.deg2rad(1000.0 / (1000.0 / 50.0 + np.linalg.norm(f)) * f)
+    return found
+
+
+@given(seed=SEEDS, aim=st.sampled_from(["centre", "surface"]), turned=st.booleans())
+def test_the_published_force_is_the_transposed_jacobian_times_the_way_to_the_target(seed: int, aim: Any, turned: bool) -> None:
+    rng = np.random.default_rng(seed)
+    part, marker = (("right_arm", "right_palm"), ("left_arm", "left_elbow"), ("torso", "left_palm"))[rng.integers(3)]
+    normal = rng.normal(size=3) if turned else None
+    target = ReachTarget(rng.uniform(-0.4, 0.4, 3), float(rng.uniform(0.01, 0.2)), aim, normal)
+    model = Model(ICUB)
+    controller = Controller(model, PUBLISHED)
+    controller.reach_toward(part, marker, target)
+    for q in poses(ICUB, seed):
+        assert felt(controller, q) == pytest.approx(reference(model, part, marker, target, q), abs=1e-8)
+
+
+@given(seed=SEEDS)
+def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> None:
+    """With sliding joints, joints that two motors drive, and motors that drive two joints; ticks that move only some of them."""
+    robot, rng = tree(seed), np.random.default_rng(seed)
+    model = Model(robot)
+    q = robot.home.copy()
+    for link in rng.permutation(len(robot.links))[:3]:
+        marker = f"marker{link}"
+        moving = np.abs(model.jacobian(poses(robot, seed, 1)[0], marker)).max(axis=0) > 0.0
+        controller = Controller(model)
+        if not moving.any():
+            with pytest.raises(InvalidValue, match="none of the motors"):
+                controller.reach_toward("body", marker, ReachTarget(np.zeros(3)))
+            continue
+        controller.reach_toward("body", marker, ReachTarget(rng.normal(size=3), normal=rng.normal(size=3)))
+        for _ in range(4):
+            some = rng.random(len(q)) < 0.4
+            q[some] = poses(robot, int(rng.integers(2**32)), 1)[0][some]
+            controller.step(q, 1e-3)
+            real, motors = controller.reaches[3][0], controller.reaches[5][0]
+            pose = model.evaluate(q)
+            assert real[at.AT : at.AT + 3] == pytest.approx(pose.position(marker), abs=1e-12)
+            assert real[at.FACING : at.FACING + 3] == pytest.approx(pose.normal(marker), abs=1e-12)
+            assert motors[at.COLUMN : at.COLUMN + 6] == pytest.approx(model.jacobian(q, marker), abs=1e-12)
+
+
+@BOTH
+@given(seed=SEEDS)
+def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> None:
+    """Of joints that rest: a law that has just begun says the same.  (The default law's smoothed error is another thing.)"""
+    rng = np.random.default_rng(seed)
+    model, q = Model(ICUB), ICUB.home.copy()
+    target = ReachTarget(rng.uniform(-0.4, 0.4, 3), normal=rng.normal(size=3))
+    old = Controller(model, gains)
+    old.reach_toward("right_arm", "right_palm", target)
+    for new in poses(ICUB, seed, 5):
+        some = rng.random(len(q)) < 0.1
+        q[some] = new[some]
+        old.step(q, 0.01)
+        fresh = Controller(model, gains)
+        fresh.reach_toward("right_arm", "right_palm", target)
+        fresh.step(q, 0.01)
+        for row in (slice(at.AT, at.MISSING + 1),):
+            assert np.array_equal(old.reaches[3][0][row], fresh.reaches[3][0][row])
+        assert np.array_equal(old.reaches[5][0][: at.EASE], fresh.reaches[5][0][: at.EASE])
+
+
+@BOTH
+def test_only_the_parts_own_motors_are_pulled(gains: Gains) -> None:
+    controller = Controller(Model(ICUB), gains)
+    controller.reach_toward("right_arm", "right_palm", ReachTarget((-0.3, 0.1, 0.1)))
+    added = felt(controller, ICUB.home)
+    moved = {ICUB.motors[i] for i in np.flatnonzero(added)}
+    assert moved and moved <= set(ICUB.part("right_arm").motors[:7])
+
+
+@BOTH
+def test_parts_reach_side_by_side_as_each_alone(gains: Gains) -> None:
+    targets = {"right_arm": ReachTarget((-0.3, 0.1, 0.1)), "left_arm": ReachTarget((-0.3, -0.1, 0.2), aim="surface")}
+    both, total = Controller(Model(ICUB), gains), np.zeros(len(ICUB.motors))
+    for part, target in targets.items():
+        alone = Controller(Model(ICUB), gains)
+        for one in (alone, both):
+            one.reach_toward(part, part.split("_")[0] + "_palm", target)
+        total += felt(alone, ICUB.home)
+    assert felt(both, ICUB.home) == pytest.approx(total, abs=1e-9)
+    both.end_reach("right_arm")
+    assert not felt(both, ICUB.home)[ICUB.part("right_arm").slice].any()
+    both.clear()
+    assert not felt(both, ICUB.home).any()
+
+
+def test_inside_the_surface_nothing_pulls() -> None:
+    model = Model(ICUB)
+    palm = model.evaluate(ICUB.home).position("right_palm")
+    controller = Controller(model, PUBLISHED)
+    controller.reach_toward("right_arm", "right_palm", ReachTarget(palm + 0.02, 0.1, "surface"))
+    assert not felt(controller, ICUB.home).any()
+    controller.reach_toward("right_arm", "right_palm", ReachTarget(palm + 0.02, 0.01, "surface"))
+    assert felt(controller, ICUB.home).any()
+
+
+def test_a_part_that_does_not_move_the_marker_cannot_reach_with_it() -> None:
+    controller = Controller(Model(ICUB))
+    with pytest.raises(InvalidValue, match="left_arm cannot reach with right_palm on r_hand"):
+        controller.reach_toward("left_arm", "right_palm", ReachTarget(np.zeros(3)))
+    with pytest.raises(UnknownName, match="Did you mean 'right_palm'"):
+        controller.reach_toward("right_arm", "right_plam", ReachTarget(np.zeros(3)))
+    with pytest.raises(InvalidValue, match="none of the motors"):
+        Controller(Model(ICUB), PUBLISHED.with_motors("r_*", weight=0)).reach_toward("right_arm", "right_palm", ReachTarget(np.zeros(3)))
+
+
+def test_the_published_reach_rests_where_pull_and_spring_are_equal() -> None:
+    long = replace(PUBLISHED, settle=Settle(speed=1e-5, acceleration=1e-4))
+    plant = OfflinePlant(Model(two_part_arm()), gains=long, motors=MotorParameters.ideal())
+    plant.act("arm", np.array([0.6, 0.8]))
+    target = ReachTarget(plant.model.evaluate(np.array([0.0, 0.5, 1.1])).position("tip"), 0.01)
+    plant.present(target)
+    outcome = plant.reach("arm", "tip")
+    q = np.concatenate([[0.0], outcome.q])
+    error = np.array([0.6, 0.8]) - outcome.q
+    spring = long.max_spring * error / (long.max_spring / long.stiffness + np.abs(error))
+    assert outcome.settled and 0.01 < outcome.missing < 0.1
+    assert reference(plant.model, "arm", "tip", target, q)[1:] == pytest.approx(-spring, abs=1e-3)
+
+
+def one_part(robot: Robot) -> Model:
+    return Model(replace(robot, parts={"arm": Part("arm", robot.motors, 0)}))
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.02])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_default_reach_ends_at_a_free_target(seed: int, dt: float) -> None:
+    """Within 2 mm, as the motors' joint sides are; and it does not swing there."""
+    model = one_part(planar_arm())
+    rng = np.random.default_rng(seed)
+    plant = OfflinePlant(model, seed, dt=dt, contact_forces=False)
+    plant.act("arm", rng.uniform([-1.0, 0.4, 0.4], [1.0, 1.5, 1.5]))
+    plant.present(ReachTarget(model.evaluate(rng.uniform([-1.0, 0.4, 0.4], [1.0, 1.5, 1.5])).position("tip")))
+    plant.begin_reach("arm", "tip")
+    outcome = None
+    while plant.model.reaching is not None:
+        before = plant.motors.q
+        plant.tick()
+    outcome = model.evaluate(before).position("tip")
+    assert np.linalg.norm(outcome - plant.model.world.objects["reach_target"].position) < 2e-3
+    assert np.abs(plant.motors.velocities).max() < np.deg2rad(3.0)
+
+
+def test_from_a_stretched_arm_the_default_reach_finds_a_way_inwards() -> None:
+    """J^T f is zero there: the target is on the line of the arm."""
+    plant = OfflinePlant(one_part(planar_arm()), contact_forces=False, motors=MotorParameters.ideal())
+    plant.present(ReachTarget((0.6, 0.0, 0.0)))
+    outcome = plant.reach("arm", "tip")
+    assert outcome.settled and outcome.missing < 2e-3
+    assert plant.measure("arm") == pytest.approx(np.zeros(3), abs=0.02)
+
+
+def test_a_target_out_of_reach_ends_as_near_as_the_arm_can() -> None:
+    plant = OfflinePlant(one_part(planar_arm()), contact_forces=False)
+    plant.act("arm", np.array([0.5, 0.6, 0.7]))
+    plant.present(ReachTarget((1.2, 0.3, 0.0)))
+    outcome = plant.reach("arm", "tip")
+    assert outcome.missing == pytest.approx(np.hypot(1.2, 0.3) - 0.9, abs=0.01)
+    assert outcome.duration < 40.0
