@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.bench.mujoco_peer import load_mujoco
 from experiments.bench.mujoco_stepper import us_per_tick
-from experiments.bench.plant_workload import DT, arm_plant, one_arm, three_agents, trajectory_hash
+from experiments.bench.plant_workload import DT, arm_plant, one_arm, one_arm_reaching, three_agents, trajectory_hash
 from experiments.bench.rounds import one_core
 from experiments.progress import Progress
 
@@ -15,6 +15,7 @@ from experiments.progress import Progress
 REQUIREMENTS = (
     ("one arm, times real time", "one_arm", "times_real_time", 2000.0, 5000.0),
     ("one arm, actions/s", "one_arm", "actions_per_second", 700.0, 1200.0),
+    ("one arm reaching, times real time", "reaching", "times_real_time", 2000.0, 9000.0),
     ("three agents at the table, transitions/s", "three_agents", "actions_per_second", 1500.0, 3000.0),
 )
 
@@ -24,25 +25,28 @@ class Settings:
     """How much is run."""
 
     actions: int = 1000
+    reaches: int = 500
     transitions: int = 3000
     hashed: int = 50
     ticks: int = 5000  # of MuJoCo
     rounds: int = 3  # the median counts
 
 
-QUICK = Settings(actions=100, transitions=300, hashed=10, ticks=500, rounds=1)
+QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500, rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
     """All numbers, for people and scripts; raises MujocoMissing."""
     load_mujoco()
-    found: dict[str, list[dict[str, float]]] = {"one_arm": [], "three_agents": []}
+    found: dict[str, list[dict[str, float]]] = {"one_arm": [], "reaching": [], "three_agents": []}
     mujoco = []
     with one_core() as core, Progress() as progress:
         for number in range(settings.rounds):
             progress.show(number / settings.rounds, "one arm")
             found["one_arm"].append(one_arm(arm_plant(), settings.actions).numbers)
-            progress.show((number + 0.4) / settings.rounds, "three agents")
+            progress.show((number + 0.3) / settings.rounds, "one arm, reaching")
+            found["reaching"].append(one_arm_reaching(arm_plant(), settings.reaches).numbers)
+            progress.show((number + 0.5) / settings.rounds, "three agents")
             found["three_agents"].append(three_agents(settings.transitions).numbers)
             progress.show((number + 0.9) / settings.rounds, "MuJoCo")
             mujoco.append(us_per_tick(arm_plant(), settings.ticks))
@@ -63,7 +67,7 @@ def report(result: dict[str, Any]) -> str:
         f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, rounds: {result['rounds']} (the median counts).",
         f"{'':<32}{'x real time':>12}{'ended/s':>10}{'us/tick':>9}{'s/action':>10}",
     ]
-    for name, title in (("one_arm", "one arm, 256 states"), ("three_agents", "three agents at the table")):
+    for name, title in (("one_arm", "one arm, 256 states"), ("reaching", "one arm, reaching"), ("three_agents", "three agents at the table")):
         one = result[name]
         lines.append(
             f"{title:<32}{one['times_real_time']:>12.0f}{one['actions_per_second']:>10.0f}{one['us_per_tick']:>9.2f}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import mobee
-from mobee import Gains, Lattice, Model, OfflinePlant, World
+from mobee import Gains, Lattice, Model, OfflinePlant, ReachTarget, World
 from mobee.robot.robot import Robot
 
 SEED = 2014
@@ -60,6 +60,21 @@ def one_arm(plant: OfflinePlant, actions: int) -> Pace:
         plant.act("left_arm", goal)
     seconds = time.process_time() - start
     return Pace(seconds, plant.time - begin, round((plant.time - begin) / plant.dt), actions)
+
+
+def one_arm_reaching(plant: OfflinePlant, reaches: int) -> Pace:
+    """From random states of the lattice to random targets in front of the arm; the moves between them do not count."""
+    space, rng = Lattice(plant.robot, LEFT, LEVELS), np.random.default_rng(SEED)
+    seconds = time_reaching = 0.0
+    for number in range(reaches + 5):
+        plant.act("left_arm", space.target(int(rng.integers(len(space)))))
+        plant.present(ReachTarget(rng.uniform((-0.4, -0.4, 0.0), (-0.1, 0.0, 0.4))))
+        begin, start = plant.time, time.process_time()
+        plant.reach("left_arm", "left_palm")
+        if number >= 5:
+            seconds += time.process_time() - start
+            time_reaching += plant.time - begin
+    return Pace(seconds, time_reaching, round(time_reaching / plant.dt), reaches)
 
 
 def three_agents(transitions: int) -> Pace:
