@@ -73,7 +73,7 @@ class Model:
         return known
 
     def _found_hand(self, link: int, marker: str) -> Hand:
-        home = self.robot.home
+        home = self.robot.home.copy()
         speck = World()
         speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, hands()).position(marker))
         table, _ = self._engine.contacts(home[None], speck.snapshot, hands())

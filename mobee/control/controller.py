@@ -168,8 +168,7 @@ class Controller:
 
     def still_nears(self, part: str) -> bool:
         """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
-        row = self._reaches.row(part)
-        return row is not None and bool(reach_law().nears_still(self._packed.integers, row, *self._reaches.arrays))
+        return bool(reach_law().still_nears(self._packed.integers, self.robot.part(part).start, *self._reaches.arrays))
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""

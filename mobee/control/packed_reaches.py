@@ -56,10 +56,6 @@ class PackedReaches:
         """The marker that a part draws."""
         return self._markers.get(part)
 
-    def row(self, part: str) -> int | None:
-        """Where a part's reach is in the arrays."""
-        return list(self._markers).index(part) if part in self._markers else None
-
     def _rows(self) -> list[Arrays]:
         a, b, c, d, e, f = self.arrays
         return [(a[r], b[r], c[r], d[r], e[r], f[r]) for r in range(len(a))]

@@ -7,6 +7,7 @@ Default: see `reacher`; the spring gives way while the reach lasts.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from mobee.control.client import share
 from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, MAX_CLIENT, MOTOR, PUBLISHED
@@ -15,6 +16,7 @@ from mobee.control.reach_layout import (
     COLUMN,
     ERROR,
     FACING,
+    FIRST,
     FORCE,
     MISSING,
     MOVED,
@@ -80,16 +82,37 @@ def add_reach(integers: Ints, floats: Array, reach: PackedReach, q: Array, attra
     add_release(floats, reach, nudged, q, attractor, total)
 
 
-@inner_exact
-def still_nears(integers: Ints, reach: PackedReach) -> bool:
-    """Whether a reach goes on although its part has settled; never under the published law."""
-    return integers[PUBLISHED] == 0 and nears(reach)
+class Reaches(NamedTuple):
+    """All reaches under way, see `reach_layout`."""
+
+    whole: Ints
+    pulled: Ints
+    driven: Ints
+    real: Array
+    chain: Array
+    motors: Array
 
 
 @inner_exact
-def reach_of(r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> PackedReach:
-    """Reach r of those in the arrays of `reach_layout`."""
-    return PackedReach(whole[r], pulled[r], driven[r], real[r], chain[r], motors[r])
+def reach_of(reaches: Reaches, r: int) -> PackedReach:
+    """One of them.  Only for functions that do not count references: its views are not counted."""
+    return PackedReach(reaches.whole[r], reaches.pulled[r], reaches.driven[r], reaches.real[r], reaches.chain[r], reaches.motors[r])
+
+
+@inner_exact
+def add_all(integers: Ints, floats: Array, reaches: Reaches, q: Array, attractor: Array, dt: float, total: Array) -> None:
+    """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2."""
+    for r in range(len(reaches.whole)):
+        add_reach(integers, floats, reach_of(reaches, r), q, attractor, dt, total)
+
+
+@inner_exact
+def goes_on(integers: Ints, reaches: Reaches, first: int) -> bool:
+    """Whether the part that begins with that motor reaches, and goes on although it has settled; never under the published law."""
+    for r in range(len(reaches.whole)):
+        if reaches.whole[r, FIRST] == first:
+            return integers[PUBLISHED] == 0 and nears(reach_of(reaches, r))
+    return False
 
 
 @entry_exact(
@@ -110,12 +133,11 @@ def add_reaches(
     chain: Array,
     motors: Array,
 ) -> None:
-    """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2; the last six: see `reach_layout`."""
-    for r in range(len(whole)):
-        add_reach(integers, floats, reach_of(r, whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
+    """`add_all`, for Python."""
+    add_all(integers, floats, Reaches(whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
 
 
 @entry_exact("boolean(int64[::1], int64, int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])")
-def nears_still(integers: Ints, r: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> bool:
-    """`still_nears` of reach r."""
-    return still_nears(integers, reach_of(r, whole, pulled, driven, real, chain, motors))
+def still_nears(integers: Ints, first: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> bool:
+    """`goes_on`, for Python."""
+    return goes_on(integers, Reaches(whole, pulled, driven, real, chain, motors), first)

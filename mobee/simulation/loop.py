@@ -13,8 +13,7 @@ import numpy as np
 from mobee.control.law import advance, constraint_forces, settle_look
 from mobee.control.layout import MOVING, OWN_VELOCITY, SETTLED
 from mobee.control.layout import REFERENCE as OWN_REFERENCE
-from mobee.control.reach_law import add_reach, reach_of, still_nears
-from mobee.control.reach_layout import FIRST as REACHES_FROM
+from mobee.control.reach_law import Reaches, add_all, goes_on
 from mobee.engine.compiled import entry_exact, inner_exact
 from mobee.engine.feel import feel
 from mobee.engine.memory import Memory, memory_of
@@ -40,17 +39,6 @@ class Law(NamedTuple):
     client: Array
     forces: Array
     total: Array
-
-
-class Reaches(NamedTuple):
-    """The reaches under way, see `reach_layout`."""
-
-    whole: Ints
-    pulled: Ints
-    driven: Ints
-    real: Array
-    chain: Array
-    motors: Array
 
 
 class Body(NamedTuple):
@@ -114,9 +102,7 @@ def respond(law: Law, reaches: Reaches, body: Body, k: int, dt: float, q: Array,
     for index in range(len(body.living)):
         i = body.living[index]
         law.total[i] = law.forces[0, i] + law.forces[1, i] + law.forces[2, i] + law.client[i]
-    for r in range(len(reaches.whole)):
-        reach = reach_of(r, reaches.whole, reaches.pulled, reaches.driven, reaches.real, reaches.chain, reaches.motors)
-        add_reach(law.integers, law.floats, reach, q, law.attractor, dt, law.total)
+    add_all(law.integers, law.floats, reaches, q, law.attractor, dt, law.total)
     command = body.commands[k % len(body.commands)]
     advance(law.integers, law.floats, q, dt, law.attractor, law.total, law.state, command)
     if body.mode != TORQUE:
@@ -135,16 +121,6 @@ def move(body: Body, dt: float) -> None:
 
 
 @inner_exact
-def goes_on(law: Law, reaches: Reaches, first: int) -> bool:
-    """Whether the part that begins with that motor is reaching, and not there yet although it has settled."""
-    for r in range(len(reaches.whole)):
-        if reaches.whole[r, REACHES_FROM] == first:
-            reach = reach_of(r, reaches.whole, reaches.pulled, reaches.driven, reaches.real, reaches.chain, reaches.motors)
-            return still_nears(law.integers, reach)
-    return False
-
-
-@inner_exact
 def judge(law: Law, reaches: Reaches, parts: Ints, tests: Array, sampled: float) -> bool:
     """Whether an action has ended, by what the encoders said at time `sampled` [s]."""
     ended = False
@@ -152,7 +128,7 @@ def judge(law: Law, reaches: Reaches, parts: Ints, tests: Array, sampled: float)
         if parts[p, ACTING] == 0:
             continue
         verdict = settle_look(law.settle, tests[p], sampled, law.state, parts[p, FIRST], parts[p, STOP])
-        if verdict == SETTLED and goes_on(law, reaches, parts[p, FIRST]):
+        if verdict == SETTLED and goes_on(law.integers, reaches, parts[p, FIRST]):
             continue
         if verdict != MOVING:
             parts[p, ACTING], parts[p, VERDICT] = 0, verdict
