@@ -6,6 +6,7 @@ import pytest
 import mobee
 from mobee.collision import tested_pairs as rules
 from mobee.collision.world import World
+from mobee.engine.hands import Hand, hands
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 
 BASE, UPPER, LOWER, OBJECT = 0, 1, 2, 3
@@ -33,8 +34,8 @@ def robot() -> Robot:
     )
 
 
-def pairs_of(robot: Robot, world: World, reaching: int = -1) -> set[tuple[int, int, str]]:
-    columns = rules.tested_pairs(robot, world.snapshot, reaching)
+def pairs_of(robot: Robot, world: World, reaching: Hand | None = None) -> set[tuple[int, int, str]]:
+    columns = rules.tested_pairs(robot, world.snapshot, hands(*() if reaching is None else (reaching,)))
     return {(int(a), int(b), ("solid", "field")[kind]) for a, b, kind in zip(*columns, strict=True)}
 
 
@@ -51,12 +52,18 @@ def test_without_a_world_the_robots_own_pairs_are_tested(robot):
 
 
 def test_an_obstacle_meets_all_but_the_base(robot):
-    assert pairs_of(robot, world_with("obstacle"), LOWER) == {(BASE, LOWER, "solid"), (UPPER, OBJECT, "field"), (LOWER, OBJECT, "solid")}
+    assert pairs_of(robot, world_with("obstacle"), Hand(2, 2)) == {
+        (BASE, LOWER, "solid"),
+        (UPPER, OBJECT, "field"),
+        (LOWER, OBJECT, "solid"),
+    }
 
 
-def test_a_target_spares_the_link_that_reaches(robot):
-    assert pairs_of(robot, world_with("target"), LOWER) == {(BASE, LOWER, "solid"), (UPPER, OBJECT, "field")}
+def test_a_target_spares_the_hand_that_reaches(robot):
+    assert pairs_of(robot, world_with("target"), Hand(2, 2)) == {(BASE, LOWER, "solid"), (UPPER, OBJECT, "field")}
     assert (LOWER, OBJECT, "solid") in pairs_of(robot, world_with("target"))
+    assert pairs_of(robot, world_with("target"), Hand(2, 1)) == {(BASE, LOWER, "solid")}
+    assert pairs_of(robot, world_with("target"), Hand(1, 1)) == {(BASE, LOWER, "solid")}
 
 
 @pytest.mark.parametrize("link", [None, "lower"])

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from mobee.control import Controller, Gains, Settle
 from mobee.control import reach_layout as at
+from mobee.control.load import reach_law
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.reach import ReachTarget
@@ -32,12 +33,10 @@ def poses(robot: Robot, seed: int, count: int = 3) -> Array:
 
 
 def felt(controller: Controller, q: Array) -> Array:
-    """What a reach adds to the acceleration in one tick from rest, (n,) rad/s^2: the difference it makes to the velocity."""
-    still = Controller(controller.model, controller.gains)
-    for one in (controller, still):
-        one.reset(q)
-    dt = 1e-5  # nothing is at its bound
-    return (controller.step(q, dt).velocity - still.step(q, dt).velocity) / dt
+    """What the reaches add to the acceleration at q, their attractor, (n,) rad/s^2."""
+    total = np.zeros(len(q))
+    reach_law().add_reaches(controller.law.integers, controller.law.floats, q.copy(), q.copy(), 0.01, total, *controller.reaches)
+    return total
 
 
 def reference(model: Model, part: str, marker: str, target: ReachTarget, q: Array) -> Array:

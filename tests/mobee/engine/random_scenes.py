@@ -143,7 +143,7 @@ def overlaps(slots: Array, vertices: Array, first: Ints, second: Ints, found: Ar
         found[p, 1:] = out
 
 
-def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: int = -1) -> tuple[NDArray[np.int64], Array]:
+def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: int = 0) -> tuple[NDArray[np.int64], Array]:
     """Numbers (c, 3), kind, first and second, and reals (c, 7) of one pose, in the order of a contact table."""
     transforms, snapshot = link_transforms(robot, q), world.snapshot
     rows, vertices = _rows(robot.shapes)
