@@ -67,7 +67,8 @@ def report(result: dict[str, Any]) -> str:
         f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, rounds: {result['rounds']} (the median counts).",
         f"{'':<32}{'x real time':>12}{'ended/s':>10}{'us/tick':>9}{'s/action':>10}",
     ]
-    for name, title in (("one_arm", "one arm, 256 states"), ("reaching", "one arm, reaching"), ("three_agents", "three agents at the table")):
+    titles = {"one_arm": "one arm, 256 states", "reaching": "one arm, reaching", "three_agents": "three agents at the table"}
+    for name, title in titles.items():
         one = result[name]
         lines.append(
             f"{title:<32}{one['times_real_time']:>12.0f}{one['actions_per_second']:>10.0f}{one['us_per_tick']:>9.2f}"
