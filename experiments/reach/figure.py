@@ -81,8 +81,8 @@ def _choices(axes: Any, mine: Runs, look: int, title: str) -> None:
     chosen = mine.chosen(look)[:STACKED]
     floor = np.zeros(chosen.shape[1])
     for number, one in enumerate(chosen):
-        axes.bar(range(len(one)), one, 1.0, floor, color=f"C{number}")
-        floor += one
+        axes.stairs(floor + one, np.arange(len(one) + 1) - 0.5, baseline=floor, fill=True, color=f"C{number}")
+        floor = floor + one
     axes.set_title(title, fontsize=9)
     axes.set_xlabel("state reached from", fontsize=8)
 

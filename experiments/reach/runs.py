@@ -51,12 +51,13 @@ class Runs:
     def favourites(self, look: int) -> Array:
         """From how many states a run reached in half of its reaches, the most frequent first, (N,)."""
         ordered = -np.sort(-self.chosen(look), axis=1)
-        return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1 for one in ordered], dtype=np.float64)
+        return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, look: int) -> Array:
         """How much higher than the mean of all states the palm is in the states that it reached from, (N,) m."""
         heights = palms()[:, 2]
-        return self.chosen(look) @ heights - heights.mean()
+        above: Array = self.chosen(look) @ heights - heights.mean()
+        return above
 
     def tried(self, tries: int) -> Array:
         """Which share of all pairs of a state and a target was tried in the first so many problem-tries, (N,)."""
@@ -64,7 +65,8 @@ class Runs:
 
     def exploration(self, tries: int) -> Array:
         """How often each state was reached from for each target in the first so many problem-tries, mean of the runs, (27, S): fig. 8.7."""
-        return np.mean([_tried(one, slice(tries)) for one in self.values], axis=0)
+        mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
+        return mean
 
     def concentration(self, first: int, last: int) -> Array:
         """Which share of the problem-tries after the first so many reached from the two most frequent states, (N,)."""
