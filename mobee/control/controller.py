@@ -73,6 +73,7 @@ class Controller:
         self.max_dt = largest_step(self.robot, self.gains)
         self._compiled = law()
         self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
+        self._reaches = PackedReaches(self.robot)
         self.clear()
         self.reset(self.robot.home)
 
@@ -150,7 +151,7 @@ class Controller:
         """End all forces of the client."""
         self._client = np.zeros(len(self.robot.motors))
         self._pushes: dict[str, Array] = {}
-        self._reaches = PackedReaches(self.robot)
+        self._reaches.clear()
 
     def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
         """Draw a marker to a target with the motors of one part, against its attractor, until the next, `end_reach` or `clear` (8.2).
@@ -158,7 +159,7 @@ class Controller:
         Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
         """
         if self._reaches.marker(part) != marker:
-            self._reaches.begin(part, marker, self._drawn(part, marker))
+            self._reaches.begin(part, marker, self._drawn)
         self._reaches.aim(part, target)
 
     def end_reach(self, part: str) -> None:

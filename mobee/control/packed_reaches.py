@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,21 +22,31 @@ Arrays = tuple[Integers, Integers, Integers, Array, Array, Array]
 class PackedReaches:
     """One for each part that reaches; the law keeps its memory in their arrays."""
 
-    __slots__ = ("_markers", "_robot", "arrays")
+    __slots__ = ("_known", "_markers", "_robot", "arrays")
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._known: dict[tuple[str, str], Arrays] = {}  # by part and marker
         self._markers: dict[str, str] = {}  # of each part that reaches, in the order of the arrays' rows
         self.arrays: Arrays = self._stacked([])
 
     def __bool__(self) -> bool:
         return bool(self._markers)
 
-    def begin(self, part: str, marker: str, motors: Ints) -> None:
-        """Let a part's motors draw a marker, to nowhere yet; the part's reach before is forgotten."""
+    def begin(self, part: str, marker: str, drawn: Callable[[str, str], Ints]) -> None:
+        """Let a part draw a marker, to nowhere yet; the part's reach before is forgotten.  `drawn`: by which motors."""
+        known = self._known.get((part, marker))
+        if known is None:
+            known = _packed(self._robot, part, self._robot.marker(marker), drawn(part, marker))
+            self._known[part, marker] = known
         self.end(part)
         self._markers[part] = marker
-        self.arrays = self._stacked([*self._rows(), _packed(self._robot, part, self._robot.marker(marker), motors)])
+        self.arrays = self._stacked([*self._rows(), known])
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._markers.clear()
+        self.arrays = self._stacked([])
 
     def aim(self, part: str, target: ReachTarget) -> None:
         """Tell a part's reach where to."""

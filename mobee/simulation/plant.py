@@ -196,7 +196,8 @@ class OfflinePlant:
             raise InvalidValue("no part is acting: call begin first")
         while (self._parts[acting, ACTING] == 1).all():
             self._run(CHUNK)
-        return [(self._names[p], self._outcome(int(p))) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
+        done = [(self._names[p], int(p)) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
+        return [(name, self._reaches.after(name) or self._outcome(index, self.model.evaluate(self._q))) for name, index in done]
 
     def tick(self) -> None:
         """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
@@ -241,8 +242,10 @@ class OfflinePlant:
         """Let the parts whose reach has settled or timed out be drawn back by their attractors."""
         for part in self._reaches.running:
             index = self._names.index(part)
-            if self._parts[index, ACTING] == 0 and self._reaches.ended(part, self._outcome(index), self._q):
-                self._test(part)
+            if self._parts[index, ACTING] == 0:
+                pose = self.model.evaluate(self._q)
+                if self._reaches.ended(part, self._outcome(index, pose), pose):
+                    self._test(part)
 
     def _test(self, part: str) -> None:
         """Start the part's settle test: in the tick just over, as live, so that the next one is the first to see it."""
@@ -254,8 +257,8 @@ class OfflinePlant:
         if others := [self._names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if self._names[p] != part]:
             raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
 
-    def _outcome(self, index: int) -> Outcome:
+    def _outcome(self, index: int, pose: Pose) -> Outcome:
         name = self._names[index]
         first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
         duration = self.time - self.dt - float(self._tests[index, 0])
-        return Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(self.model.evaluate(self._q), name))
+        return Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(pose, name))

@@ -14,6 +14,7 @@ from mobee.robot.robot import Array
 if TYPE_CHECKING:
     from mobee.control import Controller
     from mobee.model import Model
+    from mobee.pose import Pose
 
 
 @dataclass(slots=True, eq=False)
@@ -35,6 +36,7 @@ class Reaches:
         self._target: ReachTarget | None = None
         self._under_way: dict[str, Reach] = {}
         self._ended: dict[str, ReachOutcome] = {}
+        self._told: dict[str, Outcome] = {}  # how parts came to rest, until somebody asks
 
     @property
     def running(self) -> tuple[str, ...]:
@@ -69,15 +71,17 @@ class Reaches:
         """Begin to draw the marker."""
         if self._target is None:
             raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
-        self._controller.reach_toward(part, marker, self._target)
+        target = self._target
+        self.drop(part)
+        self._controller.reach_toward(part, marker, target)
         self._under_way[part] = Reach(marker, stay)
         self._tell()
 
-    def ended(self, part: str, end: Outcome, q: Array) -> bool:
-        """Note that a part has settled or timed out, at q (n,) rad; whether it is to be drawn back now."""
+    def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
+        """Note that a part has settled or timed out in a pose; whether it is to be drawn back now."""
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:
-            reach.end, reach.marker = end, self._model.evaluate(q).position(reach.name)
+            reach.end, reach.marker = end, pose.position(reach.name)
             reach.missing = self._target.missing(reach.marker)
             self._controller.end_reach(part)
             self._tell()
@@ -85,6 +89,7 @@ class Reaches:
                 return True
             self._controller.set_attractor(part, end.q)
         self._ended[part] = _outcome(reach, end)
+        self._told[part] = end
         del self._under_way[part]
         return False
 
@@ -94,8 +99,13 @@ class Reaches:
             raise InvalidValue(f"{part} has not ended a reach on this plant")
         return self._ended[part]
 
+    def after(self, part: str) -> Outcome | None:
+        """How a part came to rest after a reach that nobody has asked about yet."""
+        return self._told.pop(part, None)
+
     def drop(self, part: str) -> None:
         """Forget a part's reach, if there is one, and end its force."""
+        self._told.pop(part, None)
         if part in self._under_way:
             del self._under_way[part]
             self._controller.end_reach(part)
