@@ -20,7 +20,7 @@ from mobee.learning.reaching.acting import move, reach
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Array, Ints
 
-TRIES = 8  # of everything
+TRIES = 5  # of everything
 SEED = 9001  # no learner has it
 CARRIES = 3  # attempts to come to a state
 BLOCKED = 0.5  # share of tries that do not end in their goal, from which a transition counts as blocked
