@@ -33,7 +33,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 
 def test_each_example_has_its_own_number_and_fits_a_hundred_lines() -> None:
-    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 11)]
+    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 12)]
     assert {path.name: len(path.read_text().splitlines()) for path in EXAMPLES.values() if len(path.read_text().splitlines()) > 100} == {}
 
 
@@ -133,3 +133,11 @@ def test_10_plans_round_what_fails(tmp_path: Path) -> None:
     assert all(
         (before, after) not in ((15, 24), (42, 51), (69, 78)) for path in paths for before, after in zip(path, path[1:], strict=False)
     )
+
+
+def test_11_reaches_a_place_never_tried_before(tmp_path: Path) -> None:
+    text = printed("11", tmp_path)
+    scores = [float(score) for score in re.findall(r"tries: (\S+) of 8", text)]
+    assert len(scores) == 3 and all(3.0 < score < 8.0 for score in scores)
+    missing, reward = numbers(r"state \d+: (\S+) mm are missing, reward (\S+)", text)
+    assert missing < 20.0 and reward == pytest.approx(1 / (1 + missing / 10), abs=0.01)
