@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from bus_schema.messages import MotionStatus
@@ -40,10 +40,11 @@ class Action:
         self._test = SettleTest(self._settle, t)
         self._become("moving", k)
 
-    def look(self, k: int, t: float, speeds: Array, accelerations: Array) -> None:
-        """See whether the motion has died down."""
+    def look(self, k: int, t: float, speeds: Array, accelerations: Array, is_under_way: Callable[[], bool] = lambda: False) -> None:
+        """See whether the motion has died down; `is_under_way`: whether an action that has settled is not over all the same."""
         if self._test is not None and self.status == "moving":
-            self._become(self._test.look(t, speeds, accelerations), k)
+            verdict = self._test.look(t, speeds, accelerations)
+            self._become("moving" if verdict == "settled" and is_under_way() else verdict, k)
 
     def hold(self, k: int) -> None:
         """The part is not under control: whatever was going on ended without an outcome."""

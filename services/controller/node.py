@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -176,7 +177,7 @@ class ControllerNode:
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
-                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where])
+                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where], partial(self._law.still_nears, part))
                 self._reaches.look(part, tick, touched.get(part, []))
         self._last = tick, orders, before
         return orders, getattr(command, modality)

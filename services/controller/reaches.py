@@ -13,6 +13,7 @@ from bus_schema.messages import Reach as ReachMessage
 from bus_schema.messages import ReachPhase, Targets
 from bus_schema.rpc import ReachFor
 from mobee import Controller
+from mobee.engine.hands import MOST
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Array, Robot
@@ -41,7 +42,7 @@ class Reach:
 
 
 class Reaches:
-    """Begins, follows and ends the reaches of all parts; in the law it is one marker at a time that the target does not repel."""
+    """Begins, follows and ends the reaches of all parts."""
 
     def __init__(self, bus: Bus, robot: Robot, law: Controller, actions: Mapping[str, Action], measured: Callable[[], Array]) -> None:
         """`measured`: q (n,) rad at the newest tick."""
@@ -52,9 +53,9 @@ class Reaches:
     def begin(self, part: str, asked: ReachFor) -> None:
         """Force the part from now on.  Raises InvalidValue, UnknownName for what cannot be reached for."""
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
-        for other, reach in self._last.items():
-            if other != part and reach.phase == "reaching" and reach.marker != asked.marker:
-                raise InvalidValue(f"{other} is reaching with {reach.marker!r}: one marker at a time is spared by what it reaches for")
+        others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
+        if len(others) >= MOST:
+            raise InvalidValue(f"{' and '.join(sorted(others))} are reaching: at most {MOST} markers are spared by what they reach for")
         self._law.reach_toward(part, asked.marker, target)
         self._last[part] = Reach(asked.action_id, asked.marker, asked.object, target, asked.stay, *self._here(asked.marker), self._bus.k)
         self._tell(part)

@@ -15,6 +15,7 @@ from mobee import Gains, Model, load_world
 from mobee.collision.contact import Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
+from mobee.engine.hands import MOST
 from mobee.errors import MobeeError
 from mobee.kinematics.quaternion import from_matrix
 from mobee.model import Pose as ModelPose
@@ -73,7 +74,7 @@ class ModelNode:
         self._model.reaching = None
 
     def _note_reach(self, part: str, reach: Reach) -> None:
-        """The link of the marker that reaches does not feel the targets."""
+        """Hands that reach do not feel the targets."""
         if reach.marker not in self._robot.markers:
             self._service.bus.reject("value", f"a reach of {part} with {reach.marker!r}: this robot has no such marker")
             return
@@ -81,7 +82,7 @@ class ModelNode:
             self._reaches[part] = reach
         else:
             self._reaches.pop(part, None)
-        self._model.reaching = next((one.marker for one in self._reaches.values()), None)
+        self._model.reaching = tuple(dict.fromkeys(one.marker for one in self._reaches.values()))[:MOST] or None
 
     def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
