@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from mobee.errors import UnknownName
+from mobee.learning.reaching.alike import AlikeFailures
 from mobee.learning.reaching.histories import Histories
+from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.space import Space
 from mobee.robot.robot import Array
 
-FAILURES = ("spread", "local")
+FAILURES = ("spread", "local", "alike")
 NEAR = 0.025  # m: targets of the published size this near one another are in the way of nearly the same
 
 
@@ -20,14 +25,9 @@ class Failures:
         scale: m, the unit of distances.
         kind: "spread": every failure tells a little of every target (thesis eq. 8.1, with 1 added to its denominator, or one failure
             would forbid a transition on all targets); "local": it tells of targets within 25 mm alone.
-
-    Raises:
-        UnknownName: no such kind.
     """
 
-    def __init__(self, states: int, actions: int, scale: float, kind: str = "spread") -> None:
-        if kind not in FAILURES:
-            raise UnknownName("way to remember failures", kind, FAILURES)
+    def __init__(self, states: int, actions: int, scale: float, kind: Literal["spread", "local"] = "spread") -> None:
         self._shape = states, actions
         self._histories = Histories(states * actions, scale, NEAR if kind == "local" else np.inf)
 
@@ -44,3 +44,15 @@ class Failures:
         other = object.__new__(Failures)
         other._shape, other._histories = self._shape, self._histories.copy()
         return other
+
+
+def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
+    """What remembers failures in that way: "spread", "local", see `Failures`, or "alike", see `AlikeFailures`.
+
+    Raises UnknownName if there is no such way.
+    """
+    if kind not in FAILURES:
+        raise UnknownName("way to remember failures", kind, FAILURES)
+    if kind == "alike":
+        return AlikeFailures(space, reaches)
+    return Failures(len(space), space.goals.shape[1], reaches.scale, "local" if kind == "local" else "spread")

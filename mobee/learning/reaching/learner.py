@@ -9,7 +9,7 @@ import numpy as np
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.draws import Draws
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.failures import Failures
+from mobee.learning.reaching.failures import failures_of
 from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.problems import Problems
@@ -49,7 +49,7 @@ class ReachLearner:
             raise InvalidValue(f"penalty={penalty!r}, limit={limit!r}: valid are a reward below 0, and at least 1 action a problem-try.")
         self.space, self.part, self.reaches, self.model = space, space.part, reaches, model
         self.predictor = PREDICTORS[predictor](reaches) if isinstance(predictor, str) else predictor
-        self.failures = Failures(len(space), space.goals.shape[1], reaches.scale, failures)
+        self.failures = failures_of(space, reaches, failures)
         """What is known of failed transitions."""
         self.problems = Problems()
         """What was reached for."""

@@ -36,7 +36,7 @@ class ReachAgent(ReachLearner):
         marker: what is to come to the targets.
         predictor: of rewards, a name in `predictors.PREDICTORS` or an object that has seen nothing yet; "weighted" is the thesis'.
         strategy: what it pursues while it learns, a name in `strategies.STRATEGIES`: "intrinsic", "greedy" and "random" are the thesis'.
-        failures: how failed transitions are remembered, "spread" over all targets as published or "local".
+        failures: how failed transitions are remembered, "spread" over all targets as published, "local", or as a hint to others "alike".
         discount: of future rewards in the plan.
         scale: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
         penalty: the reward of a failed transition.

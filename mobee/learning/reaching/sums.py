@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import exp, sqrt
 
 import numpy as np
 
 from mobee.engine.compiled import entry_exact
 from mobee.robot.robot import Array, Ints
+
+FAR = 30.0  # squared distance at which a Gaussian weight, 3e-7, is taken for none
 
 
 @entry_exact("void(float64[:,::1], int64, float64[::1], float64, float64, int64[:,::1], float64[:,::1], int64, float64[::1], float64[::1])")
@@ -29,3 +31,23 @@ def weighted_sums(
         action, share = keys[k, 0], weight[keys[k, 1]]
         totals[action] += share * sums[k, 0]
         weights[action] += share * sums[k, 1]
+
+
+@entry_exact("void(float64[:,::1], float64[:,::1], int64, int64, float64[:,::1])")
+def gaussian_sums(asked: Array, events: Array, first: int, end: int, sums: Array) -> None:
+    """Add to `sums` (2, n), at each point asked about (n, d), the weights times values of events, and the weights.
+
+    Events first to end are rows of a point and a value, (..., d + 1).  The weight at a distance r is exp(-r^2 / 2).
+    """
+    for k in range(first, end):
+        for i in range(len(asked)):
+            far = 0.0
+            for axis in range(asked.shape[1]):
+                gap = asked[i, axis] - events[k, axis]
+                far += gap * gap
+                if far > FAR:
+                    break
+            if far <= FAR:
+                weight = exp(-0.5 * far)
+                sums[0, i] += weight * events[k, asked.shape[1]]
+                sums[1, i] += weight

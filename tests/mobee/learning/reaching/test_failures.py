@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from mobee.errors import UnknownName
-from mobee.learning.reaching.failures import Failures
+from mobee.learning.reaching.failures import FAILURES, Failures, failures_of
+from mobee.learning.reaching.predictors import Reaches
+from tests.mobee.learning.reaching.toy import HANDS, SPACE
 
 HERE, THERE = np.zeros(3), np.array([0.2, 0.0, 0.0])
 
@@ -45,4 +47,10 @@ def test_a_copy_goes_its_own_way():
 
 def test_an_unknown_kind_is_refused():
     with pytest.raises(UnknownName, match="local"):
-        Failures(3, 4, 0.01, "locale")
+        failures_of(SPACE, Reaches(SPACE.samples, HANDS), "locale")
+
+
+@pytest.mark.parametrize("kind", FAILURES)
+def test_every_kind_is_made_by_its_name_and_expects_no_failure_at_first(kind):
+    failures = failures_of(SPACE, Reaches(SPACE.samples, HANDS), kind)
+    assert failures.rewards(HERE).tolist() == np.zeros(SPACE.goals.shape).tolist()
