@@ -19,7 +19,7 @@ def test_a_learner_is_made_again_from_its_record(tmp_path, predictor):
     path = tmp_path / "run.sqlite"
     with ReachStore(path, PART) as store:
         learner = agent(store=store, predictor=predictor, failures="local", strategy="random")
-        learner.learn(TARGETS, 30)
+        learner.learn(TARGETS, 12)
     loaded = load_reaches(path, plant(), hands=HANDS)
     assert loaded.predictor.mean(PLACES[7]).tolist() == learner.predictor.mean(PLACES[7]).tolist()
     assert loaded.failures.rewards(PLACES[7]).tolist() == learner.failures.rewards(PLACES[7]).tolist()
