@@ -8,7 +8,7 @@ Run time: 25 minutes on 2 cores.
 The arm, its targets and its evaluations are those of `reach`; all learners have the same seeds, problems and transition models.  The oracle
 plans in the same way, but knows the mean reward of every reach and which transitions a target blocks, both measured by 5 tries of each
 on the plant (truth.npz in the run's folder).  Fractions are of the oracle's mean score over all seeds, so that they can exceed 1 by chance.
-Targets never tried: the middles of the grid's eight cells.  "spread" and "local": how failed transitions are remembered.
+Targets never tried: the middles of the grid's eight cells.  "spread", "local", "alike": how failed transitions are remembered.
 """
 
 from __future__ import annotations

@@ -30,9 +30,10 @@ LEARNERS = {
     "networks-thompson": Learner("networks", "thompson", cost=2.0),
     "gp-greedy": Learner("gp", "greedy", cost=2.0),
     "gp-ucb": Learner("gp", "ucb", cost=2.0),
+    "gp-ucb-alike": Learner("gp", "ucb", "alike", cost=2.0),
     "gp-thompson": Learner("gp", "thompson", cost=2.0),
     "gp-progress": Learner("gp", "progress", cost=2.0),
     "gp-ucb-spread": Learner("gp", "ucb", "spread", cost=2.0),
 }
-SHIPPED = "gp-ucb"  # what `mobee reach` learns with
+SHIPPED = "gp-ucb-alike"  # what `mobee reach` learns with
 PUBLISHED = "published"

@@ -22,7 +22,9 @@ class Known:
     """A predictor that says the true mean rewards (S,) of each of the targets that were measured."""
 
     def __init__(self, truth: Truth, scale: float) -> None:
-        self._rewards: dict[bytes, Array] = dict(zip(((place + 0.0).tobytes() for place in truth.places), truth.rewards(scale), strict=True))
+        self._rewards: dict[bytes, Array] = dict(
+            zip(((place + 0.0).tobytes() for place in truth.places), truth.rewards(scale), strict=True)
+        )
         self.settings: dict[str, Any] = {"name": "known", "scale": scale}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
