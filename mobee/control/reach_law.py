@@ -77,7 +77,7 @@ def add_reach(integers: Ints, floats: Array, reach: PackedReach, q: Array, attra
         published_force(reach)
         add_bounded(integers, floats, reach, total)
         return
-    nudged = pull_marker(floats, reach, q, dt)
+    nudged = pull_marker(floats, reach, q, dt, total)
     add_bounded(integers, floats, reach, total)
     add_release(floats, reach, nudged, q, attractor, total)
 

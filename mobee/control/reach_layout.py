@@ -14,9 +14,9 @@ AT, FACING, ERROR, MISSING = 13, 16, 19, 25
 # What the default law remembers: what is missing without the encoders' noise (6,), whether it has begun to, the least so far [m] and
 # for how long [s], and what is left [m].
 SEEN, BEGUN, BEST, SINCE, LEFT = 26, 32, 33, 34, 35
-# Its working space: J E J^T and what is made of it (6, 6) each, and the force on the marker (6,).
-GIVE, SOLVED, PUSH = 36, 72, 108
-REAL = 114
+# Its working space: J E J^T and what is made of it (6, 6) each, the force on the marker (6,), and where a wall pushes it (6,).
+GIVE, SOLVED, PUSH, AWAY = 36, 72, 108, 114
+REAL = 120
 
 # The joints between base and marker, integers (reaches, joints, 2 + drives): whether it slides, whether a motor that is pulled drives
 # it, and the motors that do.

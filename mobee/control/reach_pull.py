@@ -20,6 +20,7 @@ from mobee.control.layout import (
 )
 from mobee.control.marker import PackedReach, miss, place_marker
 from mobee.control.reach_layout import (
+    AWAY,
     BEFORE,
     BEGUN,
     BENT,
@@ -50,6 +51,7 @@ from mobee.control.squash import squash
 from mobee.engine.compiled import inner_exact
 from mobee.robot.robot import Array
 
+WALL = 2.0  # rad/s^2: what holds the motors back half counts as a wall where it is that strong
 ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
 RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
 LONGEST = 0.2  # m: beyond it the pull grows no more
@@ -311,8 +313,69 @@ def note_missing(reach: PackedReach, dt: float) -> float:
 
 
 @inner_exact
-def pull_marker(floats: Array, reach: PackedReach, q: Array, dt: float) -> bool:
-    """Fill the force on the motors (FORCE), before it is bounded, of a marker that is in place; whether WAY leads out of this pose."""
+def force_motors(reach: PackedReach) -> None:
+    """Fill the force on the motors: J^T of that on the marker."""
+    motors = reach.motors
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        motors[FORCE, i] = 0.0
+        for row in range(3 + 3 * reach.whole[TURNED]):
+            motors[FORCE, i] += weight(row) * motors[COLUMN + row, i] * reach.real[PUSH + row]
+
+
+@inner_exact
+def into_wall(reach: PackedReach, against: Array) -> float:
+    """How fast the motors would go against what holds them back, (n,) rad/s^2 (limits, clauses, contacts); negative if with it."""
+    speed = 0.0
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        speed -= against[i] * reach.motors[EASE, i] * reach.motors[FORCE, i]
+    return speed
+
+
+@inner_exact
+def face_wall(reach: PackedReach, against: Array) -> float:
+    """Take what holds the motors back as a direction in which they give no way, the less the weaker it is; how much of it is taken."""
+    real, motors, moved = reach.real, reach.motors, reach.whole[MOVED]
+    rows = 3 + 3 * reach.whole[TURNED]
+    squares, across = 0.0, 0.0
+    for k in range(moved):
+        i = reach.pulled[k]
+        squares += against[i] * against[i]
+        across += against[i] * motors[EASE, i] * against[i]
+    if across == 0.0:
+        return 0.0
+    length = math.sqrt(squares)
+    share = length / (length + WALL) / across
+    for row in range(rows):
+        real[AWAY + row] = 0.0
+        for k in range(moved):
+            i = reach.pulled[k]
+            real[AWAY + row] += weight(row) * motors[COLUMN + row, i] * motors[EASE, i] * against[i]
+    for a in range(rows):
+        for b in range(rows):
+            real[GIVE + 6 * a + b] -= share * real[AWAY + a] * real[AWAY + b]
+    return share
+
+
+@inner_exact
+def slide(reach: PackedReach, against: Array, size: float, scale: float) -> None:
+    """Fill the forces again for a marker whose motors are held back: along the wall, not into it."""
+    share = face_wall(reach, against)
+    push_marker(reach, size, scale)
+    force_motors(reach)
+    speed = into_wall(reach, against)
+    for k in range(reach.whole[MOVED]):
+        i = reach.pulled[k]
+        reach.motors[FORCE, i] += share * speed * against[i]
+
+
+@inner_exact
+def pull_marker(floats: Array, reach: PackedReach, q: Array, dt: float, against: Array) -> bool:
+    """Fill the force on the motors (FORCE), before it is bounded, of a marker that is in place; whether WAY leads out of this pose.
+
+    `against` (n,) rad/s^2: what else acts on the motors than their springs.
+    """
     real, motors, moved = reach.real, reach.motors, reach.whole[MOVED]
     rows = 3 + 3 * reach.whole[TURNED]
     missing = note_missing(reach, dt)
@@ -328,12 +391,11 @@ def pull_marker(floats: Array, reach: PackedReach, q: Array, dt: float) -> bool:
     weak = arriving < WEAK * WEAK * size * squares
     nudged = weak and missing > TOLERANCE and real[SINCE] <= PATIENCE and find_way(floats, reach, q, size)
     fading = missing / (missing + 0.5 * TOLERANCE)  # so that at the target the encoders' noise is not followed
-    push_marker(reach, size, fading / (1.0 + math.sqrt(squares) / LONGEST))
-    for k in range(moved):
-        i = reach.pulled[k]
-        motors[FORCE, i] = 0.0
-        for row in range(rows):
-            motors[FORCE, i] += weight(row) * motors[COLUMN + row, i] * real[PUSH + row]
+    scale = fading / (1.0 + math.sqrt(squares) / LONGEST)
+    push_marker(reach, size, scale)
+    force_motors(reach)
+    if into_wall(reach, against) > 0.0:
+        slide(reach, against, size, scale)
     return nudged
 
 
