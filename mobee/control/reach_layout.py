@@ -29,6 +29,7 @@ LINK = 28
 
 # Floats (reaches, ROWS + moved, n): the marker's Jacobian of the last tick (6,), 0 for motors that are not pulled; J^T error; how much
 # each motor gives way; the force; the way out of a singular pose, and the one before; the way along which the path bends most; which
-# of those pulled it is; and a matrix (moved, n): how J^T of the error, or of the force, changes with each motor.
-COLUMN, SLOPE, EASE, FORCE, WAY, BEFORE, BENT, SPARE, CURVE = 0, 6, 7, 8, 9, 10, 11, 12, 13
-ROWS = 13
+# of those pulled it is; how strongly its limit holds it back, and what else does; and a matrix (moved, n): how J^T of the error, or of
+# the force, changes with each motor.
+COLUMN, SLOPE, EASE, FORCE, WAY, BEFORE, BENT, SPARE, LIMITED, HELD, CURVE = 0, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
+ROWS = 15

@@ -1,6 +1,7 @@
 """The default reach law: the marker comes nearer at one RATE in every direction, wherever the arm is.  Compiled.
 
 J^T control swings where commands are late and stops in singular poses (thesis 5.1); see `reacher` for why, and for what is done.
+What holds the motors back, limits, clauses or contacts, is a wall along which the marker goes on.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from mobee.control.layout import (
     HIGH,
     LIMIT_WIDTH,
     LOW,
+    MAX_LIMIT,
     MAX_SPRING,
     MOTOR,
     STIFFNESS,
 )
+from mobee.control.limits import limit_force
 from mobee.control.marker import PackedReach, miss, place_marker
 from mobee.control.reach_layout import (
     AWAY,
@@ -32,7 +35,9 @@ from mobee.control.reach_layout import (
     ERROR,
     FORCE,
     GIVE,
+    HELD,
     LEFT,
+    LIMITED,
     LINK,
     MOTION,
     MOVED,
@@ -51,7 +56,7 @@ from mobee.control.squash import squash
 from mobee.engine.compiled import inner_exact
 from mobee.robot.robot import Array
 
-WALL = 2.0  # rad/s^2: what holds the motors back half counts as a wall where it is that strong
+WALL = 0.5  # rad/s^2: what holds the motors back half counts as a wall where it is that strong
 ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
 RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
 LONGEST = 0.2  # m: beyond it the pull grows no more
@@ -240,7 +245,7 @@ def push_marker(reach: PackedReach, size: float, scale: float) -> None:
 
 
 @inner_exact
-def curve(floats: Array, reach: PackedReach, q: Array) -> float:
+def curve(reach: PackedReach, q: Array) -> float:
     """Fill how half the square of the error curves along pairs of motors, as they give way; its size."""
     motors, moved = reach.motors, reach.whole[MOVED]
     for k in range(moved):
@@ -273,7 +278,7 @@ def curve(floats: Array, reach: PackedReach, q: Array) -> float:
 def find_way(floats: Array, reach: PackedReach, q: Array, size: float) -> bool:
     """From a pose that the pull does not move: the way (WAY) along which the error falls on both sides; False if there is none."""
     motors, moved = reach.motors, reach.whole[MOVED]
-    shift = curve(floats, reach, q)
+    shift = curve(reach, q)
     for k in range(moved):
         i = reach.pulled[k]
         motors[BEFORE, i] = motors[WAY, i]
@@ -324,25 +329,31 @@ def force_motors(reach: PackedReach) -> None:
 
 
 @inner_exact
-def into_wall(reach: PackedReach, against: Array) -> float:
-    """How fast the motors would go against what holds them back, (n,) rad/s^2 (limits, clauses, contacts); negative if with it."""
-    speed = 0.0
+def held_back(floats: Array, reach: PackedReach, q: Array, against: Array) -> bool:
+    """Split what acts against the force (LIMITED, of each motor alone; HELD, the rest); whether any of it does."""
+    motors = reach.motors
+    speed, limited = 0.0, False
     for k in range(reach.whole[MOVED]):
         i = reach.pulled[k]
-        speed -= against[i] * reach.motors[EASE, i] * reach.motors[FORCE, i]
-    return speed
+        o = F_MOTOR + i * MOTOR
+        limit = limit_force(q[i], floats[o + LOW], floats[o + HIGH], floats[o + LIMIT_WIDTH], floats[o + MAX_LIMIT])
+        motors[LIMITED, i] = abs(limit) if limit * motors[FORCE, i] < 0.0 else 0.0
+        motors[HELD, i] = against[i] - limit
+        limited = limited or motors[LIMITED, i] > 0.0
+        speed -= motors[HELD, i] * motors[EASE, i] * motors[FORCE, i]
+    return limited or speed > 0.0
 
 
 @inner_exact
-def face_wall(reach: PackedReach, against: Array) -> float:
-    """Take what holds the motors back as a direction in which they give no way, the less the weaker it is; how much of it is taken."""
+def face_wall(reach: PackedReach) -> float:
+    """Take HELD as a direction in which the motors give no way, the less the weaker it is; how much of it is taken."""
     real, motors, moved = reach.real, reach.motors, reach.whole[MOVED]
     rows = 3 + 3 * reach.whole[TURNED]
     squares, across = 0.0, 0.0
     for k in range(moved):
         i = reach.pulled[k]
-        squares += against[i] * against[i]
-        across += against[i] * motors[EASE, i] * against[i]
+        squares += motors[HELD, i] * motors[HELD, i]
+        across += motors[HELD, i] * motors[EASE, i] * motors[HELD, i]
     if across == 0.0:
         return 0.0
     length = math.sqrt(squares)
@@ -351,7 +362,7 @@ def face_wall(reach: PackedReach, against: Array) -> float:
         real[AWAY + row] = 0.0
         for k in range(moved):
             i = reach.pulled[k]
-            real[AWAY + row] += weight(row) * motors[COLUMN + row, i] * motors[EASE, i] * against[i]
+            real[AWAY + row] += weight(row) * motors[COLUMN + row, i] * motors[EASE, i] * motors[HELD, i]
     for a in range(rows):
         for b in range(rows):
             real[GIVE + 6 * a + b] -= share * real[AWAY + a] * real[AWAY + b]
@@ -359,15 +370,25 @@ def face_wall(reach: PackedReach, against: Array) -> float:
 
 
 @inner_exact
-def slide(reach: PackedReach, against: Array, size: float, scale: float) -> None:
-    """Fill the forces again for a marker whose motors are held back: along the wall, not into it."""
-    share = face_wall(reach, against)
+def slide(reach: PackedReach, size: float, scale: float) -> None:
+    """Fill the forces again for motors that are held back: along the wall, not into it."""
+    motors, moved = reach.motors, reach.whole[MOVED]
+    before = 0.0
+    for k in range(moved):
+        i = reach.pulled[k]
+        before += motors[HELD, i] * motors[EASE, i] * motors[FORCE, i]
+        motors[EASE, i] *= WALL / (WALL + motors[LIMITED, i])
+    give(reach)
+    share = face_wall(reach) if before < 0.0 else 0.0
     push_marker(reach, size, scale)
     force_motors(reach)
-    speed = into_wall(reach, against)
-    for k in range(reach.whole[MOVED]):
+    speed = 0.0
+    for k in range(moved):
         i = reach.pulled[k]
-        reach.motors[FORCE, i] += share * speed * against[i]
+        speed += motors[HELD, i] * motors[EASE, i] * motors[FORCE, i]
+    for k in range(moved):
+        i = reach.pulled[k]
+        motors[FORCE, i] = (motors[FORCE, i] - share * speed * motors[HELD, i]) * WALL / (WALL + motors[LIMITED, i])
 
 
 @inner_exact
@@ -394,8 +415,8 @@ def pull_marker(floats: Array, reach: PackedReach, q: Array, dt: float, against:
     scale = fading / (1.0 + math.sqrt(squares) / LONGEST)
     push_marker(reach, size, scale)
     force_motors(reach)
-    if into_wall(reach, against) > 0.0:
-        slide(reach, against, size, scale)
+    if held_back(floats, reach, q, against):
+        slide(reach, size, scale)
     return nudged
 
 

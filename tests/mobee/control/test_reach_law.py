@@ -214,3 +214,15 @@ def test_a_target_out_of_reach_ends_as_near_as_the_arm_can() -> None:
     outcome = plant.reach("arm", "tip")
     assert outcome.missing == pytest.approx(np.hypot(1.2, 0.3) - 0.9, abs=0.01)
     assert outcome.duration < 40.0
+
+
+def test_a_motor_at_its_limit_leaves_the_way_to_the_others() -> None:
+    """Least motion would turn the first joint beyond its limit."""
+    free = planar_arm()
+    first = replace(free.motor_table[0], limits=np.array([-0.5, 0.5]))
+    model = one_part(replace(free, motor_table=(first, *free.motor_table[1:])))
+    plant = OfflinePlant(model, contact_forces=False)
+    plant.act("arm", np.array([0.3, 0.6, 0.6]))
+    plant.present(ReachTarget(model.evaluate(np.array([0.25, 1.6, 0.7])).position("tip")))
+    outcome = plant.reach("arm", "tip")
+    assert outcome.missing < 4e-3 and outcome.q[0] < 0.45
