@@ -1,0 +1,110 @@
+"""What came of the cells, in numbers with intervals, and what that says of the claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from experiments.claims import Claim
+from experiments.reaching.planner_peer import MEMORIES
+from experiments.statistics import decides, interval, told
+from experiments.sweep import CellResult
+from experiments.unmodelled.contestants import FATES
+from experiments.unmodelled.scene import WRONG
+from mobee.robot.robot import Array
+
+HIDDEN = WRONG[1:]
+EVEN, ABOVE = 0.05, 0.2  # of success: as much below still counts as equal; that far above is the aim
+EQUAL_BY, ABOVE_BY = 200, 800  # tries
+CLAIMS = (
+    Claim("aim of this reproduction", "with part of the truth hidden, the reach learner is equal to the re-planning peer", "by 200 tries"),
+    Claim("aim of this reproduction", "and at least 20 points of success above it", "by 800 tries"),
+    Claim("aim of this reproduction", "also where MoBeE is as mistaken as the peer: equal to the re-planning peer", "by 200 tries"),
+    Claim("aim of this reproduction", "and at least 20 points of success above it there", "by 800 tries"),
+    Claim("thesis 9.3", "with nothing hidden, planning once would do: success of the peer, whose model is perfect", "-"),
+)
+
+
+def claims(done: Mapping[str, CellResult]) -> list[Claim]:
+    """The claims with our numbers."""
+    found = []
+    for number, wrong in enumerate(HIDDEN):
+        found.append(_against(done, CLAIMS[2 * number], wrong, EQUAL_BY, -EVEN))
+        found.append(_against(done, CLAIMS[2 * number + 1], wrong, ABOVE_BY, ABOVE))
+    return [*found, _perfect(done)]
+
+
+def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
+    """Whether the learner's lead (seeds,) over each of the peers is at least that; False if over one of them it is not."""
+    each = [decides(interval(lead), least=least) for lead in leads.values()]
+    return False if False in each else None if None in each else True
+
+
+def success(done: Mapping[str, CellResult], who: str, wrong: str) -> tuple[list[int], Array]:
+    """After how many tries, and the success of each seed then, (seeds, points)."""
+    found = _of(done, who, wrong)
+    points = found[0].cell.settings["tries"] if found else []
+    return list(points), np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(-1, len(points))
+
+
+def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
+    """After how many tries each seed's learner is not below the peer for good, (seeds,): inf where it is at the end."""
+    ahead = learner >= peer
+    for_good = np.flip(np.cumprod(np.flip(ahead, 1), axis=1), 1).astype(bool)
+    return np.where(for_good.any(axis=1), np.array(tries)[for_good.argmax(axis=1)], np.inf)
+
+
+def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
+    """The tables of the results, as text."""
+    rows, crossings = [], []
+    for wrong in WRONG:
+        for who in ("learner", *MEMORIES):
+            found = _of(done, who, wrong)
+            if not found:
+                continue
+            last = [one.values["rows"][-1] for one in found]
+            points, values = success(done, who, wrong)
+            row = {"hidden from": wrong, "who": who} | {f"success at {n}": told(values[:, i]) for i, n in enumerate(points)}
+            row |= {fate: told([one["fates"][i] for one in last]) for i, fate in enumerate(FATES) if i}
+            row |= {name: told([one[name] for one in last], 1) for name in ("seconds", "actions", "hours")}
+            if who != "learner":
+                row["planning a try [ms]"] = told([1000.0 * float(np.median(one.values["planning"])) for one in found], 1)
+            rows.append(row)
+        for memory in MEMORIES:
+            tries, learner, peer = *success(done, "learner", wrong), success(done, memory, wrong)[1]
+            if len(learner) and learner.shape == peer.shape:
+                each = crossover(tries, learner, peer)
+                text = ", ".join("never" if np.isinf(n) else f"{n:.0f}" for n in each)
+                crossings.append({"hidden from": wrong, "peer remembers": memory, "tries until the learner is not below it, by seed": text})
+    return {"success": rows, "crossover": crossings}
+
+
+def _against(done: Mapping[str, CellResult], claim: Claim, wrong: str, by: int, least: float) -> Claim:
+    """The learner's success after so many tries, and its lead over the peers without memory and with memory of what was blocked."""
+    tries, learner = success(done, "learner", wrong)
+    if by not in tries:
+        return claim.measured("not measured", None)
+    at = tries.index(by)
+    theirs = {memory: success(done, memory, wrong)[1][:, at] for memory in MEMORIES}
+    leads = {memory: learner[:, at] - values for memory, values in theirs.items()}
+    text = f"learner {told(learner[:, at])}; peer that remembers " + "; ".join(
+        f"{memory} {told(theirs[memory])}, lead {told(leads[memory])}" for memory in MEMORIES
+    )
+    return claim.measured(text, verdict({memory: leads[memory] for memory in ("none", "blocked")}, least))
+
+
+def _perfect(done: Mapping[str, CellResult]) -> Claim:
+    tries, learner = success(done, "learner", WRONG[0])
+    values = success(done, "none", WRONG[0])[1]
+    if not len(learner) or not len(values):
+        return CLAIMS[4].measured("not measured", None)
+    text = f"peer {told(values[:, -1])}, learner after {tries[-1]} tries {told(learner[:, -1])}"
+    return CLAIMS[4].measured(text, decides(interval(values[:, -1]), least=0.9))
+
+
+def _of(done: Mapping[str, CellResult], who: str, wrong: str) -> list[CellResult]:
+    wanted = {"who": who, "wrong": wrong}
+    found = [one for one in done.values() if wanted.items() <= one.cell.settings.items()]
+    return sorted(found, key=lambda one: one.cell.seed)

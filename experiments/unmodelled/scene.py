@@ -1,0 +1,92 @@
+"""What is true of an arm and its workspace, and what its planners do not know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+
+from experiments.learning.published import RIGHT
+from experiments.reaching.arm import arm_belief, arm_plant, body, reachable, space, straight_ways
+from experiments.reaching.judged_plant import Errors, JudgedPlant
+from experiments.reaching.peer_belief import PeerBelief
+from experiments.reaching.targets import grid
+from mobee import World, sphere
+from mobee.errors import InvalidValue
+from mobee.reach import ReachTarget
+from mobee.robot.robot import Array
+
+WRONG = ("nothing", "planners", "everyone")
+"""Who is mistaken: nobody; the planners alone; also MoBeE, which pulls where it sees the target by the encoders that it has."""
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m by which targets, rad by which joints are not where they are believed
+UNSEEN = "unseen"
+RADIUS = 0.05  # m, of the ball that nobody sees
+AWAY = 0.12  # m, from its middle to that of any target
+LEAST, MOST = 0.08, 0.3  # share of the straight ways between two states that it blocks
+DRAWS = 400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Targets where they are seen, the place of the ball (3,) m, and by how much joints and targets are off: (4,) rad, (3,) m."""
+
+    targets: list[ReachTarget]
+    ball: Array
+    turns: Array
+    shift: Array
+    wrong: str
+
+    def plant(self, seed: int, ball: bool = True) -> JudgedPlant:
+        """The true arm, with or without the ball."""
+        turns = np.zeros(len(body().motors))
+        turns[[body().motor_index(name) for name in RIGHT]] = self.turns
+        errors = Errors(turns, self.shift) if self.wrong == "everyone" else None
+        return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
+
+    def belief(self) -> PeerBelief:
+        """What its planners know."""
+        if self.wrong == "nothing":
+            return arm_belief(_world(self.ball))
+        return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
+
+    def seen(self, target: ReachTarget) -> ReachTarget:
+        """Where its planners believe a target."""
+        return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
+
+
+def make_scene(seed: int, wrong: str) -> Scene:
+    """A ball in the way of many motions, not in that of any target, and errors of the sizes above; the same for all who are `wrong`."""
+    rng = np.random.default_rng([seed, 86])
+    ball = _ball(rng, grid())
+    shift = rng.normal(size=3)
+    return Scene(reachable(_world(ball)), ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), wrong)
+
+
+def _world(ball: Array) -> World:
+    world = World()
+    world.add(UNSEEN, sphere(RADIUS), position=ball)
+    return world
+
+
+def _ball(rng: np.random.Generator, targets: Array) -> Array:
+    """Where the palm may come, away from the targets and from the robot at home, in the way of some motions."""
+    low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
+    pairs = list(permutations(range(len(space())), 2))
+    chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
+    ways = straight_ways(chosen).reshape(-1, len(RIGHT))
+    alone = arm_belief()
+    before = 1.0 - alone.sound(ways).reshape(len(chosen), -1).all(axis=1).mean()
+    for _ in range(DRAWS):
+        q = rng.uniform(low, high)
+        place = alone.model.evaluate(alone.whole(q)).position(alone.marker)
+        if np.linalg.norm(targets - place, axis=1).min() < AWAY:
+            continue
+        belief = arm_belief(_world(place))
+        if len(belief.model.evaluate(body().home).table):
+            continue
+        blocked = 1.0 - belief.sound(ways).reshape(len(chosen), -1).all(axis=1).mean()
+        if LEAST <= blocked - before <= MOST:
+            found: Array = place
+            return found
+    raise InvalidValue(f"no place for the ball in {DRAWS} draws: leave this seed out.")
