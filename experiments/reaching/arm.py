@@ -23,6 +23,7 @@ from mobee.robot.robot import Array, Robot
 
 PART, MARKER = "right_arm", "right_palm"
 GOOD = 0.02  # m from the surface
+TARGETS = 27
 LEARNED = 3000  # curious transitions before the first target (thesis 7.2.2: 2987)
 PREDICTOR, STRATEGY = "gp", "ucb"
 
@@ -81,15 +82,26 @@ def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int) -> ReachAg
     )
 
 
-def reachable(world: World | None = None) -> list[ReachTarget]:
-    """Those of the thesis' 27 targets that the palm can touch, of all who know all: no link but the hand in the target, cables kept."""
-    belief = arm_belief(world)
-    found = []
-    for target in targets_at(grid(), "surface"):
-        belief.present(target)
-        if len(goals(belief, target, np.random.default_rng(0), most=1)[0]):
-            found.append(target)
-    return found
+@cache
+def reachable() -> tuple[ReachTarget, ...]:
+    """TARGETS that the palm can touch in an empty world: those of the thesis' 27, and others drawn between them.
+
+    So that neither cables nor joint limits push, and no solid but the hand's is in the target.
+    """
+    belief, rng = arm_belief(), np.random.default_rng(27)
+    places = grid()
+    found = [target for target in targets_at(places, "surface") if touchable(belief, target)]
+    while len(found) < TARGETS:
+        target = targets_at(rng.uniform(places.min(axis=0), places.max(axis=0))[None], "surface")[0]
+        found += [target] if touchable(belief, target) else []
+    return tuple(found)
+
+
+def touchable(belief: PeerBelief, target: ReachTarget) -> bool:
+    """Whether, of all that is believed, the palm can touch a target where nothing pushes."""
+    belief.present(target)
+    poses = goals(belief, target, np.random.default_rng(0), most=1)[0]
+    return bool(len(poses) and ((poses >= belief.limits[:, 0]) & (poses <= belief.limits[:, 1])).all())
 
 
 def straight_ways(pairs: Sequence[tuple[int, int]], looks: int = 21) -> Array:

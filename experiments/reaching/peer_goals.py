@@ -12,7 +12,7 @@ RESTARTS = 64
 STEPS = 60
 DAMPING = 0.03  # m/rad
 LONGEST = 0.25  # rad a step, of each motor
-ARRIVED = 2e-3  # m
+ARRIVED, ALMOST = 2e-3, 0.01  # m: what may be missing, and what if there is nothing better
 KEPT = 12  # of the poses found: those that fields push least away
 RETREAT, CLEAR = 0.02, 0.2  # m a step away from the target, and how far at most
 
@@ -20,13 +20,13 @@ RETREAT, CLEAR = 0.02, 0.2  # m a step away from the target, and how far at most
 def goals(belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, most: int = KEPT) -> tuple[Array, Array]:
     """Poses with the marker on the target, and poses before them, clear of it, from which the hand goes straight there: (K, d) rad each.
 
-    At most so many, those that fields push least.
+    At most so many, those that fields push least; where joint limits push, only if there are no others.
     """
     within = target.radius if target.aim == "surface" else 0.0
-    for limits in (belief.limits, belief.range):  # where the joint limits push, only if it must be
+    for limits, enough in ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST)):
         starts = rng.uniform(*limits.T, (RESTARTS, len(limits)))
         found, missing = approach(belief, starts, target.position, within, limits)
-        found = found[missing <= ARRIVED]
+        found = found[missing <= enough]
         found = found[belief.sound(found, "grasping")] if len(found) else found
         if len(found):
             break

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from experiments.learning.published import RIGHT
-from experiments.reaching.arm import arm_belief, arm_plant, body, reachable, space, straight_ways
+from experiments.reaching.arm import arm_belief, arm_plant, body, reachable, space, straight_ways, touchable
 from experiments.reaching.judged_plant import Errors, JudgedPlant
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.targets import grid
@@ -60,7 +60,9 @@ def make_scene(seed: int, wrong: str) -> Scene:
     rng = np.random.default_rng([seed, 86])
     ball = _ball(rng, grid())
     shift = rng.normal(size=3)
-    return Scene(reachable(_world(ball)), ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), wrong)
+    knowing = arm_belief(_world(ball))
+    targets = [target for target in reachable() if touchable(knowing, target)]
+    return Scene(targets, ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), wrong)
 
 
 def _world(ball: Array) -> World:

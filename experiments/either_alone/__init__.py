@@ -1,0 +1,73 @@
+"""The coarse planner alone, the reactive reach alone, and both.
+
+Claim: a coarse discrete planner with a reactive reach does more than either alone; the planner may have few states, the reach closes what
+is left, and only together do they bring the hand from arbitrary poses around the targets.
+Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: NN minutes on 2 cores.
+
+The right arm of today's robot under the default law, the reachable ones of the thesis' 27 targets, arbitrary poses to begin in (no home
+pose, no lattice state).  "planner": the MDP leads to the state whose sample holds the palm nearest to the target, and there it ends.
+"reach": the palm is drawn to the target from where it is.  "both": a learner, after 3000 curious transitions and 800 tries without
+obstacles, plans to where it expects most of a reach, and reaches; it learns nothing from these cases.  Both planners remember within a
+case which transitions failed.  Scenes: free space; the target between shoulder and hand; the arm within 3 cm of the object, the palm
+turned away; a ball of 8 cm between hand and target, of which only MoBeE knows; a target that moves 5 to 12 cm at 3 cm/s.
+Success: the palm within 2 cm of the target's surface when the force ends.  The seeds draw all of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.either_alone.cases import SCENES, make_cases
+from experiments.either_alone.figure import draw
+from experiments.either_alone.findings import CLAIMS, claims, summary
+from experiments.either_alone.trial import WAYS, attempt, trained
+from experiments.reaching.arm import LEARNED
+from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+
+NAME = "either-alone"
+CLAIM = "a coarse planner with a reactive reach does more than either alone"
+SOURCE = "thesis 5.3, 8.2, 9.3"
+__all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
+
+TRIES, CASES = 800, 40
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the experiment."""
+    sweep_arguments(parser)
+
+
+def cells(arguments: argparse.Namespace) -> list[Cell]:
+    """One of each seed: a learner, and all scenes."""
+    settings = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else {"transitions": LEARNED, "tries": TRIES, "cases": CASES}
+    return [Cell(f"all-s{seed}", seed, settings) for seed in range(arguments.seed, arguments.seed + arguments.seeds)]
+
+
+def work(cell: Cell) -> dict[str, Any]:
+    """Train the learner, and let all attempt the same cases; arrays by "scene|who|measure"."""
+    settings = cell.settings
+    agent = trained(cell.seed, settings["transitions"], settings["tries"])
+    found: dict[str, Any] = {}
+    for scene in SCENES:
+        cases = make_cases(scene, settings["cases"], cell.seed)
+        for way in WAYS:
+            made = [attempt(way, agent, case, 1000 * cell.seed + number) for number, case in enumerate(cases)]
+            found[f"{scene}|{way}|missing"] = np.array([one.missing for one in made])
+            found[f"{scene}|{way}|seconds"] = np.array([one.seconds for one in made])
+    return found
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Work off all cells; returns the claims and the table."""
+    run_cells(work, cells(arguments), folder, arguments)
+    done = load_cells(folder)
+    return {"claims": [claim.record() for claim in claims(done)], **summary(done)}
+
+
+def figure(folder: Path) -> Path:
+    """Success of each in each scene."""
+    return draw(load_cells(folder), folder / "either-alone.png")
