@@ -17,11 +17,13 @@ from mobee.robot.robot import Array
 SCENES = ("free", "around", "against", "between", "moving")
 """From anywhere; the hand behind the target; the hand at it, and not with the palm; a ball between hand and target; a target that moves."""
 OBSTACLE, RADIUS = "obstacle", 0.04  # m
-NEAR = 0.25  # m: the hand behind the target is no farther
+HAND = 0.06  # m from the palm's middle, where an obstacle begins
+NEAR = 0.25  # m: the hand behind the target is no farther from it
+BEYOND = np.cos(np.deg2rad(70.0))  # between the way from shoulder to target and that from target to hand
 TOUCH = 0.03  # m: so near to the target a link is "at" it
 WAY = (0.05, 0.12)  # m that a target moves, at least and at most
 SPEED = 0.03  # m/s
-DRAWS = 4000
+DRAWS = 20_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,10 +54,10 @@ class Case:
 def make_cases(scene: str, count: int, seed: int) -> list[Case]:
     """That many cases of one of the SCENES; nothing solid touches where they begin."""
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
-    targets, found = reachable(), []
+    targets, belief = reachable(), arm_belief()
+    found: list[Case] = []
     for _ in range(DRAWS):
-        target = targets[rng.integers(len(targets))]
-        case = _case(scene, target, rng)
+        case = _case(scene, targets[rng.integers(len(targets))], belief, rng)
         if case is not None:
             found.append(case)
         if len(found) == count:
@@ -63,43 +65,50 @@ def make_cases(scene: str, count: int, seed: int) -> list[Case]:
     raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {DRAWS} draws: take another seed.")
 
 
-def _case(scene: str, target: ReachTarget, rng: np.random.Generator) -> Case | None:
-    belief = arm_belief()
-    belief.present(target)
+def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Case | None:
+    """A pose that is drawn, if it fits."""
     q = rng.uniform(*belief.limits.T)
     hand = belief.model.evaluate(belief.whole(q)).position(belief.marker)
-    obstacle, to = None, None
-    if scene == "between":
-        way = target.position - hand
-        if np.linalg.norm(way) < 2.0 * (target.radius + 2.0 * RADIUS):
-            return None
-        obstacle = hand + 0.5 * way
-        belief.model.world.add(OBSTACLE, sphere(RADIUS), position=obstacle)
-    elif scene == "moving":
-        to = _goal_of(target, belief, rng)
-    fits = {"around": _behind, "against": _touches}.get(scene)
-    if not belief.sound(q[None])[0] or (fits is not None and not fits(belief, target, q, hand)) or (scene == "moving" and to is None):
+    way = target.position - hand
+    if scene == "around" and not _behind(belief, target, hand):
         return None
-    return Case(target, q, obstacle, to)
+    belief.present(target)
+    if not belief.sound(q[None])[0] or (scene == "against" and not _touches(belief, target, q, way)):
+        return None
+    if scene == "between":
+        obstacle = hand + 0.5 * way
+        apart = float(np.linalg.norm(way)) / 2.0 - RADIUS
+        return Case(target, q, obstacle) if apart > max(target.radius, HAND) and _clear(belief, q, obstacle) else None
+    if scene == "moving":
+        to = _goal_of(target, belief, rng)
+        return None if to is None else Case(target, q, to=to)
+    return Case(target, q)
 
 
-def _behind(belief: PeerBelief, target: ReachTarget, q: Array, hand: Array) -> bool:
-    """Whether the target is between the shoulder and the hand."""
+def _clear(belief: PeerBelief, q: Array, obstacle: Array) -> bool:
+    """Whether no solid touches the obstacle."""
+    world = belief.model.world
+    world.add(OBSTACLE, sphere(RADIUS), position=obstacle)
+    clear = bool(belief.sound(q[None])[0])
+    world.remove(OBSTACLE)
+    return clear
+
+
+def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
+    """Whether the hand is on the far side of the target, as seen from the shoulder."""
     robot = belief.model.robot
     shoulder = robot.joints[int(np.flatnonzero(robot.coupling[0][:, belief.columns[0]])[0])].point  # the torso is at home
-    way, out = hand - shoulder, target.position - shoulder
-    off = np.linalg.norm(out - way * (out @ way) / (way @ way))
-    return bool(off < target.radius and out @ way < way @ way and np.linalg.norm(hand - target.position) < NEAR)
+    out, beyond = target.position - shoulder, hand - target.position
+    length = float(np.linalg.norm(beyond))
+    return bool(length < NEAR and out @ beyond > BEYOND * np.linalg.norm(out) * length)
 
 
-def _touches(belief: PeerBelief, target: ReachTarget, q: Array, hand: Array) -> bool:
-    """Whether a solid of the arm is within TOUCH of the target, and the palm is not turned to it."""
-    pose = belief.model.evaluate(belief.whole(q))
-    belief.model.world.remove("reach_target")
+def _touches(belief: PeerBelief, target: ReachTarget, q: Array, way: Array) -> bool:
+    """Whether a solid of the arm is within TOUCH of the target, and the palm is turned away from it, which lies `way` (3,) m off."""
     belief.present(ReachTarget(target.position, target.radius + TOUCH))
     near = not belief.sound(q[None])[0]
     belief.present(target)
-    return near and float(pose.normal(belief.marker) @ (target.position - hand)) < 0.0
+    return near and float(belief.model.evaluate(belief.whole(q)).normal(belief.marker) @ way) < 0.0
 
 
 def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Array | None:
