@@ -45,8 +45,8 @@ def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
 def success(done: Mapping[str, CellResult], who: str, wrong: str) -> tuple[list[int], Array]:
     """After how many tries, and the success of each seed then, (seeds, points)."""
     found = _of(done, who, wrong)
-    points = found[0].cell.settings["tries"] if found else []
-    return list(points), np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(-1, len(points))
+    points = list(found[0].cell.settings["tries"]) if found else []
+    return points, np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(len(found), len(points))
 
 
 def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
