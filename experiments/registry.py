@@ -18,6 +18,7 @@ EXPERIMENTS = {
     "connectivity": "experiments.connectivity",
     "coverage": "experiments.coverage",
     "decay": "experiments.decay",
+    "either-alone": "experiments.either_alone",
     "flood": "experiments.flood",
     "graze": "experiments.graze",
     "hypercube": "experiments.hypercube",
@@ -37,6 +38,7 @@ EXPERIMENTS = {
     "transfer": "experiments.transfer",
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
+    "unmodelled": "experiments.unmodelled",
     "wall": "experiments.wall",
 }
 

@@ -43,7 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
     """One of each seed: a learner, and all scenes."""
-    settings = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else {"transitions": LEARNED, "tries": TRIES, "cases": CASES}
+    settings = (
+        {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else {"transitions": LEARNED, "tries": TRIES, "cases": CASES}
+    )
     return [Cell(f"all-s{seed}", seed, settings) for seed in range(arguments.seed, arguments.seed + arguments.seeds)]
 
 

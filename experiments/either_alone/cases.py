@@ -118,4 +118,3 @@ def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) 
     starts = rng.uniform(*belief.limits.T, (16, len(belief.limits)))
     missing = approach(belief, starts, place, target.radius, belief.limits)[1]
     return place if missing.min() < 1e-3 else None
-

@@ -39,7 +39,7 @@ def trained(seed: int, transitions: int, tries: int) -> ReachAgent:
 
 
 def attempt(way: str, agent: ReachAgent, case: Case, seed: int) -> Attempt:
-    """Begin at rest in the case's pose, and go: to the best pre-reach state, by the reach from there, or first the one and then the other."""
+    """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other."""
     plant = arm_plant(seed, case.world())
     place(plant, arm_belief().whole(case.start))
     begun = plant.time

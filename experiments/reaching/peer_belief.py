@@ -16,7 +16,7 @@ from mobee.robot.robot import Array, Clause
 STEP = 0.02  # of a motor's range, between two poses of a motion that are looked at
 NEAR = 0.08  # of the motors' ranges: a pose that near to one where a motion was blocked is held for blocked
 Care = Literal["grasping", "solids", "fields"]
-"""What must not touch anything: the solids but for the hand at the target; the solids; or also the fields, but for the hand's at the target."""
+"""What must not touch anything: the solids but for the hand at the target; all solids; also the fields but for the hand's there."""
 
 
 class PeerBelief:

@@ -45,7 +45,10 @@ def goals(belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, mos
 
 
 def approach(belief: PeerBelief, starts: Array, place: Array, within: float, limits: Array, steps: int = STEPS) -> tuple[Array, Array]:
-    """From starts (K, d) rad draw the marker to within a distance [m] of a place (3,) m, within limits (d, 2): poses (K, d), and what is missing, (K,) m."""
+    """From starts (K, d) rad draw the marker to within a distance [m] of a place (3,) m, the motors within limits (d, 2).
+
+    Returns poses (K, d), and what is missing, (K,) m.
+    """
     q = starts.copy()
     low, high = limits.T
     for _ in range(steps):

@@ -15,7 +15,9 @@ RANGE = 0.25  # of the motors' ranges, the longest extension
 SHORTCUTS = 60  # tried
 
 
-def rrt_connect(belief: PeerBelief, start: Array, ends: Array, seed: int, care: Care = "solids", extensions: int = EXTENSIONS) -> Array | None:
+def rrt_connect(
+    belief: PeerBelief, start: Array, ends: Array, seed: int, care: Care = "solids", extensions: int = EXTENSIONS
+) -> Array | None:
     """A sound way from a sound pose (d,) to one of the poses (G, d), as its corners (k, d) rad; None: none was found.
 
     Raises OmplMissing.

@@ -1,7 +1,8 @@
 """Reaching when the model is wrong: a learner against a planner that plans anew on every change, with and without memory.
 
 Claim: where part of the truth is hidden, learning from tries overtakes planning with a model (the issue's headline; thesis 9.3: one
-could plan the motions offline, but they fail in practice).  Published: no numbers; aims: equal by 200 tries, 20 points above by 800.
+could plan the motions offline, but moving the target just a little may invalidate the plan).
+Source: thesis 5.3, 9.3; our own aims: equal by 200 tries, 20 points of success above it by 800.  Published: no numbers.
 Run time: NN minutes on 2 cores.
 
 The right arm of today's robot under the default law, and those of the thesis' 27 targets that it can touch.  Hidden from every planner:

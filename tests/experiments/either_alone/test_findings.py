@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.either_alone.findings import CLAIMS, better, claims, summary
 from experiments.either_alone.cases import SCENES
+from experiments.either_alone.findings import CLAIMS, better, claims, summary
 from experiments.either_alone.trial import WAYS
 from experiments.sweep import Cell
 
@@ -23,9 +23,7 @@ def sweep(**shares):
     return {f"all-s{seed}": Done(seed, shares) for seed in range(6)}
 
 
-@pytest.mark.parametrize(
-    ("planner", "reach", "expected"), [(0.2, 0.6, True), (0.2, 0.8, None), (0.9, 0.1, False)]
-)
+@pytest.mark.parametrize(("planner", "reach", "expected"), [(0.2, 0.6, True), (0.2, 0.8, None), (0.9, 0.1, False)])
 def test_both_must_have_more_success_than_each_alone(planner, reach, expected):
     both = np.full(6, 0.8)
     assert better(both, {"planner": np.full(6, planner), "reach": np.full(6, reach)}) is expected
