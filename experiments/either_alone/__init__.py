@@ -2,7 +2,7 @@
 
 Claim: a coarse discrete planner with a reactive reach does more than either alone; the planner may have few states, the reach closes what
 is left, and only together do they bring the hand from arbitrary poses around the targets.
-Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: NN minutes on 2 cores.
+Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: ten minutes on 2 cores.
 
 The right arm of today's robot under the default law, the reachable ones of the thesis' 27 targets, arbitrary poses to begin in (no home
 pose, no lattice state).  "planner": the MDP leads to the state whose sample holds the palm nearest to the target, and there it ends.

@@ -105,6 +105,7 @@ def _perfect(done: Mapping[str, CellResult]) -> Claim:
 
 
 def _of(done: Mapping[str, CellResult], who: str, wrong: str) -> list[CellResult]:
-    wanted = {"who": who, "wrong": wrong}
+    """In the order of the seeds; to the learner it is all the same whether the planners are wrong."""
+    wanted = {"who": who, "wrong": HIDDEN[0] if who == "learner" and wrong == WRONG[0] else wrong}
     found = [one for one in done.values() if wanted.items() <= one.cell.settings.items()]
     return sorted(found, key=lambda one: one.cell.seed)
