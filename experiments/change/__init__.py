@@ -3,7 +3,7 @@
 Claim: when actions that had always ended in one state suddenly end in another, they become very interesting, their value shoots up, the
 agent tries them out a few times and so mends its model.  Ours: one that forgets old counts should mend it sooner.
 Source: thesis 7.2.6 (there the simulator's instabilities were the cause, and few runs were looked at).  Published number: none.
-Run time: 5 minutes on 2 cores.
+Run time: 3 minutes on 2 cores.
 
 The left arm on the lattice of rank 3.  After 3000 transitions a ball of 6 cm enters where the hand is in the middle state, or the
 friction of the elbow doubles, from 4 deg/s, with which it arrives, to 8, with which it sticks; 3000 more follow, from home.  With

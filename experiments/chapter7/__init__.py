@@ -2,7 +2,7 @@
 
 Claim: the thesis' experiments in model learning can be repeated, figures and all, by one command.  Source: thesis chapter 7, paper
 section 3.  Published number: the robot took over two days for the longest of them (7.4).
-Run time: 30 minutes on 2 cores; with --all, which adds what the works promise and our own studies, an hour.
+Run time: 23 minutes on 2 cores; with --all, which adds what the works promise and our own studies, 45.
 
 Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
 that fails, whatever it raises, does not stop the others, and leaves failed.txt.  With --resume and more --seeds those that have

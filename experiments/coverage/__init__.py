@@ -3,7 +3,7 @@
 Claim: the curious agent (AC) has tried all state-actions in about half the time of the agent that takes the action least tried
 (LT), the random one (RAND) is far behind; early on AC and LT try only what is new.  Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
 Published number: AC/LT about 1/2, on the lattice of 81 states and their 16 nearest neighbours.
-Run time: 3 minutes on 2 cores.
+Run time: 2 minutes on 2 cores.
 
 The left arm, with its cable constraints and self-contacts and without both (free), on the published graph and on that of the
 equidistant neighbours; ties among the 16 nearest are drawn anew for every seed, the same for all explorers.  Floor: the fewest

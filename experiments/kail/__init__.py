@@ -2,7 +2,7 @@
 
 Claim: with plain KL divergence from a uniform prior every first try is equally interesting, so that it takes many tries to tell
 failing actions from sound ones, and small state spaces are numerically more interesting than large ones; 'Kail' divergence has
-neither problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: 3 minutes on 2 cores.
+neither problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
 
 On paper: the rewards of a sound, a failing and an uncertain action, try by try.  On the robot: the left arm, 81 states with 16
 neighbours and its constraints, for 4000 transitions, and the torso, 27 states with 8 neighbours, for 900; both

@@ -4,7 +4,7 @@ Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent neve
 125, 189 and 253, though it tries hundreds of times, for the cables of the shoulder turn it away; 57->61 ends in 62, 121->125 in
 126, 249->253 in 254.  Of the lattice stretched to 12.5 and 87.5 % far more states are out of reach.  The arm often touches its
 own body, and reaches its goal nevertheless.
-Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 6 minutes on 2 cores.
+Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 3 minutes on 2 cores.
 
 The left arm from a random state, 50-50 initialisation, discount 0.9.  An action touches the own body if fields of two links overlap at any
 time while it lasts.  State numbers: pitch fastest, then roll, yaw and elbow.

@@ -4,7 +4,7 @@ Claim: over time the agents of torso and arms bend forward, put the arms low and
 what they try most are the actions whose outcomes depend on another part, both arms the same ones; an outcome that depends on
 others spreads over a handful of states.
 Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more
-than two full days".  Run time: 15 minutes on 2 cores, as much again with --part.
+than two full days".  Run time: 9 minutes on 2 cores, more than as much again with --part.
 
 Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries
 alone say little, for a graph of 16 neighbours has favourites of its own, and all runs share one: each explorer also runs with a
