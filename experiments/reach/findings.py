@@ -15,7 +15,7 @@ from experiments.statistics import decides, interquartile_mean, interval, told
 from experiments.sweep import CellResult
 
 RIVALS = STRATEGIES[1:]
-JUDGED = (800, 1600, 6400)  # problem-tries at which intrinsic motivation is compared
+JUDGED = (800, 1600, 3200, 6400)  # problem-tries at which intrinsic motivation is compared
 HOURS = {"random": 207.0, "greedy": 109.0, "intrinsic": 113.0}  # published, of 5 runs
 TWICE, SAME = (1.5, 2.5), (0.8, 1.2)  # "about twice", and as long as
 NEARLY_ALL = 0.9  # "almost all possible combinations"

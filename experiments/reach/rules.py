@@ -19,6 +19,7 @@ from experiments.statistics import (
 )
 from mobee.robot.robot import Array
 
+ABOUT_EQUAL = (0.9, 1.1)
 Verdicts = list[bool | None]
 
 
@@ -30,14 +31,16 @@ def all_hold(verdicts: Sequence[bool | None]) -> bool | None:
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> tuple[str, Verdicts]:
     """Whether runs of one group are likelier above (or, `worse`, below) those of each rival than not: the text, and a verdict a rival.
 
-    It holds where the interval of the probability of improvement is above one half, and does not where it is below.
+    It holds where the interval of the probability of improvement is above one half, and does not where it is below, or where the
+    ratio of the two is within a tenth of 1 with its interval: they are about equal.
     """
     parts, verdicts = [f"{name} {told(values[name], digits)}"], Verdicts()
     for rival in rivals:
         first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
         chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
         parts.append(f"{rival} {told(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
-        verdicts.append(True if low > 0.5 else False if high < 0.5 else None)
+        equal = decides(ratio_interval(first, second), *ABOUT_EQUAL)
+        verdicts.append(True if low > 0.5 else False if high < 0.5 or equal else None)
     return ", ".join(parts), verdicts
 
 
