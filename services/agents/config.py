@@ -59,8 +59,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Of the rewards of reaching."""
     strategy: str = "intrinsic"
     """What it pursues while it learns to reach."""
-    failures: Literal["spread", "local"] = "spread"
-    """How transitions that failed are remembered: for all targets, or for those nearby."""
+    failures: Literal["spread", "local", "alike"] = "spread"
+    """How transitions that failed are remembered: for all targets, for those nearby, or as a hint to transitions like them."""
     learned: str = ""
     """Folder of a run whose transitions it plans its ways to reaches with; empty: it believes that most actions work."""
     tries: Annotated[int, Meta(ge=0)] = 0
