@@ -13,8 +13,10 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.chain import Commands, Tick
+from bus_schema.messages import Reach
 from bus_schema.rpc import Config, Empty
 from mobee.errors import ActionInterrupted, MobeeError
+from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachTarget
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Array, Robot
@@ -30,7 +32,9 @@ WHO = "mobee_reach"
 PATIENCE = 0.3  # s for a system that runs to answer
 CONTROL = 8.0  # s for the part to come under control and its goal to be free
 LONGEST = 300.0  # s of the clock on the wall for a reach, whatever the robot does
-MOVES = 5e-3  # rad/s by which a command differs from those before the request
+NOTED = 1.0  # s from the request for which commands are noted
+_RESTLESS = f"has not come to rest in {LONGEST:g} s: is the robot paused? See `mobee status`"
+MOVES = 5e-3  # rad/s by which a command that moves differs from the last before the reach began
 
 
 class LivePlant(BusPlant):
@@ -40,9 +44,10 @@ class LivePlant(BusPlant):
         super().__init__(service, robot, (part,))
         self._link, self._where = service, robot.part(part).slice
         self._q: Array | None = None
-        self._before: Array | None = None  # the newest command before the request
-        self._asked, self._moved = 0.0, 0.0  # s, monotonic clock
+        self._asked = self._begun = np.inf  # s, monotonic clock: the request, and when the controller began
+        self._commands: list[tuple[float, Array]] = []  # when sent, what: the last before the request, and those after
         service.on_newest(keys.TICK, Tick, self._note_tick)
+        service.on_each(keys.reach(part), Reach, self._note_reach, part=part)
         service.on_each(keys.COMMANDS, Commands, self._note_commands)
 
     def q(self) -> Array:
@@ -55,48 +60,62 @@ class LivePlant(BusPlant):
 
     def measure(self, part: str) -> Array:
         """As a BusPlant, but with an end: raises UserError while somebody holds the part."""
-        waiting = [True]
-        self._end_after(CONTROL, waiting, f"{part} is in hold: `mobee status` says why, `mobee estop --reset` ends an emergency stop")
-        try:
-            return super().measure(part)
-        except ActionInterrupted:
-            raise
-        except MobeeError as error:
-            raise UserError(f"{error}. `mobee launch reach` starts a system in which nobody owns it.", FAILED) from None
-        finally:
-            waiting.clear()
+        with self._at_most(CONTROL, f"{part} is in hold: `mobee status` says why, `mobee estop --reset` ends an emergency stop"):
+            try:
+                return super().measure(part)
+            except ActionInterrupted:
+                raise
+            except MobeeError as error:
+                raise UserError(f"{error}. `mobee launch reach` starts a system in which nobody owns it.", FAILED) from None
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """As a BusPlant, but with an end."""
+        with self._at_most(LONGEST, f"{part} {_RESTLESS}"):
+            return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """As a BusPlant, but with an end."""
-        waiting = [True]
-        self._end_after(LONGEST, waiting, f"{part} has not come to rest in {LONGEST:g} s: is the robot paused? See `mobee status`")
-        self._asked, self._moved = time.monotonic(), 0.0
-        try:
+        self._asked, self._begun = time.monotonic(), np.inf
+        with self._at_most(LONGEST, f"{part} {_RESTLESS}"):
             return super().reach(part, marker, stay)
-        finally:
-            waiting.clear()
 
     def first_motion(self) -> float | None:
         """From the last request to the first command that moves, in s; None if none came."""
-        return self._moved - self._asked if self._moved else None
+        before, *_ = [ref for sent, ref in reversed(self._commands) if sent < self._begun] or [None]
+        for sent, ref in self._commands:
+            if sent >= self._begun and before is not None and np.abs(ref - before).max() > MOVES:
+                return sent - self._asked
+        return None
 
-    def _end_after(self, patience: float, waiting: list[bool], why: str) -> None:
+    @contextmanager
+    def _at_most(self, patience: float, why: str) -> Iterator[None]:
+        """Raise UserError out of whatever is waited for in there, after s of the clock on the wall."""
+        waits = True
+
         def end() -> None:
-            if waiting:
+            if waits:
                 raise UserError(why, ENVIRONMENT)
 
         self._link.inbox.at(time.monotonic() + patience, end)
+        try:
+            yield
+        finally:
+            waits = False
 
     def _note_tick(self, tick: Tick) -> None:
         self._q = np.array(tick.q)
 
+    def _note_reach(self, reach: Reach) -> None:
+        """Its sender's clock is this machine's."""
+        if reach.phase == "reaching" and reach.tw * 1e-9 > self._asked:
+            self._begun = min(self._begun, reach.tw * 1e-9)
+
     def _note_commands(self, commands: Commands) -> None:
-        """The sender's clock is this machine's."""
-        ref, sent = np.array(commands.ref[self._where]), commands.tw * 1e-9
-        if self._asked == 0.0 or sent < self._asked:
-            self._before = ref
-        elif not self._moved and self._before is not None and np.abs(ref - self._before).max() > MOVES:
-            self._moved = sent
+        sent = commands.tw * 1e-9
+        if sent < self._asked:
+            self._commands.clear()
+        if sent < self._asked + NOTED:
+            self._commands.append((sent, np.array(commands.ref[self._where])))
 
 
 @contextmanager

@@ -38,7 +38,7 @@ def test_live_reaches_in_lockstep_are_those_of_the_offline_plant_to_the_bit(tmp_
     live = json.loads((Path(summary["run"]) / "reaches.json").read_text())
     robot, world = load_robot("icub"), load_world("table")
     world.remove("ball")  # live, nobody sees it without cameras
-    plant = OfflinePlant(Model(robot, world), seed=SEED, gains=Gains.named("published_2014"), dt=TICK)
+    plant = OfflinePlant(Model(robot, world), seed=SEED, gains=Gains.default(), dt=TICK)
     offline = list(perform(plant))
     assert live == offline
     print("mm missing:", [round(1e3 * outcome["missing"]) for outcome in offline if "missing" in outcome])
