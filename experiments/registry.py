@@ -31,6 +31,7 @@ EXPERIMENTS = {
     "rank4": "experiments.rank4",
     "reach": "experiments.reach",
     "reach-predictors": "experiments.reach_predictors",
+    "reach-vs-planners": "experiments.reach_vs_planners",
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,12 +28,16 @@ DRAWS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A target, the pose (4,) rad to begin in, and if there are, where an obstacle is and where the target goes, (3,) m."""
+    """A target, the pose (4,) rad to begin in, and if there are, where an obstacle is and where the target goes, (3,) m.
+
+    `to_and_fro`: it never stops.
+    """
 
     target: ReachTarget
     start: Array
     obstacle: Array | None = None
     to: Array | None = None
+    to_and_fro: bool = False
 
     def world(self) -> World:
         """All but the target."""
@@ -47,8 +51,14 @@ class Case:
         if self.to is None:
             return self.target.position
         way = self.to - self.target.position
-        found: Array = self.target.position + way * min(1.0, SPEED * seconds / float(np.linalg.norm(way)))
+        gone = SPEED * seconds / float(np.linalg.norm(way))
+        share = 1.0 - abs(1.0 - gone % 2.0) if self.to_and_fro else min(1.0, gone)
+        found: Array = self.target.position + share * way
         return found
+
+    def seen_at(self, seconds: float) -> ReachTarget:
+        """The target so long after it was presented first."""
+        return replace(self.target, position=self.target_at(seconds))
 
 
 def make_cases(scene: str, count: int, seed: int) -> list[Case]:

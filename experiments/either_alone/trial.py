@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from experiments.control.ride import place
 from experiments.either_alone.cases import Case
 from experiments.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, reachable, space
-from mobee import OfflinePlant
+from mobee import MotorParameters, OfflinePlant
 from mobee.learning.explorers import choose
 from mobee.learning.reaching.acting import move
 from mobee.learning.reaching.reach_agent import ReachAgent
@@ -24,10 +25,11 @@ LIMIT = 10  # actions
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """What the palm missed in the end [m], and s of plant time."""
+    """What the palm missed in the end [m], s of plant time, and s of this machine's time in which nothing moved but a plan was made."""
 
     missing: float
     seconds: float
+    thinking: float = 0.0
 
 
 def trained(seed: int, transitions: int, tries: int) -> ReachAgent:
@@ -38,26 +40,28 @@ def trained(seed: int, transitions: int, tries: int) -> ReachAgent:
     return agent
 
 
-def attempt(way: str, agent: ReachAgent, case: Case, seed: int) -> Attempt:
+def attempt(way: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None) -> Attempt:
     """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other."""
-    plant = arm_plant(seed, case.world())
-    place(plant, arm_belief().whole(case.start))
-    begun = plant.time
-
-    def present(now: float) -> None:
-        plant.present(ReachTarget(case.target_at(now - begun), case.target.radius, "surface"))
-
-    present(begun)
-    plant.every(EVERY, present if case.to is not None else None)
+    plant = begun(case, seed, motors)
+    start, thinking = plant.time, 0.0
+    plant.present(case.target)
+    plant.every(EVERY, (lambda now: plant.present(case.seen_at(now - start))) if case.to is not None else None)
     if way != "reach":
         rng = np.random.default_rng([seed, 88])
-        _go(plant, agent, (lambda target: agent.predictor.mean(target)) if way == "both" else _nearness, case, begun, rng)
+        thinking = _go(plant, agent, agent.predictor.mean if way == "both" else _nearness, case, start, rng)
     if way == "planner":
         q = np.concatenate([plant.measure(part) for part in plant.robot.parts])
-        target = ReachTarget(case.target_at(plant.time - begun), case.target.radius, "surface")
-        return Attempt(target.missing(plant.model.evaluate(q).position(MARKER)), plant.time - begun)
+        missing = case.seen_at(plant.time - start).missing(plant.model.evaluate(q).position(MARKER))
+        return Attempt(missing, plant.time - start, thinking)
     outcome = plant.reach(PART, MARKER)
-    return Attempt(outcome.missing, plant.time - begun)
+    return Attempt(outcome.missing, plant.time - start, thinking)
+
+
+def begun(case: Case, seed: int, motors: MotorParameters | None = None) -> OfflinePlant:
+    """The arm at rest where a case begins."""
+    plant = arm_plant(seed, case.world(), motors)
+    place(plant, arm_belief().whole(case.start))
+    return plant
 
 
 def _nearness(target: Array) -> Array:
@@ -67,17 +71,22 @@ def _nearness(target: Array) -> Array:
 
 
 def _go(
-    plant: OfflinePlant, agent: ReachAgent, worth: Callable[[Array], Array], case: Case, begun: float, rng: np.random.Generator
-) -> None:
-    """Follow the plan to where ending it is worth most, as an evaluation does: failures are remembered meanwhile (thesis 8.1, 8.3.3)."""
-    failures, columns = agent.failures.copy(), space().columns
+    plant: OfflinePlant, agent: ReachAgent, worth: Callable[[Array], Array], case: Case, start: float, rng: np.random.Generator
+) -> float:
+    """Follow the plan to where ending it is worth most, as an evaluation does: failures are remembered meanwhile (thesis 8.1, 8.3.3).
+
+    Returns s of this machine's time spent on plans.
+    """
+    failures, columns, thinking = agent.failures.copy(), space().columns, 0.0
     state = space().state_of(plant.measure(PART)[columns])
     for _ in range(LIMIT - 1):
-        target = case.target_at(plant.time - begun)
+        target, asked = case.target_at(plant.time - start), time.perf_counter()
         values, action_values = agent.planning.values(np.maximum(worth(target), 0.0), failures.rewards(target))
         action = choose(action_values[state], rng)
+        thinking += time.perf_counter() - asked
         if action == space().goals.shape[1]:
-            return
+            break
         _, following = move(plant, space(), state, action)
         failures.add(state, action, target, agent.penalty if values[following] <= values[state] else 0.0)
         state = following
+    return thinking

@@ -100,8 +100,7 @@ def reachable() -> tuple[ReachTarget, ...]:
 def touchable(belief: PeerBelief, target: ReachTarget) -> bool:
     """Whether, of all that is believed, the palm can touch a target where nothing pushes."""
     belief.present(target)
-    poses = goals(belief, target, np.random.default_rng(0), most=1)[0]
-    return bool(len(poses) and ((poses >= belief.limits[:, 0]) & (poses <= belief.limits[:, 1])).all())
+    return len(goals(belief, target, np.random.default_rng(0), most=1, free=True)[0]) > 0
 
 
 def straight_ways(pairs: Sequence[tuple[int, int]], looks: int = 21) -> Array:
