@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -28,7 +29,7 @@ from services.common.config import ServiceConfig
 from services.common.service import Service
 from services.common.session import BusUnreachable, open_client
 
-WHO = "mobee_reach"
+WHO = f"mobee_reach_{os.getpid()}"  # so that of two who present a target the second is told
 PATIENCE = 0.3  # s for a system that runs to answer
 CONTROL = 8.0  # s for the part to come under control and its goal to be free
 LONGEST = 300.0  # s of the clock on the wall for a reach, whatever the robot does

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from bus_schema import keys
@@ -36,7 +38,8 @@ class ReachClient:
         if target is not None:
             self._put(target)
         elif self._is_there:
-            self._call("remove", OneName, name=TARGET)
+            with suppress(InvalidValue):  # somebody else has taken it away already
+                self._call("remove", OneName, name=TARGET)
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:

@@ -115,3 +115,11 @@ def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeSer
     with pytest.raises(ActionInterrupted, match="does not say what there is"):
         client.present_object("ball")
     client.leave()  # nobody need hear of it
+
+
+def test_a_target_that_somebody_else_has_taken_away_is_not_missed(service: FakeService, client: ReachClient) -> None:
+    client.present(ReachTarget(np.array(AT)))
+    service.failure = CallFailed("world", "unknown world object 'reach_target'")
+    client.present(None)
+    with pytest.raises(InvalidValue, match="nothing is presented"):
+        client.asked()
