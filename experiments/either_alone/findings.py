@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,19 +23,25 @@ TOLD = {
     "between": "past an obstacle between hand and target",
     "moving": "to a target that moves meanwhile",
 }
+LAWS = ("published", "default")
+MEASURE = {"published": "reward", "default": "success"}
+"""What decides: under the published law, whose reaches pull against the attractor, no palm comes within 2 cm of the surface."""
 CLAIMS = tuple(
-    Claim("thesis 5.3, 8.2, 9.3", f"coarse planner and reactive reach together do more than either alone: {what}", "no number")
+    Claim("thesis 5.3, 8.2, 9.3", f"coarse planner and reactive reach together do more than either alone: {what} ({law} law)", "no number")
+    for law in LAWS
     for what in TOLD.values()
 )
 
 
-def success(done: Mapping[str, CellResult], scene: str, way: str) -> Array:
-    """The share of cases with the palm within 2 cm of the surface, (seeds,)."""
-    return np.array([(one.values[f"{scene}|{way}|missing"] <= GOOD).mean() for one in _ordered(done)])
+def measured(done: Mapping[str, CellResult], law: str, scene: str, way: str, measure: str) -> Array:
+    """The mean over the cases, (seeds,); "success": the palm within 2 cm of the surface."""
+    name = "missing" if measure == "success" else measure
+    each = [one.values[f"{scene}|{way}|{name}"] for one in _of(done, law)]
+    return np.array([(values <= GOOD if measure == "success" else values).mean() for values in each])
 
 
 def better(both: Array, alone: Mapping[str, Array]) -> bool | None:
-    """Whether both together have more success (seeds,) than each alone; False if less than one."""
+    """Whether both together do more (seeds,) than each alone; False if less than one."""
     spans = [interval(both - other) for other in alone.values()]
     if all(low > 0.0 for low, _ in spans):
         return True
@@ -44,30 +51,27 @@ def better(both: Array, alone: Mapping[str, Array]) -> bool | None:
 def claims(done: Mapping[str, CellResult]) -> list[Claim]:
     """The claims with our numbers."""
     found = []
-    for scene, claim in zip(SCENES, CLAIMS, strict=True):
-        each = {way: success(done, scene, way) for way in WAYS}
-        text = "success " + ", ".join(f"{'both' if way == 'both' else way + ' alone'} {told(values)}" for way, values in each.items())
-        found.append(claim.measured(text, better(each["both"], {way: each[way] for way in WAYS[:2]})))
+    for (law, scene), claim in zip(product(LAWS, SCENES), CLAIMS, strict=True):
+        if not _of(done, law):
+            found.append(claim.measured("not measured", None))
+            continue
+        each = {way: measured(done, law, scene, way, MEASURE[law]) for way in WAYS}
+        numbers = ", ".join(f"{'both' if way == 'both' else way + ' alone'} {told(values)}" for way, values in each.items())
+        found.append(claim.measured(f"{MEASURE[law]} {numbers}", better(each["both"], {way: each[way] for way in WAYS[:2]})))
     return found
 
 
 def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
     """The table of the results, as text."""
     rows = []
-    for scene in SCENES:
-        for way in WAYS:
-            measured = {name: [one.values[f"{scene}|{way}|{name}"] for one in _ordered(done)] for name in ("missing", "seconds")}
-            rows.append(
-                {
-                    "scene": scene,
-                    "who": way,
-                    "success": told(success(done, scene, way)),
-                    "median missing [cm]": told([100.0 * float(np.median(values)) for values in measured["missing"]], 1),
-                    "seconds": told([float(values.mean()) for values in measured["seconds"]], 1),
-                }
-            )
+    for law, scene, way in product(LAWS, SCENES, WAYS):
+        if _of(done, law):
+            row = {measure: told(measured(done, law, scene, way, measure)) for measure in ("success", "reward")}
+            missing = told([100.0 * float(np.median(one.values[f"{scene}|{way}|missing"])) for one in _of(done, law)], 1)
+            seconds = told(measured(done, law, scene, way, "seconds"), 1)
+            rows.append({"law": law, "scene": scene, "who": way, **row, "median missing [cm]": missing, "seconds": seconds})
     return {"cases": rows}
 
 
-def _ordered(done: Mapping[str, CellResult]) -> list[CellResult]:
-    return sorted(done.values(), key=lambda one: one.cell.seed)
+def _of(done: Mapping[str, CellResult], law: str) -> list[CellResult]:
+    return sorted((one for one in done.values() if one.cell.settings["law"] == law), key=lambda one: one.cell.seed)

@@ -32,6 +32,7 @@ from experiments.reaching.judged_plant import JudgedPlant
 from experiments.reaching.planner_peer import PlannerPeer
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import MotorParameters
+from mobee.reach import reward_of
 
 NAME = "reach-vs-planners"
 CLAIM = "the learned reacher is no worse than planning with a perfect model, also under noise and to moving targets"
@@ -91,7 +92,7 @@ def planned(case: Case, seed: int, motors: MotorParameters | None) -> Attempt:
         plant.inner.every(EVERY, lambda now: plant.present(case.seen_at(now - start)))
     peer = PlannerPeer(plant, arm_belief(case.world()), PART, "none", seed)
     tried = peer.try_problem(case.target, lambda: case.seen_at(plant.time - start))
-    return Attempt(tried.missing, tried.seconds, tried.planning)
+    return Attempt(tried.missing, tried.seconds, tried.planning, reward_of(tried.missing))
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:

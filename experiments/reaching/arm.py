@@ -1,4 +1,4 @@
-"""The right arm of today's robot under the default law: its states, its plant, and what a planner knows of it.
+"""The right arm, today's under the default law or that of 2014 under the published one: states, plant, and what a planner knows of it.
 
 The four joints of the published lattice move, the wrist and the fingers are rigid at home.  A try succeeds if the palm comes within 2 cm
 of the surface of a target of 10 cm.
@@ -7,21 +7,23 @@ of the surface of a target of 10 cm.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 import mobee
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.learning.published import robot as published_robot
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import goals
+from experiments.reaching.scene import MARKER, PART, laws
 from experiments.reaching.targets import grid, targets_at
-from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
+from mobee import CuriousAgent, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import ReachPlant, ReachTarget
 from mobee.robot.robot import Array, Robot
 
-PART, MARKER = "right_arm", "right_palm"
 GOOD = 0.02  # m from the surface
 TARGETS = 27
 LEARNED = 3000  # curious transitions before the first target (thesis 7.2.2: 2987)
@@ -29,78 +31,80 @@ PREDICTOR, STRATEGY = "gp", "ucb"
 
 
 @cache
-def body() -> Robot:
-    """The robot."""
-    return mobee.load_robot("icub")
+def body(law: str = "default") -> Robot:
+    """Today's robot; that of 2014 for the published law."""
+    return published_robot() if law == "published" else mobee.load_robot("icub")
 
 
 @cache
-def space() -> Lattice:
+def space(law: str = "default") -> Lattice:
     """81 states, with the 16 nearest as neighbours."""
-    return Lattice(body(), RIGHT, RANK3, ARM_NEIGHBOURS)
+    return Lattice(body(law), RIGHT, RANK3, ARM_NEIGHBOURS)
 
 
 @cache
-def hands() -> Array:
+def hands(law: str = "default") -> Array:
     """Where the palm is in each state, (S, 3) m, root frame."""
-    home = np.tile(body().home, (len(space()), 1))
-    home[:, [body().motor_index(name) for name in RIGHT]] = space().samples
-    found: Array = Model(body()).evaluate(home).position(MARKER)
+    robot = body(law)
+    poses = np.tile(robot.home, (len(space(law)), 1))
+    poses[:, [robot.motor_index(name) for name in RIGHT]] = space(law).samples
+    found: Array = Model(robot).evaluate(poses).position(MARKER)
     return found
 
 
-def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None) -> OfflinePlant:
+def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
     """The plant; `motors`: None for the usual ones."""
-    return OfflinePlant(Model(body(), world), seed, motors=motors, active=RIGHT)
+    chosen = laws()[law]
+    return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
 
 
-def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None) -> PeerBelief:
+def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None, law: str = "default") -> PeerBelief:
     """What a planner believes: a world, the rows of the cables if it knows them, joints that stand `turns` (4,) rad elsewhere."""
-    clauses = [clause for clause in body().clauses if clause.part == PART] if cables else []
-    return PeerBelief(Model(body(), world), RIGHT, MARKER, clauses, Gains.default(), turns)
+    clauses = [clause for clause in body(law).clauses if clause.part == PART] if cables else []
+    return PeerBelief(Model(body(law), world), RIGHT, MARKER, clauses, laws()[law].gains, turns)
 
 
-def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = LEARNED) -> TransitionModel:
+def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = LEARNED, law: str = "default") -> TransitionModel:
     """What a curious agent learns of the transitions while nothing is presented."""
-    agent = CuriousAgent(space(), plant, seed=seed)
+    agent = CuriousAgent(space(law), plant, seed=seed)
     agent.run(transitions)
     return agent.model
 
 
-def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int) -> ReachAgent:
+def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
     """The learner: the shipped predictor, failures remembered locally, the model learned on (thesis 9.4.1)."""
     return ReachAgent(
-        space(),
+        space(law),
         plant,
         marker=MARKER,
         predictor=PREDICTOR,
         strategy=STRATEGY,
         failures="local",
         model=model,
-        hands=hands(),
+        hands=hands(law),
         seed=seed,
     )
 
 
 @cache
-def reachable() -> tuple[ReachTarget, ...]:
+def reachable(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
     """TARGETS that the palm can touch in an empty world: those of the thesis' 27, and others drawn between them.
 
-    So that neither cables nor joint limits push, and no solid but the hand's is in the target.
+    So that no solid but the hand's is in the target, cables hold, and, if `free`, no joint limit pushes.
     """
-    belief, rng = arm_belief(), np.random.default_rng(27)
-    places = grid()
-    found = [target for target in targets_at(places, "surface") if touchable(belief, target)]
+    belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
+    found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
     while len(found) < TARGETS:
-        target = targets_at(rng.uniform(places.min(axis=0), places.max(axis=0))[None], "surface")[0]
-        found += [target] if touchable(belief, target) else []
+        target = targets_at(rng.uniform(places.min(axis=0), places.max(axis=0))[None], aim)[0]
+        found += [target] if touchable(belief, target, free) else []
     return tuple(found)
 
 
-def touchable(belief: PeerBelief, target: ReachTarget) -> bool:
-    """Whether, of all that is believed, the palm can touch a target where nothing pushes."""
-    belief.present(target)
-    return len(goals(belief, target, np.random.default_rng(0), most=1, free=True)[0]) > 0
+def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> bool:
+    """Whether, of all that is believed, the palm can touch a target; `free`: where no joint limit pushes."""
+    to_surface = replace(target, aim="surface")
+    belief.present(to_surface)
+    return len(goals(belief, to_surface, np.random.default_rng(0), most=1, free=free)[0]) > 0
 
 
 def straight_ways(pairs: Sequence[tuple[int, int]], looks: int = 21) -> Array:

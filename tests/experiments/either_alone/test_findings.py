@@ -4,23 +4,24 @@ import numpy as np
 import pytest
 
 from experiments.either_alone.cases import SCENES
-from experiments.either_alone.findings import CLAIMS, better, claims, summary
+from experiments.either_alone.findings import CLAIMS, LAWS, better, claims, summary
 from experiments.either_alone.trial import WAYS
 from experiments.sweep import Cell
 
 
 class Done:
-    def __init__(self, seed, shares):
-        self.cell = Cell(f"all-s{seed}", seed)
+    def __init__(self, law, seed, shares):
+        self.cell = Cell(f"{law}-s{seed}", seed, {"law": law})
         self.values = {}
         for scene in SCENES:
             for way in WAYS:
                 self.values[f"{scene}|{way}|missing"] = np.where(np.arange(10) < 10 * shares[way], 0.01, 0.1)
                 self.values[f"{scene}|{way}|seconds"] = np.full(10, 5.0)
+                self.values[f"{scene}|{way}|reward"] = np.full(10, shares[way] / 10.0)
 
 
 def sweep(**shares):
-    return {f"all-s{seed}": Done(seed, shares) for seed in range(6)}
+    return {f"{law}-s{seed}": Done(law, seed, shares) for seed in range(6) for law in LAWS}
 
 
 @pytest.mark.parametrize(("planner", "reach", "expected"), [(0.2, 0.6, True), (0.2, 0.8, None), (0.9, 0.1, False)])
@@ -29,13 +30,13 @@ def test_both_must_have_more_success_than_each_alone(planner, reach, expected):
     assert better(both, {"planner": np.full(6, planner), "reach": np.full(6, reach)}) is expected
 
 
-def test_each_scene_is_a_claim_of_its_own():
+def test_each_scene_is_a_claim_of_its_own_by_what_decides_under_the_law():
     found = claims(sweep(planner=0.3, reach=0.5, both=0.9))
-    assert len(found) == len(CLAIMS) == len(SCENES) and {claim.verdict for claim in found} == {"confirmed"}
-    assert "both 0.90" in found[0].ours and "planner alone 0.30" in found[0].ours
+    assert len(found) == len(CLAIMS) == len(LAWS) * len(SCENES) and {claim.verdict for claim in found} == {"confirmed"}
+    assert "reward planner alone 0.03" in found[0].ours and "success planner alone 0.30" in found[-1].ours
 
 
 def test_the_table_tells_success_and_what_is_missing():
     rows = summary(sweep(planner=0.3, reach=0.5, both=0.9))["cases"]
-    assert len(rows) == len(SCENES) * len(WAYS)
+    assert len(rows) == len(LAWS) * len(SCENES) * len(WAYS)
     assert rows[0]["success"].startswith("0.30") and rows[0]["median missing [cm]"].startswith("10.0")
