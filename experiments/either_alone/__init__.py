@@ -9,6 +9,7 @@ thesis and others between them, and arbitrary poses to begin in (no home pose, n
 "planner": the MDP leads to the state whose sample holds the palm nearest to the target, and there it ends.  "reach": the palm is drawn
 to the target from where it is.  "both": a learner, after 3000 curious transitions and 800 tries without obstacles, plans to where it
 expects most of a reach, and reaches; it learns nothing from these cases.  Both planners remember within a case which transitions failed.
+Under the default law who reached and missed reaches again, up to three times a case: planned from another state, alone from where it is.
 Scenes: free space; the hand on the far side of the target, as seen from the shoulder; the arm within 3 cm of the object, the palm turned
 away; a ball of 8 cm between hand and target, of which only MoBeE knows; a target that moves 5 to 12 cm at 3 cm/s.
 What decides is success, the palm within 2 cm of the target's surface when the force ends; under the published law, where the spring and

@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.control.ride import place
 from experiments.either_alone.cases import Case
-from experiments.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, reachable
+from experiments.reaching.arm import GOOD, MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, reachable
 from mobee import MotorParameters, OfflinePlant
 from mobee.learning.explorers import choose
 from mobee.learning.reaching.acting import move
@@ -21,7 +21,8 @@ from mobee.robot.robot import Array
 
 WAYS = ("planner", "reach", "both")
 EVERY = 5  # ticks, after which a target has moved on
-LIMIT = 10  # actions
+LIMIT = 10  # actions before a reach, and that
+REACHES = {"published": 1, "default": 3}  # a case; under the published law none comes so near that it would be the last
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,22 +48,31 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default") -> Re
 
 
 def attempt(way: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
-    """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other."""
+    """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other.
+
+    Who reaches and misses may reach again, as often as REACHES says.
+    """
     plant = begun(case, seed, motors, law)
-    start, thinking = plant.time, 0.0
+    start = plant.time
     plant.present(case.target)
     plant.every(EVERY, (lambda now: plant.present(case.seen_at(now - start))) if case.to is not None else None)
-    if way != "reach":
-        rng = np.random.default_rng([seed, 88])
-        worth = agent.predictor.mean if way == "both" else partial(_nearness, hands(law))
-        thinking = _go(plant, agent, worth, case, start, rng)
-    if way == "planner":
-        whole = np.concatenate([plant.measure(part) for part in plant.robot.parts])
-        aimed = case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
-    else:
-        aimed = plant.reach(PART, MARKER).missing
-    missing = aimed if case.target.aim == "surface" else max(aimed - case.target.radius, 0.0)
-    return Attempt(missing, plant.time - start, thinking, reward_of(aimed))
+    worth = partial(_nearness, hands(law)) if way == "planner" else agent.predictor.mean
+    course = _Course(plant, agent, worth, case, np.random.default_rng([seed, 88]))
+    for _ in range(1 if way == "planner" else REACHES[law]):
+        if way != "reach":
+            course.go()
+        aimed = _missing(plant, case, start) if way == "planner" else plant.reach(PART, MARKER).missing
+        missing = aimed if case.target.aim == "surface" else max(aimed - case.target.radius, 0.0)
+        if missing <= GOOD:
+            break
+        course.missed()
+    return Attempt(missing, plant.time - start, course.thinking, reward_of(aimed))
+
+
+def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
+    """How far the palm is from where it was to be, now, m."""
+    whole = np.concatenate([plant.measure(part) for part in plant.robot.parts])
+    return case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
 
 
 def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
@@ -78,23 +88,37 @@ def _nearness(palms: Array, target: Array) -> Array:
     return np.array([reward_of(float(distance)) for distance in distances])
 
 
-def _go(
-    plant: OfflinePlant, agent: ReachAgent, worth: Callable[[Array], Array], case: Case, start: float, rng: np.random.Generator
-) -> float:
-    """Follow the plan to where ending it is worth most, as an evaluation does: failures are remembered meanwhile (thesis 8.1, 8.3.3).
+class _Course:
+    """The way of one case by plans, as in an evaluation (thesis 8.3.3); what failed in it and from where a reach missed is remembered."""
 
-    Returns s of this machine's time spent on plans.
-    """
-    failures, columns, thinking = agent.failures.copy(), agent.space.columns, 0.0
-    state = agent.space.state_of(plant.measure(PART)[columns])
-    for _ in range(LIMIT - 1):
-        target, asked = case.target_at(plant.time - start), time.perf_counter()
-        values, action_values = agent.planning.values(np.maximum(worth(target), 0.0), failures.rewards(target))
-        action = choose(action_values[state], rng)
-        thinking += time.perf_counter() - asked
-        if action == agent.space.goals.shape[1]:
-            break
-        _, following = move(plant, agent.space, state, action)
-        failures.add(state, action, target, agent.penalty if values[following] <= values[state] else 0.0)
-        state = following
-    return thinking
+    def __init__(
+        self, plant: OfflinePlant, agent: ReachAgent, worth: Callable[[Array], Array], case: Case, rng: np.random.Generator
+    ) -> None:
+        self._plant, self._agent, self._worth, self._case, self._rng = plant, agent, worth, case, rng
+        self._failures, self._begun = agent.failures.copy(), plant.time
+        self._state = -1
+        self._spent: list[int] = []
+        self.thinking = 0.0
+        """s of this machine's time spent on plans."""
+
+    def go(self) -> None:
+        """Follow the plan to where ending it is worth most, or until the actions are used up."""
+        space = self._agent.space
+        self._state = space.state_of(self._plant.measure(PART)[space.columns])
+        for _ in range(LIMIT - 1):
+            target, asked = self._case.target_at(self._plant.time - self._begun), time.perf_counter()
+            worth = np.maximum(self._worth(target), 0.0)
+            worth[self._spent] = 0.0
+            values, action_values = self._agent.planning.values(worth, self._failures.rewards(target))
+            action = choose(action_values[self._state], self._rng)
+            self.thinking += time.perf_counter() - asked
+            if action == space.goals.shape[1]:
+                return
+            _, following = move(self._plant, space, self._state, action)
+            failed = values[following] <= values[self._state]
+            self._failures.add(self._state, action, target, self._agent.penalty if failed else 0.0)
+            self._state = following
+
+    def missed(self) -> None:
+        """Expect nothing more of reaching from here in this case."""
+        self._spent.append(self._state)
