@@ -76,7 +76,8 @@ def found_in(folders: Sequence[Path]) -> Recorded:
             config = read(entry / CONFIG)
             claims = open_with_few_seeds(read(entry / RESULTS), config["options"]).get("claims")
             if claims:
-                seeds, commit = config["options"].get("seeds"), read(folder / VERSIONS).get("commit")
+                run = folder if (folder / VERSIONS).exists() else folder.parent  # a part of chapter7 has it in the whole's folder
+                seeds, commit = config["options"].get("seeds"), read(run / VERSIONS).get("commit")
                 found = better(found, {config["experiment"]: {"seeds": seeds, "commit": commit, "claims": claims}})
     return found
 

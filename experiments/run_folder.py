@@ -43,13 +43,23 @@ def discard_unused(folder: Path) -> None:
         shutil.rmtree(folder)
 
 
-def options_of(folder: Path, name: str) -> dict[str, Any]:
-    """With what options a run was begun; raises InvalidValue if it is no run of that experiment."""
+def experiment_of(folder: Path) -> str:
+    """Of which experiment a run is; raises InvalidValue if it is no run."""
+    return _begun(folder)[0]
+
+
+def _begun(folder: Path) -> tuple[str, dict[str, Any]]:
+    """Name and options."""
     try:
         config = json.loads((folder / CONFIG).read_text())
-        begun, options = config["experiment"], dict(config["options"])
+        return str(config["experiment"]), dict(config["options"])
     except (OSError, ValueError, KeyError, TypeError):
         raise InvalidValue(f"{folder} is not the folder of a run: it has no readable {CONFIG}.") from None
+
+
+def options_of(folder: Path, name: str) -> dict[str, Any]:
+    """With what options a run was begun; raises InvalidValue if it is no run of that experiment."""
+    begun, options = _begun(folder)
     if begun != name:
         raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
     return options

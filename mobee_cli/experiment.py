@@ -14,7 +14,18 @@ from experiments.claims import Claim, open_with_few_seeds
 from experiments.claims_table import better, claims_text, finished_runs, found_in, recorded, rows, write_page
 from experiments.matplotlib_figure import MatplotlibMissing
 from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import RESULTS, discard_unused, given_run, held, keep_options, new_run, newest_run, options_of, write
+from experiments.run_folder import (
+    RESULTS,
+    discard_unused,
+    experiment_of,
+    given_run,
+    held,
+    keep_options,
+    new_run,
+    newest_run,
+    options_of,
+    write,
+)
 from experiments.sweep import CellsFailed
 from mobee.errors import InvalidValue, MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
@@ -36,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     running.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
     running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="of the experiment")
     drawing = actions.add_parser("figure", help="draw a run", description="Draw the figure of a run.")
-    drawing.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
-    drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run (default: the newest)")
+    drawing.add_argument("name", metavar="NAME|RUN", help=f"folder of a run, or of whose newest: {', '.join(EXPERIMENTS)}")
+    drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run, after a name")
     drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest is looked for (default: runs)")
     drawing.add_argument("--json", action="store_true", help="print as JSON")
     text = "The table of claims: what was published, what was found here. Without RUN and --write: as experiments/README.md has it."
@@ -55,9 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
             return _list(arguments)
         if arguments.action == "claims":
             return _claims(arguments)
-        experiment = load_experiment(arguments.name)
         if arguments.action == "figure":
-            return _figure(experiment, arguments)
+            return _figure(arguments)
+        experiment = load_experiment(arguments.name)
         return _run(experiment, _options(experiment, arguments.make_parser, arguments.options))
     except MatplotlibMissing as error:
         raise UserError(str(error), ENVIRONMENT) from None
@@ -159,8 +170,11 @@ def _claims(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _figure(experiment: Experiment, arguments: argparse.Namespace) -> int:
-    runs, name = arguments.runs, experiment.NAME
-    path = experiment.figure(given_run(arguments.folder, runs, name) if arguments.folder else newest_run(runs, name))
+def _figure(arguments: argparse.Namespace) -> int:
+    runs, name, folder = arguments.runs, arguments.name, arguments.folder
+    if folder is None and name not in EXPERIMENTS and Path(name).is_dir():
+        name, folder = experiment_of(Path(name)), Path(name)
+    experiment = load_experiment(name)
+    path = experiment.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0

@@ -55,6 +55,7 @@ def test_the_parts_of_a_chapter_count_and_a_later_run_more(tmp_path, claim):
     write(part / "config.json", {"experiment": "coverage", "options": {"seeds": 6}})
     write(part / "results.json", {"claims": [claim.measured("old", False).record()]})
     assert found_in([chapter])["coverage"]["seeds"] == 6
+    assert found_in([chapter / "coverage"]) == found_in([chapter])
     run = finished(tmp_path, "coverage", [claim.measured("new", True)])
     assert found_in([chapter, run])["coverage"]["claims"][0]["ours"] == "new"
     assert set(finished_runs(tmp_path)) == {chapter, run}

@@ -66,6 +66,8 @@ def test_a_figure_is_drawn_of_the_newest_run(tmp_path, capsys):
         folder = Path(capsys.readouterr().out.splitlines()[0].partition(": ")[2])
     assert main(["experiment", "figure", "flood", "--runs", str(tmp_path), "--json"]) == 0
     assert Path(json.loads(capsys.readouterr().out)["figure"]).parent == folder
+    assert main(["experiment", "figure", str(folder)]) == 0
+    assert Path(capsys.readouterr().out.strip()).parent == folder
 
 
 def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
