@@ -35,6 +35,7 @@ EXPERIMENTS = {
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
+    "simultaneous": "experiments.simultaneous",
     "table": "experiments.table",
     "transfer": "experiments.transfer",
     "tune": "experiments.tune",

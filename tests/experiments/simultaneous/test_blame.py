@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from experiments.simultaneous.blame import BlamingPlant
+from mobee.plant import Outcome
+from mobee.reach import TARGET
+
+
+class Stuck:
+    """Goes half of the way, and touches what it is told to touch."""
+
+    robot = None
+
+    def __init__(self, touched, share):
+        self.touched, self.share = touched, share
+
+    def act(self, part, target):
+        return Outcome(self.share * target, settled=True, duration=1.0, touched=self.touched)
+
+
+SPACE = SimpleNamespace(columns=np.array([0]), state_of=lambda q: round(float(q[0])))
+
+
+@pytest.mark.parametrize("touched", [(), (TARGET,)])
+@pytest.mark.parametrize(("share", "told"), [(1.0, ()), (0.5, (TARGET,))])
+def test_who_blames_the_target_has_touched_it_wherever_a_transition_fails(touched, share, told):
+    plant = BlamingPlant(Stuck(touched, share), SPACE, "target")
+    assert plant.act("arm", np.array([4.0])).touched == told
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_who_blames_the_model_has_touched_nothing(share):
+    plant = BlamingPlant(Stuck((TARGET,), share), SPACE, "model")
+    outcome = plant.act("arm", np.array([4.0]))
+    assert outcome.touched == () and outcome.q.tolist() == [4.0 * share]
