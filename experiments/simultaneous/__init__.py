@@ -6,7 +6,7 @@ Source: thesis 9.4.1 (future work).  Published: no numbers.  Run time: five minu
 
 The right arm under the published law and the 27 targets, as in `reach`; the learner that is shipped, or the thesis' (--learner published).
 Everybody has the same total of actions, reaches included and evaluations not.  "contact": both at once, failures attributed by contact.
-"first 3000", "first 1000": so many curious transitions without targets, as the thesis did it, then reaches; the model is changed no more.
+"first-3000", "first-1000": so many curious transitions without targets, as the thesis did it, then reaches; the model is changed no more.
 "model": both at once, and every transition is an update of the model, as if nothing were felt.  "target": both at once, and every
 transition that does not end in its goal is the target's fault, so that the model hears of successes alone.
 A score is the sum of the rewards of the 27 targets in one evaluation.  The error of a model is the mean L1 distance, 0 to 2, of its beliefs

@@ -15,11 +15,11 @@ from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints
 
-COLORS = {"contact": "tab:red", "first 3000": "tab:blue", "first 1000": "tab:cyan", "model": "tab:orange", "target": "0.4"}
+COLORS = {"contact": "tab:red", "first-3000": "tab:blue", "first-1000": "tab:cyan", "model": "tab:orange", "target": "0.4"}
 LABELS = {
     "contact": "at once, by contact",
-    "first 3000": "model first, 3000 transitions",
-    "first 1000": "model first, 1000 transitions",
+    "first-3000": "model first, 3000 transitions",
+    "first-1000": "model first, 1000 transitions",
     "model": "at once, all is the model's fault",
     "target": "at once, failures are the target's fault",
 }

@@ -23,7 +23,7 @@ EVEN = 0.05  # of that score: as much below still counts as equal
 _SOURCE = "thesis 9.4.1"
 SOONER = {
     way: Claim(_SOURCE, f"model and reaches at once need no more actions to {SHARE:.0%} of the final score of {told_of} first", "no number")
-    for way, told_of in (("first 3000", "3000 curious transitions"), ("first 1000", "1000 curious transitions"))
+    for way, told_of in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
 }
 LEVEL = Claim(_SOURCE, "with the same total of actions they end with no lower score than the better of these", "no number")
 CLEAN = Claim(_SOURCE, "contact keeps the model clean: its error is smaller than if all failures are the model's", "no number")

@@ -17,7 +17,7 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachPlant
 
-FIRST = {"first 3000": 3000, "first 1000": 1000}  # curious transitions before the first target
+FIRST = {"first-3000": 3000, "first-1000": 1000}  # curious transitions before the first target
 CONTACT = "contact"
 WAYS = (CONTACT, *FIRST, *BLAMES)
 

@@ -15,8 +15,8 @@ def runs(**changes):
     """Scores and errors at the three looks; nobody reaches before the model is learned."""
     given = {
         "contact": ((4.0, 8.0, 10.0), 0.05),
-        "first 3000": ((np.nan, np.nan, 9.0), 0.01),
-        "first 1000": ((1.0, 6.0, 10.0), 0.02),
+        "first-3000": ((np.nan, np.nan, 9.0), 0.01),
+        "first-1000": ((1.0, 6.0, 10.0), 0.02),
         "model": ((4.0, 7.0, 9.0), 0.2),
         "target": ((3.0, 5.0, 6.0), 0.3),
     } | changes
@@ -57,7 +57,7 @@ def test_all_claims_hold_where_contact_tells_whose_fault_it_is():
 
 
 def test_all_claims_fail_where_the_others_do_better():
-    worse = runs(contact=((1.0, 2.0, 3.0), 0.4), **{"first 3000": ((np.nan, 9.0, 9.0), 0.01)})
+    worse = runs(contact=((1.0, 2.0, 3.0), 0.4), **{"first-3000": ((np.nan, 9.0, 9.0), 0.01)})
     assert verdicts(worse) == ["refuted"] * len(CLAIMS)
 
 
