@@ -15,13 +15,14 @@ Aim = Literal["centre", "surface"]
 AIMS = ("centre", "surface")
 TARGET = "reach_target"  # name of the presented target in the plant's world
 RADIUS = 0.05  # m, of the thesis' targets (8.3)
+FARTHEST = 1e3  # m: farther than any robot sees, nearer than squares overflow
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachTarget:
     """A place to put a marker: a sphere, which is in everybody's way but the reaching hand's.
 
-    `position`: (3,) m, root frame.  `radius`: m, above 0.  `aim`: a marker is to come to its "centre" (thesis 8.2) or
+    `position`: (3,) m, root frame, at most 1 km off.  `radius`: m, above 0.  `aim`: a marker is to come to its "centre" (thesis 8.2) or
     to its "surface".  `normal`: (3,), root frame, where the marker's normal is to point; None: anywhere.
     """
 
@@ -33,8 +34,10 @@ class ReachTarget:
     def __post_init__(self) -> None:
         """Check; raises InvalidValue, UnknownName."""
         where = _triple(self.position, "position")
-        if not 0.0 < self.radius < np.inf:
-            raise InvalidValue(f"radius {self.radius!r} of the target: must be a finite length above 0 m")
+        if np.abs(where).max() > FARTHEST:
+            raise InvalidValue(f"position {where.tolist()} of the target: must be within {FARTHEST:g} m of the root frame's origin")
+        if not 0.0 < self.radius <= FARTHEST:
+            raise InvalidValue(f"radius {self.radius!r} of the target: must be a length above 0 m, at most {FARTHEST:g} m")
         if self.aim not in AIMS:
             raise UnknownName("aim", self.aim, AIMS)
         object.__setattr__(self, "position", where)

@@ -61,6 +61,7 @@ ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is 
 RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
 LONGEST = 0.2  # m: beyond it the pull grows no more
 SOFT = 0.03  # of the size of J E J^T: damping
+SOFTER = 60  # times at most that it is doubled: more than any finite force needs
 TOLERANCE = 2e-3  # m
 WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
 NUDGE = 0.1  # rad, out of a singular pose
@@ -235,7 +236,7 @@ def push_marker(reach: PackedReach, size: float, scale: float) -> None:
     real = reach.real
     rows = 3 + 3 * reach.whole[TURNED]
     soft = SOFT
-    while True:
+    for _ in range(SOFTER):
         for row in range(rows):
             real[PUSH + row] = RATE * scale * weight(row) * real[ERROR + row] / size
         solve(real, rows, size, soft)

@@ -61,11 +61,15 @@ class Reaches:
         self._tell(part)
 
     def aim(self, targets: Targets) -> None:
-        """The model has seen where the targets are; one that it knows no more is where it was."""
+        """The model has seen where the targets are; one that it knows no more, or where none can be, is where it was."""
         for part, reach in self._last.items():
             position = targets.positions.get(reach.object)
             if reach.phase == "reaching" and position is not None and position != reach.target.position.tolist():
-                reach.target = replace(reach.target, position=np.array(position))
+                try:
+                    reach.target = replace(reach.target, position=np.array(position))
+                except InvalidValue as error:
+                    self._bus.reject("value", f"{reach.object} at tick {targets.re_k}: {error}")
+                    continue
                 self._law.reach_toward(part, reach.marker, reach.target)
 
     def exert(self) -> None:

@@ -20,8 +20,14 @@ def test_a_place_that_is_none_is_refused(bad: object) -> None:
         ReachTarget(bad)  # type: ignore[arg-type]  # the test is about wrong types
 
 
+@pytest.mark.parametrize("far", [1.1e3, -1e160, 1e300], ids=str)
+def test_a_place_farther_than_anything_is_refused(far: float) -> None:
+    with pytest.raises(InvalidValue, match="within 1000 m"):
+        ReachTarget(np.array([0.0, far, 0.0]))
+
+
 def test_a_radius_a_normal_or_an_aim_that_is_none_is_refused() -> None:
-    for bad in ({"radius": 0.0}, {"radius": np.nan}, {"normal": [0.0, 0.0, 0.0]}, {"aim": "middle"}):
+    for bad in ({"radius": 0.0}, {"radius": np.nan}, {"radius": 1e200}, {"normal": [0.0, 0.0, 0.0]}, {"aim": "middle"}):
         with pytest.raises(MobeeError):
             ReachTarget(np.zeros(3), **bad)
 
