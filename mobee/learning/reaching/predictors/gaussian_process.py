@@ -1,4 +1,4 @@
-"""Gaussian process regression of the rewards over poses, targets and the ways between: the default predictor."""
+"""Gaussian process regression of the rewards over poses, targets and the ways between: the best predictor here."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ REFITS = (30, 60, 120, 250, 500, 1000)  # reaches after which the parameters of 
 MOST = 2500  # pairs of state and target: 50 MB
 REPEATS = 768  # reaches that repeat others, or pairs beyond the most, after which they are merged
 RASTER = 0.01, 1.25  # m: how near targets are merged first, and how much farther each next time
+COARSEST = 10.0  # m: then all targets of a state are one
 FIRST_MEAN = 0.3  # expected reward before the first fit
 JITTER = 1e-9  # of the variance: what rounding may cost
 
 
 class GaussianProcess:
     """Exact up to 2500 pairs of a state and a target, or a little more; then targets of a state that are near each other are merged.
+
+    For spaces of some hundred states: time and memory grow with their square.
 
     A target asked about again costs well under a millisecond; a new one up to 30, the more reaches there were.
 
@@ -55,7 +58,7 @@ class GaussianProcess:
             logs = most_likely(self._covariance.logs, self._reaches, self._squares, self._reached, self._mean)
             self._covariance = Covariance(self._squares, logs)
             self._rebuild()
-        elif self._repeats >= REPEATS or len(self._posterior) >= MOST + REPEATS:
+        elif self._repeats >= REPEATS or len(self._posterior) >= self._room:
             self._rebuild()
 
     def mean(self, target: Array) -> Array:
@@ -78,14 +81,17 @@ class GaussianProcess:
         """Begin again from the averages of all pairs."""
         state, target, mean, count = thinned(self._reached, MOST)
         self._posterior = Posterior(self._reaches, self._covariance, state, target, mean - self._mean, count)
-        self._repeats = 0
+        self._repeats, self._room = 0, max(len(state), MOST) + REPEATS
 
 
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array]:
-    """State, target (n, 3), average reward and number of tries of pairs; those near each other are one where there are too many."""
+    """State, target (n, 3), average reward and number of tries of pairs; those near each other are one where there are too many.
+
+    There is at least one for each state that was reached from.
+    """
     state, raster, step = known.state, *RASTER
     which = np.arange(len(known))
-    while len(state) > most:
+    while len(state) > most and raster <= COARSEST:
         cell = np.column_stack([known.state, np.round(known.places[known.target] / raster)])
         _, first, which = np.unique(cell, axis=0, return_index=True, return_inverse=True)
         state, raster = known.state[first], raster * step

@@ -97,6 +97,15 @@ def test_thinned_keeps_all_tries_their_average_reward_and_their_middle():
     assert [count[state == s].sum() for s in range(4)] == [(known.state == s).sum() for s in range(4)]
 
 
+def test_thinned_keeps_a_pair_of_every_state_where_there_are_more_states_than_pairs_wanted():
+    known, rng = Reached(), np.random.default_rng(2)
+    for number in range(200):
+        known.add(number % 50, rng.uniform(-0.2, 0.2, 3), float(rng.random()))
+    state, _, _, count = thinned(known, 40)
+    assert sorted(state) == list(range(50))
+    assert count.tolist() == [4.0] * 50
+
+
 def test_thinned_leaves_few_pairs_as_they_are():
     known = Reached()
     for state, target, value in drawn(reaches(), 50):
