@@ -84,7 +84,7 @@ class ReachAgent(ReachLearner):
 
     @property
     def state(self) -> int:
-        """Where the part is: measured at first and after an interruption, else from the last outcome."""
+        """Where the part is: measured at first and after whatever broke off a step, else from the last outcome."""
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part)[self.space.columns])
         return self._state
@@ -125,11 +125,8 @@ class ReachAgent(ReachLearner):
     def _step(self) -> None:
         state = self.state
         action = self.decide(state)
-        try:
-            step = self._reached(state) if action == REACH else self._moved(state, action)
-        except ActionInterrupted:
-            self._state = None
-            raise
+        self._state = None  # whatever breaks off the action, or its record
+        step = self._reached(state) if action == REACH else self._moved(state, action)
         if self.store is not None:
             self.store.append(step, self.problems.targets)
         self.observe(step)

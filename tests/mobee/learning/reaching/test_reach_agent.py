@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.table import ReachTable
 from mobee.learning.tabular import ideal
@@ -215,6 +215,24 @@ def test_an_interrupted_action_is_no_step_and_the_try_goes_on():
     made = reacher.try_problem(GOAL)
     assert [state for _, _, state, _ in made.path] == [1, 2, 3] and made.reach_state == 3
     assert (reacher.steps, reacher.tries) == (4, 1)
+
+
+def test_a_step_that_cannot_be_kept_is_none_and_where_the_part_is_is_measured_anew():
+    class Full:
+        full = True
+
+        def append(self, step, targets):
+            if self.full:
+                raise MobeeError("the disk is full")
+
+    reacher = corridor()
+    reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
+    reacher.store = Full()
+    with pytest.raises(MobeeError, match="disk"):
+        reacher.try_problem(GOAL)
+    assert (reacher.steps, reacher.plant.state, reacher.state) == (0, 1, 1)
+    reacher.store.full = False
+    assert [state for state, _, _, _ in reacher.try_problem(GOAL).path] == [1, 2]
 
 
 def test_a_try_left_for_another_problem_has_ended():
