@@ -9,7 +9,7 @@ Run time: 15 minutes on 2 cores.
 
 The four joints of the right arm under the published law, 81 states and 432 transitions of equidistant neighbours, their outcomes learned
 before by 3000 curious transitions without a target, anew for every seed.  Predictors, strategies and negative rewards as published,
-with the resolutions of docs/reach.md; distances in units of 1 cm (--scale).  A score is the sum of the rewards of the 27 targets in one
+with the resolutions of docs/reaching.md; distances in units of 1 cm (--scale).  A score is the sum of the rewards of the 27 targets in one
 evaluation.  The targets and what inverse kinematics can reach of them: experiments/reaching/README.md.
 """
 
