@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.claims import Claim
@@ -39,9 +40,15 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
         first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
         chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
         parts.append(f"{rival} {told(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
-        equal = decides(ratio_interval(first, second), *ABOUT_EQUAL)
-        verdicts.append(True if low > 0.5 else False if high < 0.5 or equal else None)
+        verdicts.append(True if low > 0.5 else False if high < 0.5 or _about_equal(first, second) else None)
     return ", ".join(parts), verdicts
+
+
+def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
+    """Whether the interval of the ratio is within a tenth of 1; where values are not above 0 there is no ratio."""
+    if min(np.min(first), np.min(second)) <= 0.0:
+        return False
+    return decides(ratio_interval(first, second), *ABOUT_EQUAL) is True
 
 
 def rises(change: ArrayLike) -> bool | None:

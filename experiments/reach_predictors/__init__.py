@@ -3,7 +3,7 @@
 Claim: a predictor that shares what it learns over poses and targets brings at least .80 of an oracle's score after 200 problem-tries, .90
 after 400 and .97 after 1600, and .80 on targets never tried after 800; the published one brings much less.
 Source: aims of this reproduction, to thesis 8.5 and 9.4.4 ("a more powerful function approximator").  Published: no numbers.
-Run time: 25 minutes on 2 cores.
+Run time: 20 minutes on 2 cores.
 
 The arm, its targets and its evaluations are those of `reach`; all learners have the same seeds, problems and transition models.  The oracle
 plans in the same way, but knows the mean reward of every reach and which transitions a target blocks, both measured by 5 tries of each

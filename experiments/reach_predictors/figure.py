@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.matplotlib_figure import new_figure
 from experiments.reach_predictors.findings import AIMS, BETWEEN, GRID, fractions, looks
-from experiments.reach_predictors.learners import LEARNERS, PUBLISHED, SHIPPED
+from experiments.reach_predictors.learners import LEARNERS, PUBLISHED, RECOMMENDED
 from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
@@ -43,8 +43,8 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
 
 
 def _curve(axes: Any, at: list[int], curve: Array, learner: str, color: str, style: str) -> None:
-    """Interquartile means; the intervals of the shipped and of the published one."""
+    """Interquartile means; the intervals of the recommended and of the published one."""
     middle = [interquartile_mean(column) for column in curve.T]
-    axes.plot(at, middle, style, color=color, label=learner, linewidth=2.2 if learner in (SHIPPED, PUBLISHED) else 1.0)
-    if learner in (SHIPPED, PUBLISHED):
+    axes.plot(at, middle, style, color=color, label=learner, linewidth=2.2 if learner in (RECOMMENDED, PUBLISHED) else 1.0)
+    if learner in (RECOMMENDED, PUBLISHED):
         axes.fill_between(at, *np.array([interval(column) for column in curve.T]).T, color=color, alpha=0.2, linewidth=0.0)

@@ -35,5 +35,5 @@ LEARNERS = {
     "gp-progress": Learner("gp", "progress", cost=2.0),
     "gp-ucb-spread": Learner("gp", "ucb", "spread", cost=2.0),
 }
-SHIPPED = "gp-ucb-alike"  # what `mobee reach` learns with
+RECOMMENDED = "gp-ucb-alike"  # by docs/reaching.md
 PUBLISHED = "published"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.reach.findings import CLAIMS, judged
+from experiments.reach.findings import CLAIMS, THOSE, _choices, judged
 from experiments.reach.rules import all_hold, better
 from experiments.reach.runs import LOOKS, Runs
 
@@ -41,6 +41,11 @@ def runs(**changes):
 
 def verdicts(found) -> dict[str, str]:
     return {claim.text: claim.verdict for claim in judged(found)}
+
+
+def verdict_of_favourites(found) -> str:
+    (verdict,) = [claim.verdict for claim in _choices(found) if claim.text == THOSE.text]
+    return verdict
 
 
 def of(found: dict[str, str], words: str) -> str:
@@ -90,6 +95,16 @@ def test_equal_agents_refute_that_one_is_better_and_leave_changes_open():
     found = verdicts(runs(intrinsic=same, greedy=same, random=same))
     assert of(found, "after 1600 problem") == "refuted" and of(found, "falls back") == "open"
     assert of(found, "about twice") == "refuted"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "verdict"), [(57, 77, "confirmed"), (76, 56, "confirmed"), (57, 76, "refuted"), (0, 1, "refuted")]
+)
+def test_the_favourites_are_those_of_the_thesis_or_not(first, second, verdict):
+    made = runs()
+    for one in made["intrinsic"].values:
+        one["states_grid"][-1] = np.where(one["states_grid"][-1] == 0, first, second)
+    assert verdict_of_favourites(made) == verdict
 
 
 def test_the_intervals_decide_whether_one_is_better():
