@@ -12,8 +12,8 @@ expects most of a reach, and reaches; it learns nothing from these cases.  Both 
 Under the default law who reached and missed reaches again, up to three times a case: planned from another state, alone from where it is.
 Scenes: free space; the hand on the far side of the target, as seen from the shoulder; the arm within 3 cm of the object, the palm turned
 away; a ball of 8 cm between hand and target, of which only MoBeE knows; a target that moves 5 to 12 cm at 3 cm/s.
-What decides is success, the palm within 2 cm of the target's surface when the force ends; under the published law, where the spring and
-the fingers' fields keep every palm further off, the reward of eq. 8.4.  The seeds draw all of it.
+What decides is success, the palm within 2 cm of the target's surface when the force ends; under the published law, whose reaches go to the
+centre, as the thesis measured them: the reward of eq. 8.4.  The seeds draw all of it.
 """
 
 from __future__ import annotations

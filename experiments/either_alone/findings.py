@@ -25,7 +25,7 @@ TOLD = {
 }
 LAWS = ("published", "default")
 MEASURE = {"published": "reward", "default": "success"}
-"""What decides: under the published law, whose reaches pull against the attractor, no palm comes within 2 cm of the surface."""
+"""What decides: under the published law, whose reaches are for the centre, what the thesis measured (eq. 8.4)."""
 CLAIMS = tuple(
     Claim("thesis 5.3, 8.2, 9.3", f"coarse planner and reactive reach together do more than either alone: {what} ({law} law)", "no number")
     for law in LAWS

@@ -22,7 +22,7 @@ from mobee.robot.robot import Array
 WAYS = ("planner", "reach", "both")
 EVERY = 5  # ticks, after which a target has moved on
 LIMIT = 10  # actions before a reach, and that
-REACHES = {"published": 1, "default": 3}  # a case; under the published law none comes so near that it would be the last
+REACHES = {"published": 1, "default": 3}  # a case; the thesis reached once
 
 
 @dataclass(frozen=True, slots=True)
