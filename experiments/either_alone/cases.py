@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.reaching.arm import arm_belief, reachable
+from experiments.reaching.arm import arm_belief, reachable, touchable
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import approach
 from mobee import World, sphere
@@ -17,7 +17,7 @@ from mobee.robot.robot import Array
 SCENES = ("free", "around", "against", "between", "moving")
 """From anywhere; the hand behind the target; the hand at it, and not with the palm; a ball between hand and target; a target that moves."""
 OBSTACLE, RADIUS = "obstacle", 0.04  # m
-HAND = 0.06  # m from the palm's middle, where an obstacle begins
+APART = 0.14  # m, at least, from its middle to those of palm and target
 NEAR = 0.25  # m: the hand behind the target is no farther from it
 BEYOND = np.cos(np.deg2rad(70.0))  # between the way from shoulder to target and that from target to hand
 TOUCH = 0.03  # m: so near to the target a link is "at" it
@@ -87,21 +87,21 @@ def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Ge
         return None
     if scene == "between":
         obstacle = hand + 0.5 * way
-        apart = float(np.linalg.norm(way)) / 2.0 - RADIUS
-        return Case(target, q, obstacle) if apart > max(target.radius, HAND) and _clear(belief, q, obstacle) else None
+        apart = float(np.linalg.norm(way)) / 2.0
+        return Case(target, q, obstacle) if apart > APART and _leaves_way(belief, target, q, obstacle) else None
     if scene == "moving":
         to = _goal_of(target, belief, rng)
         return None if to is None else Case(target, q, to=to)
     return Case(target, q)
 
 
-def _clear(belief: PeerBelief, q: Array, obstacle: Array) -> bool:
-    """Whether no solid touches the obstacle."""
+def _leaves_way(belief: PeerBelief, target: ReachTarget, q: Array, obstacle: Array) -> bool:
+    """Whether no solid touches the obstacle in the pose, nor needs to where the palm touches the target."""
     world = belief.model.world
     world.add(OBSTACLE, sphere(RADIUS), position=obstacle)
-    clear = bool(belief.sound(q[None])[0])
+    leaves = bool(belief.sound(q[None])[0]) and touchable(belief, target, free=False)
     world.remove(OBSTACLE)
-    return clear
+    return leaves
 
 
 def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
