@@ -37,8 +37,9 @@ show("the post as a ghost", robot.home)
 
 # A target is an obstacle for all but the hand that reaches for it.
 world.set_role("post", "target")
-model.reaching = "left_palm"
-show("the post as the palm's target", robot.home)
+for hand in ("right_palm", "left_palm"):
+    model.reaching = hand
+    show(f"the post as the target of {hand}", robot.home)
 model.reaching = None
 
 # An attached object moves with a link, and does not touch it.

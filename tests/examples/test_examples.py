@@ -60,7 +60,8 @@ def test_03_a_post_in_the_hand_touches_unless_it_is_a_ghost(tmp_path: Path) -> N
     solids, fields = numbers("a post at the left palm" + count, text)
     assert solids > 0 and fields > 0
     assert numbers("the post as a ghost" + count, text) == [0, 0]
-    assert 0 < numbers("the post as the palm's target" + count, text)[0] < solids
+    assert numbers("the post as the target of right_palm" + count, text) == [solids, fields]
+    assert numbers("the post as the target of left_palm" + count, text) == [0, 0]
     carried = mobee.load_robot("icub")
     low = carried.home.copy()
     low[carried.motor_index("l_shoulder_pitch")] = np.deg2rad(-20)
