@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from experiments.learning.truth import walk
-from experiments.reach_predictors.learners import PUBLISHED, SHIPPED
+from experiments.reach_predictors.learners import PUBLISHED, RECOMMENDED
 from experiments.reaching.scene import reach_plant, reach_space
 from experiments.simultaneous.figure import draw
 from experiments.simultaneous.findings import CLAIMS, findings
@@ -45,7 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the experiment."""
     sweep_arguments(parser)
     parser.add_argument(
-        "--learner", choices=(SHIPPED, PUBLISHED), default=SHIPPED, help=f"predictor, strategy and memory of failures (default: {SHIPPED})"
+        "--learner",
+        choices=(RECOMMENDED, PUBLISHED),
+        default=RECOMMENDED,
+        help=f"of reaches, and how it explores (default: {RECOMMENDED})",
     )
 
 
