@@ -16,7 +16,7 @@ from mobee.robot.zero_position import read_robot
 
 FUZZ = Path(__file__).parent
 SEEDS = FUZZ / "seeds"
-RECOMMENDED = FUZZ.parents[1] / "mobee" / "robot"
+SHIPPED = FUZZ.parents[1] / "mobee" / "robot"
 CORPUS = FUZZ.parent / "corpus"
 DIVIDER = b"\n%%\n"  # between the files of one input
 URDF_FILES = ("given.urdf", "given.srdf", "given.stl", "given.obj", "given.dae")
@@ -62,7 +62,7 @@ def feed_urdf(content: bytes, folder: Path) -> bool:
 def check_message(error: RobotFileError, folder: Path) -> None:
     """Raise AssertionError unless a message names a file and is of a length that a person reads."""
     text = str(error)
-    named = str(folder) in text or str(RECOMMENDED) in text
+    named = str(folder) in text or str(SHIPPED) in text
     if not named or len(text) > 4000 or error.args == ():
         raise AssertionError(f"a message without a file, or endless: {text[:300]}")
 
@@ -109,7 +109,7 @@ def tested_links(robot: Robot) -> set[frozenset[int]]:
 
 def xml_seeds() -> list[bytes]:
     """Shipped robots and worlds, the corpus, and a robot that has every tag."""
-    folders = (RECOMMENDED / "robots", RECOMMENDED / "worlds", CORPUS / "robots", CORPUS / "worlds", SEEDS)
+    folders = (SHIPPED / "robots", SHIPPED / "worlds", CORPUS / "robots", CORPUS / "worlds", SEEDS)
     return [path.read_bytes() for folder in folders for path in sorted(folder.glob("*.xml"))]
 
 

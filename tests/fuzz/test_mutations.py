@@ -9,11 +9,11 @@ import pytest
 
 from mobee.errors import RobotFileError
 from tests.fuzz.mutations import mutated
-from tests.fuzz.readers import SEEDS, RECOMMENDED, check_message, feed_urdf, feed_xml, urdf_seeds, words, xml_seeds
+from tests.fuzz.readers import SEEDS, SHIPPED, check_message, feed_urdf, feed_xml, urdf_seeds, words, xml_seeds
 
 TIMES = {"icub": 15, "icub_2014": 15, "icub_katana": 15, "katana": 80, "table": 30, "table_2014": 30, "every_tag": 150}
-FILES = [RECOMMENDED / "robots" / f"{name}.xml" for name in ("icub", "icub_2014", "icub_katana", "katana")] + [
-    *(RECOMMENDED / "worlds" / f"{name}.xml" for name in ("table", "table_2014")),
+FILES = [SHIPPED / "robots" / f"{name}.xml" for name in ("icub", "icub_2014", "icub_katana", "katana")] + [
+    *(SHIPPED / "worlds" / f"{name}.xml" for name in ("table", "table_2014")),
     SEEDS / "every_tag.xml",
 ]
 

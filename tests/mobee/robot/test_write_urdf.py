@@ -20,7 +20,7 @@ from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.test_write_xml import random_robot
 from tests.mobee.robot.urdf_files import foreign
 
-RECOMMENDED = ("icub", "icub_2014", "katana")
+SHIPPED = ("icub", "icub_2014", "katana")
 FOREIGN = ("franka_panda/panda.urdf", "xarm/xarm6_with_gripper.urdf", "r2d2.urdf", "laikago/laikago.urdf", "pr2_gripper.urdf")
 
 
@@ -30,7 +30,7 @@ def read_back(robot: Robot, folder: Path) -> Robot:
         return load_robot(write_urdf(robot, folder / "written.urdf"))
 
 
-@pytest.mark.parametrize("name", RECOMMENDED)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_xml_becomes_a_urdf_of_the_same_robot(tmp_path: Path, name: str) -> None:
     robot = load_robot(name)
     assert_same_robot(robot, read_back(robot, tmp_path))

@@ -16,7 +16,7 @@ from mobee.robot.write_xml import write_xml
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
-RECOMMENDED = ("icub", "icub_2014", "katana")
+SHIPPED = ("icub", "icub_2014", "katana")
 FOREIGN = ("franka_panda/panda.urdf", "xarm/xarm6_with_gripper.urdf", "r2d2.urdf", "a1/a1.urdf", "pr2_gripper.urdf", "racecar/racecar.urdf")
 
 
@@ -26,7 +26,7 @@ def read_back(robot: Robot, folder: Path) -> Robot:
         return load_robot(write_xml(robot, folder / "written.xml"))
 
 
-@pytest.mark.parametrize("name", RECOMMENDED)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_robot_is_read_back_as_it_was(tmp_path: Path, name: str) -> None:
     robot = load_robot(name)
     written = read_back(robot, tmp_path)

@@ -31,7 +31,7 @@ FOREIGN = (
     "pr2_gripper.urdf",
     "racecar/racecar.urdf",
 )
-RECOMMENDED = ("icub", "icub_2014", "katana")
+SHIPPED = ("icub", "icub_2014", "katana")
 
 
 class Oracle:
@@ -64,10 +64,10 @@ class Oracle:
         return jacobian
 
 
-@pytest.mark.parametrize("name", [*FOREIGN, *RECOMMENDED])
+@pytest.mark.parametrize("name", [*FOREIGN, *SHIPPED])
 def test_links_and_jacobians_are_those_of_pinocchio_at_200_poses(tmp_path: Path, name: str) -> None:
-    robot = load_robot(name if name in RECOMMENDED else foreign(name))
-    oracle = Oracle(robot, write_urdf(robot, tmp_path / "x.urdf") if name in RECOMMENDED else foreign(name))
+    robot = load_robot(name if name in SHIPPED else foreign(name))
+    oracle = Oracle(robot, write_urdf(robot, tmp_path / "x.urdf") if name in SHIPPED else foreign(name))
     matrix, offset = robot.coupling
     rest = oracle.frames(np.zeros(len(robot.joints)))
     for q in np.random.default_rng(8).uniform(*robot.limits.T, size=(200, len(robot.motors))):
