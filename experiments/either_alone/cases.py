@@ -61,10 +61,10 @@ class Case:
         return replace(self.target, position=self.target_at(seconds))
 
 
-def make_cases(scene: str, count: int, seed: int, law: str = "default") -> list[Case]:
-    """That many cases of one of the SCENES; nothing solid touches where they begin."""
+def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
+    """That many cases of one of the SCENES, with the targets of `reachable`; nothing solid touches where they begin."""
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
-    targets, belief = reachable(law, free=False), arm_belief(law=law)
+    targets, belief = reachable(law, free), arm_belief(law=law)
     found: list[Case] = []
     for _ in range(DRAWS):
         case = _case(scene, targets[rng.integers(len(targets))], belief, rng)

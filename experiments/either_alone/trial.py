@@ -39,11 +39,11 @@ class Attempt:
     reward: float
 
 
-def trained(seed: int, transitions: int, tries: int, law: str = "default") -> ReachAgent:
-    """A reach learner that has tried the targets, in an empty world."""
+def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
+    """A reach learner that has tried the targets of `reachable`, in an empty world."""
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
-    agent.learn(reachable(law, free=False), tries)
+    agent.learn(reachable(law, free), tries)
     return agent
 
 
