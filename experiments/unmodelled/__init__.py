@@ -34,7 +34,7 @@ CLAIM = "with part of the truth hidden, a reach learner overtakes a planner that
 SOURCE = "thesis 5.3, 9.3; aim of this reproduction"
 __all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
 
-TRIES = (25, 50, 100, 200, 400, 800)  # after which they are evaluated
+TRIES = (5, 25, 50, 100, 200, 400, 800)  # after which they are evaluated
 REPETITIONS = 2  # of all targets, an evaluation
 COSTS = {"learner": 1.0, "none": 2.0, "blocked": 4.0, "missed": 4.0}
 
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
     """Of each seed: the learner and each peer, under each kind of error."""
-    tries = TRIES[:3] if arguments.quick else TRIES
+    tries = TRIES[:4] if arguments.quick else TRIES
     return [
         Cell(f"{who}-{wrong}-s{seed}", seed, {"who": who, "wrong": wrong, "tries": list(tries)}, COSTS[who])
         for seed in range(arguments.seed, arguments.seed + arguments.seeds)

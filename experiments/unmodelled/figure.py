@@ -44,7 +44,7 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
         _mark_crossover(axes, done, wrong)
         axes.axvline(EQUAL_BY, color="0.8", linewidth=0.8, zorder=0)
         axes.set(title=TITLES[wrong], xlabel="tries", xscale="log", ylim=(0.0, 1.02))
-        axes.set_xticks((25, 50, 100, 200, 400, 800), ("25", "50", "100", "200", "400", "800"))
+        axes.set_xticks((5, 25, 50, 100, 200, 400, 800), ("5", "25", "50", "100", "200", "400", "800"))
         axes.minorticks_off()
         axes.grid(alpha=0.2)
     drawing.axes[0].set_ylabel("palm within 2 cm of the target's surface")
