@@ -148,13 +148,12 @@ class Controller:
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
-        """End all forces of the client."""
+        """End all forces of the client; reaches go on."""
         self._client = np.zeros(len(self.robot.motors))
         self._pushes: dict[str, Array] = {}
-        self._reaches.clear()
 
     def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
-        """Draw a marker to a target with the motors of one part, against its attractor, until the next, `end_reach` or `clear` (8.2).
+        """Draw a marker to a target with the motors of one part, against its attractor, until the next or `end_reach` (8.2).
 
         Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
         """

@@ -43,11 +43,6 @@ class PackedReaches:
         self._markers[part] = marker
         self.arrays = self._stacked([*self._rows(), known])
 
-    def clear(self) -> None:
-        """Forget all."""
-        self._markers.clear()
-        self.arrays = self._stacked([])
-
     def aim(self, part: str, target: ReachTarget) -> None:
         """Tell a part's reach where to."""
         row = list(self._markers).index(part)

@@ -143,7 +143,6 @@ class GoalDesk:
                 at_marker[marker] = at_marker.get(marker, 0.0) + push
         for marker, push in at_marker.items():
             self._law.push(marker, push)
-        self._reaches.exert()
 
     def _check_free(self, part: str) -> None:
         if self._actions[part].status == "held":

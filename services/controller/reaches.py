@@ -72,12 +72,6 @@ class Reaches:
                     continue
                 self._law.reach_toward(part, reach.marker, reach.target)
 
-    def exert(self) -> None:
-        """Tell the law again, which has forgotten all forces of clients."""
-        for part, reach in self._last.items():
-            if reach.phase == "reaching":
-                self._law.reach_toward(part, reach.marker, reach.target)
-
     def look(self, part: str, tick: Tick, touched: list[str]) -> None:
         """Let go of a part whose action has come to its end: it is drawn back, and has to settle once more, unless it is to stay."""
         reach, action = self._last.get(part), self._actions[part]

@@ -137,8 +137,21 @@ def test_parts_reach_side_by_side_as_each_alone(gains: Gains) -> None:
     assert felt(both, ICUB.home) == pytest.approx(total, abs=1e-9)
     both.end_reach("right_arm")
     assert not felt(both, ICUB.home)[ICUB.part("right_arm").slice].any()
-    both.clear()
+    both.end_reach("left_arm")
     assert not felt(both, ICUB.home).any()
+
+
+def test_a_reach_goes_on_with_what_it_remembers_when_the_forces_of_clients_end() -> None:
+    controller = Controller(Model(ICUB), Gains.default())
+    controller.reach_toward("right_arm", "right_palm", ReachTarget((-3.0, 0.1, 0.1)))
+    controller.step(ICUB.home, 0.01)
+    assert controller.still_nears("right_arm")
+    for _ in range(100):  # the arm does not move
+        controller.force(np.zeros(len(ICUB.motors)))
+        controller.clear()
+        controller.step(ICUB.home, 0.01)
+    assert not controller.still_nears("right_arm")
+    assert felt(controller, ICUB.home).any()
 
 
 def test_inside_the_surface_nothing_pulls() -> None:
