@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             learn(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, told)
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
-    table = [row for task, found in tasks.items() for row in _rows(task, found)]
+    table = {f"{task}, {who}": row for task, found in tasks.items() for who, row in _rows(found).items()}
     return {"claims": [_claim(tasks).record()], "distances": table}
 
 
@@ -102,19 +102,13 @@ def figure(folder: Path) -> Path:
     return draw({task: compared(folder, task, least) for task in names}, least, folder / "transfer.png")
 
 
-def _rows(task: str, found: Compared) -> list[dict[str, Any]]:
+def _rows(found: Compared) -> dict[str, dict[str, Any]]:
+    """The distances of each live robot, and of the offline seeds."""
     variation, agree = (np.array([getattr(one, name) for one in found.offline]) for name in ("variation", "agree"))
-    rows: list[dict[str, Any]] = [{"task": task, "robot": robot, **_plain(one)} for robot, one in found.live.items()]
+    number = int(np.median([one.compared for one in found.offline]))
+    rows = {robot: _plain(one) for robot, one in found.live.items()}
     for name, pick in (("least", np.min), ("median", np.median), ("most", np.max)):
-        rows.append(
-            {
-                "task": task,
-                "robot": f"offline seeds, {name}",
-                "variation": round(float(pick(variation)), 4),
-                "agree": round(float(pick(agree)), 4),
-                "compared": int(np.median([one.compared for one in found.offline])),
-            }
-        )
+        rows[f"offline seeds, {name}"] = _plain(Distance(float(pick(variation)), float(pick(agree)), number))
     return rows
 
 
