@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.learning.model_error import model_error
+from experiments.learning.model_error import l1
 from experiments.learning.truth import Truth, truth_of
 from experiments.reaching.scene import reach_space
 from experiments.simultaneous.trial import CONTACT, FIRST, WAYS
 from experiments.statistics import decides, interval, told
 from experiments.sweep import CellResult
+from mobee import TransitionModel
 from mobee.robot.robot import Array, Ints
 
 SHARE = 0.9  # of the score that model first ends with: the score that both are to come to
@@ -35,12 +36,14 @@ CLAIMS = (*SOONER.values(), LEVEL, CLEAN, HEARD)
 class Runs:
     """The N runs of one way, by seed: `scores` and `errors` (N, L) of the looks, after so many `actions` (L,); NaN: not looked at.
 
-    `tries`, `failed`: (N,) problem-tries and failed transitions.
+    `observed`: as `errors`, of those transitions alone that the model was told of.  `tries`, `failed`: (N,) problem-tries and failed
+    transitions.
     """
 
     actions: Ints
     scores: Array
     errors: Array
+    observed: Array
     tries: Ints
     failed: Ints
 
@@ -69,10 +72,12 @@ def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
     for way in WAYS:
         mine = [one for one in ordered if one.cell.settings["way"] == way]
         if mine:
+            errors = np.array([_errors(one, truth) for one in mine])
             runs[way] = Runs(
                 np.array(mine[0].cell.settings["looks"]),
                 np.array([one.values["scores"].mean(axis=-1) for one in mine]),
-                np.array([_errors(one, truth) for one in mine]),
+                errors[..., 0],
+                errors[..., 1],
                 np.array([one.values["tries"][-1] for one in mine]),
                 np.array([one.values["failed"][-1] for one in mine]),
             )
@@ -92,11 +97,16 @@ def judged(runs: Mapping[str, Runs]) -> list[Claim]:
     text = "score " + ", ".join(f"{way} {told(ends[way])}" for way in (CONTACT, *FIRST))
     found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[way] for way in FIRST])))
     errors = {way: runs[way].errors[:, -1] for way in (CONTACT, "model", "target")}
-    text = "L1 " + ", ".join(f"{way} {told(values, 3)}" for way, values in errors.items())
+    text = "L1 " + ", ".join(f"{way} {told(values, 3)}{_of_observed(runs[way])}" for way, values in errors.items())
     found.append(CLEAN.measured(text, above(errors["model"], errors[CONTACT])))
     text = "score " + ", ".join(f"{way} {told(ends[way])}" for way in (CONTACT, "target", "model"))
     found.append(HEARD.measured(text, above(ends[CONTACT], ends["target"])))
     return found
+
+
+def _of_observed(mine: Runs) -> str:
+    last = mine.observed[:, -1]
+    return f" ({told(last, 3)} of transitions observed)" if np.isfinite(last).all() else ""
 
 
 def actions_to(least: float, actions: Ints, scores: Array) -> Array:
@@ -129,13 +139,27 @@ def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
 
 
 def _errors(one: CellResult, truth: Truth | None) -> Array:
-    """At every look the mean L1 of what is believed, NaN where nothing was kept or nothing is known to be true."""
+    """At every look the mean L1 of what is believed, of all transitions and of those observed, (L, 2).
+
+    NaN where nothing was kept, nothing is known to be true, or nothing was observed.
+    """
     looks = range(len(one.cell.settings["looks"]))
-    found = np.full(len(looks), np.nan)
+    found = np.full((len(looks), 2), np.nan)
     for n in looks:
         if truth is not None and f"outcomes_{n}" in one.values:
-            found[n] = model_error(_Beliefs(one.values[f"outcomes_{n}"].astype(np.intp), one.values[f"probabilities_{n}"]), truth)[0]
+            believed = _Beliefs(one.values[f"outcomes_{n}"].astype(np.intp), one.values[f"probabilities_{n}"])
+            error, observed = l1(believed, truth), _observed(believed)
+            found[n, 0] = np.nanmean(error)
+            if np.isfinite(error[observed]).any():
+                found[n, 1] = np.nanmean(error[observed])
     return found
+
+
+def _observed(believed: _Beliefs) -> Array:
+    """Which transitions (S, A) are not believed to be as they were before anything was observed."""
+    before = TransitionModel(reach_space()).debiased().probabilities
+    changed: Array = (believed.probabilities[..., : before.shape[2]] != before).any(axis=2)
+    return changed
 
 
 def _row(way: str, mine: Runs) -> dict[str, Any]:
@@ -145,5 +169,5 @@ def _row(way: str, mine: Runs) -> dict[str, Any]:
             row[f"score at {look}"] = told(mine.scores[:, n])
     for n, look in enumerate(mine.actions.tolist()):
         if np.isfinite(mine.errors[:, n]).all():
-            row[f"L1 at {look}"] = told(mine.errors[:, n], 3)
+            row[f"L1 at {look}"] = told(mine.errors[:, n], 3) + (_of_observed(mine) if n == len(mine.actions) - 1 else "")
     return row

@@ -21,7 +21,14 @@ def runs(**changes):
         "target": ((3.0, 5.0, 6.0), 0.3),
     } | changes
     return {
-        way: Runs(LOOKS, np.tile(scores, (SEEDS, 1)), np.full((SEEDS, 3), error), np.full(SEEDS, 900), np.full(SEEDS, 80))
+        way: Runs(
+            LOOKS,
+            np.tile(scores, (SEEDS, 1)),
+            np.full((SEEDS, 3), error),
+            np.full((SEEDS, 3), error),
+            np.full(SEEDS, 900),
+            np.full(SEEDS, 80),
+        )
         for way, (scores, error) in given.items()
     }
 
