@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,11 +49,13 @@ def trial(way: str, learner: str, looks: Sequence[int], repetitions: int, seed: 
 def _agent(way: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeModel, int]:
     """The learner, what it believes of its transitions, and how many actions that has taken."""
     chosen, space, arm = LEARNERS[learner], reach_space(), reach_plant(seed)
-    names = {"predictor": chosen.predictor, "strategy": chosen.strategy, "failures": chosen.failures}
+    agent = partial(
+        ReachAgent, space, marker=MARKER, predictor=chosen.predictor, strategy=chosen.strategy, failures=chosen.failures, seed=seed
+    )
     if way in FIRST:
         beliefs = learned_beliefs(arm, seed, FIRST[way])
-        return ReachAgent(space, arm, beliefs, marker=MARKER, seed=seed, **names), beliefs, FIRST[way]
+        return agent(plant=arm, beliefs=beliefs), beliefs, FIRST[way]
     begin_anywhere(space, arm, seed)
     plant: ReachPlant = next((BlamingPlant(arm, space, blame) for blame in BLAMES if blame == way), arm)
     model = TransitionModel(space)
-    return ReachAgent(space, plant, marker=MARKER, model=model, seed=seed, **names), model.debiased(), 0
+    return agent(plant=plant, model=model), model.debiased(), 0
