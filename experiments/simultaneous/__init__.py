@@ -35,7 +35,7 @@ SOURCE = "thesis 9.4.1"
 __all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "cells", "figure", "run", "work"]
 
 LOOKS = (500, 1000, 1500, 2000, 3000, 3500, 4000)  # actions after which everybody is evaluated
-LEARNER = "kernel-ucb"  # the best of those that cost no more than the plant
+LEARNER = "kernel-ucb"  # costs less than the plant; "gp-ucb-alike" many times that
 QUICK = (500, 1000, 2000)
 REPETITIONS = 2  # of an evaluation
 WALKS = (9001, 9002)  # seeds that no learner has
