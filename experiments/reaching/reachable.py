@@ -16,7 +16,7 @@ from mobee.reach import RADIUS
 from mobee.robot.robot import Array
 
 AT_CENTRE = 2e-3  # m: the palm is at the centre
-NEAR_SURFACE = 0.02  # m, from the surface (issue: within 2 cm)
+NEAR_SURFACE = 0.02  # m, from the surface as reached counts in `mobee reach`
 
 
 def joints_of(count: int) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the experiment."""
     sweep_arguments(parser)
     parser.add_argument(
-        "--learner", choices=list(LEARNERS), default=LEARNER, help=f"predictor, strategy and memory of failures (default: {LEARNER})"
+        "--learner", choices=list(LEARNERS), default=LEARNER, metavar="NAME", help=f"one of {', '.join(LEARNERS)} (default: {LEARNER})"
     )
 
 

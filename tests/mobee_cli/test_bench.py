@@ -92,6 +92,7 @@ def test_the_plant_is_timed_beside_mujoco_and_repeats_itself() -> None:
     assert [(one["name"], one["least"]) for one in result["requirements"]] == [
         ("one arm, times real time", 2000.0),
         ("one arm, actions/s", 700.0),
+        ("one arm reaching, times real time", 2000.0),
         ("three agents at the table, transitions/s", 1500.0),
     ]
     assert result["one_arm"]["seconds_per_action"] == pytest.approx(6.4, abs=1.0)

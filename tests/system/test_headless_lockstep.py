@@ -1,4 +1,4 @@
-"""The issue's first run in robot time: the iCub at the table, three curious agents, everything but the monitor, in lockstep."""
+"""The first run of all, in robot time: the iCub at the table, three curious agents, everything but the monitor, in lockstep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The issue's first run: the iCub at the table, three curious agents, everything but the monitor, in real time."""
+"""The first run of all: the iCub at the table, three curious agents, everything but the monitor, in real time."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def test_what_a_link_carries_meets_free_objects_but_spares_targets_when_it_reach
     world = world_with("obstacle", "lower")
     world.add("ball", mobee.sphere(0.1), role="target")
     assert (OBJECT, OBJECT + 1, "solid") in pairs_of(robot, world)
-    assert (OBJECT, OBJECT + 1, "solid") not in pairs_of(robot, world, LOWER)
+    assert (OBJECT, OBJECT + 1, "solid") not in pairs_of(robot, world, Hand(LOWER, LOWER))
 
 
 def test_two_carried_objects_meet_where_their_links_do(robot):

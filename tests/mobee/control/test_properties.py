@@ -1,4 +1,4 @@
-"""What the issue promises of the forces and of the system, for any pose and motion."""
+"""What is promised of the forces and of the system, for any pose and motion."""
 
 from __future__ import annotations
 
