@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Contacts, Forces, Geometry, Pose, WorldObject
+from bus_schema.messages import Contacts, Forces, Geometry, Message, Pose, WorldObject
 from bus_schema.rpc import (
     Done,
     Empty,
@@ -40,9 +41,13 @@ class Stage:
     def tick(self, **how: Any) -> Forces:
         """One tick of the simulator, and the model's whole answer to it."""
         k = self.sim.tick(**how)
-        wait_for(lambda: self.contacts and self.contacts[-1].re_k == k and self.contacts[-1].run == self.rig.bus.run, f"contacts {k}")
-        wait_for(lambda: self.forces[-1].re_k == k, f"forces {k}")
+        for stream in (self.contacts, self.forces):
+            self.wait_for_answer(stream, k)
         return self.forces[-1]
+
+    def wait_for_answer(self, stream: Sequence[Message], k: int) -> None:
+        """The newest of a stream answers tick k of this run; runs before had a tick k too."""
+        wait_for(lambda: stream and (stream[-1].run, stream[-1].re_k) == (self.rig.bus.run, k), f"the answer to tick {k}")
 
     def at(self, q: Array) -> Forces:
         self.sim.q = q.copy()

@@ -48,6 +48,9 @@ class Reacher:
         assert ("l_forearm_field" in felt) == ("l_palm_field" in felt)
         return "l_palm_field" in felt
 
+    def hears_at(self, k: int) -> None:
+        self.stage.wait_for_answer(self.targets, k)
+
     def comes_to(self, felt: bool) -> None:
         wait_for(lambda: self.is_felt() == felt, f"felt: {felt}")
 
@@ -83,16 +86,16 @@ def test_where_the_target_is_is_told_in_every_tick_while_somebody_reaches_for_it
     reacher.tell("reaching")
     reacher.comes_to(felt=False)
     k = reacher.stage.tick().re_k
-    wait_for(lambda: reacher.targets[-1].re_k == k, "the target")
+    reacher.hears_at(k)
     assert reacher.targets[-1].positions == {TARGET: reacher.at}
     there = [-0.3, 0.2, 0.1]
     reacher.stage.edit("move", MoveObject, name=TARGET, position=there)
     k = reacher.stage.tick().re_k
-    wait_for(lambda: reacher.targets[-1].re_k == k, "the target")
+    reacher.hears_at(k)
     assert reacher.targets[-1].positions == {TARGET: there}
     reacher.stage.edit("remove", OneName, name=TARGET)
     k = reacher.stage.tick().re_k
-    wait_for(lambda: reacher.targets[-1].re_k == k, "the word that it is gone")
+    reacher.hears_at(k)
     assert reacher.targets[-1].positions == {}
     reacher.tell("over")
 
