@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import joint_squares
+from mobee.learning.reaching.predictors.independent import Independent
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.prior import DistancePrior
 from mobee.learning.reaching.predictors.reached import Reached, around
@@ -19,7 +20,7 @@ REFIT = 1.2  # scales and prior are fitted anew when there are so many times as 
 LEFT_OUT = 400  # pairs at most that are predicted from all others
 
 
-class Kernel:
+class Kernel(Independent):
     """Gaussian weights over poses and targets, drawn to the average, or to a prior from the distance, where there are few reaches.
 
     Args:
@@ -28,10 +29,11 @@ class Kernel:
     """
 
     def __init__(self, reaches: Reaches, prior: bool = False) -> None:
+        super().__init__()
         self._reaches, self._prior = reaches, prior
         squares = joint_squares(reaches).sum(axis=0)
         self._alike = np.stack([np.exp(-0.5 * squares / scale**2) for scale in JOINTS])
-        self._reached, self._next = Reached(), 0.0
+        self._next = 0.0
         self._scales = JOINTS[2], PLACES[2]
         self._refit()
 
@@ -47,24 +49,12 @@ class Kernel:
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
         """Learn how a reach went."""
-        self._reached.add(state, target, reward)
+        super().add(state, target, reward, expected)
         if self._reached.tries >= self._next:
             self._refit()
 
-    def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,)."""
-        return self._posterior(target)[0]
-
-    def deviation(self, target: Array) -> Array:
-        """How far mean rewards are from what is expected with no reach near, less with the weight of those that are, shape (S,)."""
-        return self._posterior(target)[1]
-
-    def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """One draw of the mean rewards, each on its own, shape (S,)."""
-        drawn: Array = rng.normal(*self._posterior(target))
-        return drawn
-
     def _posterior(self, target: Array) -> tuple[Array, Array]:
+        """The deviation is how far mean rewards are from what is expected with no reach near, less with the weight of those that are."""
         known, (by_joints, by_place) = self._reached, self._scales
         near = np.exp(-0.5 * ((known.places - target) ** 2).sum(axis=1) / by_place**2)[known.target] * known.count
         residual = known.mean - self._at_places(known)

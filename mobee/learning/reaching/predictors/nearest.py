@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import joint_squares
+from mobee.learning.reaching.predictors.independent import Independent
 from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.learning.reaching.predictors.reached import Reached, around
+from mobee.learning.reaching.predictors.reached import around
 from mobee.robot.robot import Array, Ints
 
 NEIGHBOURS = 5
@@ -21,7 +22,7 @@ IMAGINED = 0.5  # weight of what is expected of all, in neighbours at a squared 
 KEPT = 256  # targets whose neighbours are in memory
 
 
-class Nearest:
+class Nearest(Independent):
     """Averages of the five nearest reaches, repeats merged, by their inverse squared distance, drawn to the average of all.
 
     Args:
@@ -29,9 +30,9 @@ class Nearest:
     """
 
     def __init__(self, reaches: Reaches) -> None:
+        super().__init__()
         self._reaches = reaches
         self._joints = joint_squares(reaches).sum(axis=0) * JOINT**2
-        self._reached = Reached()
         self._found: dict[bytes, tuple[int, Array, Ints]] = {}
 
     @property
@@ -39,24 +40,8 @@ class Nearest:
         """Its name, as plain JSON values."""
         return {"name": "nearest"}
 
-    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went."""
-        self._reached.add(state, target, reward)
-
-    def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,)."""
-        return self._posterior(target)[0]
-
-    def deviation(self, target: Array) -> Array:
-        """The spread of all mean rewards, less the nearer the neighbours are, shape (S,)."""
-        return self._posterior(target)[1]
-
-    def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """One draw of the mean rewards, each on its own, shape (S,)."""
-        drawn: Array = rng.normal(*self._posterior(target))
-        return drawn
-
     def _posterior(self, target: Array) -> tuple[Array, Array]:
+        """The deviation is the spread of all mean rewards, less the nearer the neighbours are."""
         middle, variance = around(self._reached)
         far, which = self._neighbours(target)
         weight = 1.0 / (far + CLOSE)
