@@ -9,6 +9,7 @@ import numpy as np
 
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.room import forget
 from mobee.learning.space import Space
 from mobee.robot.robot import Array
 
@@ -84,8 +85,7 @@ class AlikeFailures:
             sums, asked = sums.copy(), self._middles.copy()
             asked[:, :3] += target / WAY
             _compiled().gaussian_sums(asked, self._events, seen, self._used, sums)
-        while len(self._sums) >= KEPT:
-            del self._sums[next(iter(self._sums))]  # not asked about for the longest time
+        forget(self._sums, KEPT)
         self._sums[key] = self._used, sums
         return sums
 

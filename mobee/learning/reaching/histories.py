@@ -6,9 +6,8 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mobee.learning.bins import Scalar
+from mobee.learning.reaching.room import room_for
 from mobee.robot.robot import Array
 
 
@@ -38,7 +37,7 @@ class Histories:
         entry = self._entries.get(key)
         if entry is None:
             entry = self._entries[key] = len(self._entries)
-            self._keys, self._sums = _room(self._keys, entry), _room(self._sums, entry)
+            self._keys, self._sums = room_for(self._keys, entry), room_for(self._sums, entry)
             self._keys[entry] = key
         self._sums[entry] += value, 1.0
 
@@ -66,14 +65,9 @@ class Histories:
         index = self._known.get(key)
         if index is None:
             index = self._known[key] = len(self._known)
-            self._targets = _room(self._targets, index)
+            self._targets = room_for(self._targets, index)
             self._targets[index] = target
         return index
-
-
-def _room(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
-    """The array, or a copy twice as long where it has no such index."""
-    return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
 
 
 @cache

@@ -10,6 +10,7 @@ from mobee.learning.reaching.predictors.covariance import joint_squares
 from mobee.learning.reaching.predictors.independent import Independent
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import around
+from mobee.learning.reaching.room import forget
 from mobee.robot.robot import Array, Ints
 
 NEIGHBOURS = 5
@@ -67,7 +68,6 @@ class Nearest(Independent):
             which = np.concatenate([which, np.broadcast_to(np.arange(seen, len(known)), squares.shape)], axis=1)
             order = np.argsort(far, axis=1, kind="stable")[:, :NEIGHBOURS]
             far, which = np.take_along_axis(far, order, axis=1), np.take_along_axis(which, order, axis=1)
-        while len(self._found) >= KEPT:
-            del self._found[next(iter(self._found))]  # not asked about for the longest time
+        forget(self._found, KEPT)
         self._found[key] = len(self._reached), far, which
         return far, which

@@ -1,11 +1,10 @@
-"""All reaches so far, repeats of one state and target merged: what every predictor but the published one learns from."""
+"""All reaches so far, repeats of one state and target merged: what most predictors learn from."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mobee.learning.bins import Scalar
+from mobee.learning.reaching.room import room_for
 from mobee.robot.robot import Array, Ints
 
 EXPECTED, SPREAD = 0.3, 0.25  # of mean rewards before the first reach: average and standard deviation
@@ -72,11 +71,11 @@ class Reached:
         """Take one reach; returns the index of its pair."""
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
-        self._places = _room(self._places, place)
+        self._places = room_for(self._places, place)
         self._places[place] = target
         pair = self._pair_of.setdefault((state, place), len(self._pair_of))
-        self._state, self._target = _room(self._state, pair), _room(self._target, pair)
-        self._count, self._total, self._squares = _room(self._count, pair), _room(self._total, pair), _room(self._squares, pair)
+        self._state, self._target = room_for(self._state, pair), room_for(self._target, pair)
+        self._count, self._total, self._squares = room_for(self._count, pair), room_for(self._total, pair), room_for(self._squares, pair)
         self._state[pair], self._target[pair] = state, place
         self._count[pair] += 1.0
         self._total[pair] += reward
@@ -90,8 +89,3 @@ def around(known: Reached) -> tuple[float, float]:
     rewards, pairs = known.mean, len(known) + IMAGINED
     middle = (rewards.sum() + IMAGINED * EXPECTED) / pairs
     return float(middle), float((((rewards - middle) ** 2).sum() + IMAGINED * SPREAD**2) / pairs)
-
-
-def _room(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
-    """The array, or a copy twice as long where it has no such index."""
-    return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
