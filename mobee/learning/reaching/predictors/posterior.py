@@ -10,14 +10,15 @@ import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import Covariance, Points, points
 from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.room import forget
 from mobee.robot.robot import Array, Ints
 
 BLOCK = 32  # rows
-KEPT = 64  # targets whose rows are in memory
+KEPT = 300e6  # bytes of rows and covariances of targets in memory, but those of one at least: of 256 states 31 targets, at the fullest
 
 
-class Known:
-    """What is known of one target: rows (n, S), of which the first `done` will not change, and their sums."""
+class Asked:
+    """What is known of a target asked about: rows (n, S), of which the first `done` will not change, and their sums."""
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
         self.at, self.done, self.upto = at, 0, 0
@@ -45,7 +46,7 @@ class Posterior:
         room = -(-self._used // BLOCK) * BLOCK + 8 * BLOCK
         self._state, self._target = np.zeros(room, dtype=np.intp), np.zeros((room, 3))
         self._factor, self._score = np.zeros((room, room)), np.zeros(room)
-        self._known: dict[bytes, Known] = {}
+        self._asked: dict[bytes, Asked] = {}
         if self._used:
             self._state[: self._used], self._target[: self._used] = state, target
             seen = points(reaches, state, target)
@@ -75,16 +76,21 @@ class Posterior:
         self._state[row], self._target[row] = state, target
         self._used += 1
 
-    def _brought_up(self, target: Array) -> Known:
+    @property
+    def _most(self) -> int:
+        """Targets that there is memory for: each with its rows, and its covariance twice."""
+        states = len(self._all)
+        return max(1, int(KEPT // (8 * states * (len(self._score) + 2 * states))))
+
+    def _brought_up(self, target: Array) -> Asked:
         """The rows of a target, to the last."""
         key = target.tobytes()
-        known = self._known.pop(key, None)
+        known = self._asked.pop(key, None)
         if known is None:
             at = points(self._reaches, self._all, target)
-            known = Known(at, self._covariance.between(at, at), len(self._score))
-            while len(self._known) >= KEPT:
-                del self._known[next(iter(self._known))]  # the one not asked about for the longest time
-        self._known[key] = known
+            known = Asked(at, self._covariance.between(at, at), len(self._score))
+        forget(self._asked, self._most)
+        self._asked[key] = known
         if known.upto < self._used:
             if len(known.rows) < self._used:
                 known.rows = np.concatenate([known.rows, np.empty((len(self._score) - len(known.rows), len(self._all)))])
@@ -96,7 +102,7 @@ class Posterior:
             known.upto = self._used
         return known
 
-    def _continued(self, known: Known, first: int, end: int) -> tuple[Array, Array]:
+    def _continued(self, known: Asked, first: int, end: int) -> tuple[Array, Array]:
         """Rows first to end of a target; returns mean and covariance with them."""
         new = slice(first, end)
         seen = points(self._reaches, self._state[new], self._target[new])

@@ -42,12 +42,24 @@ def test_merging_repeats_changes_nothing(monkeypatch):
 
 def test_targets_forgotten_in_memory_are_worked_out_again(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 100)
-    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", 2)
+    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", 80e3)
     process, other = taught(GaussianProcess(made, refits=()), seen), GaussianProcess(made, refits=())
     monkeypatch.undo()
     taught(other, seen)
     for target in places():
         np.testing.assert_array_equal(process.mean(target), other.mean(target))
+
+
+@pytest.mark.parametrize(("targets", "kept"), [(3.5, 3), (0.5, 1)])
+def test_what_is_kept_of_targets_is_bounded_by_its_bytes(monkeypatch, targets, kept):
+    made = reaches()
+    process = GaussianProcess(made, refits=())
+    process.mean(places()[0])
+    (one,) = process._posterior._asked.values()
+    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", targets * (one.rows.nbytes + 2 * one.covariance.nbytes))
+    for distance in range(6):
+        process.mean(np.array([distance, 0.0, 0.0]))
+    assert len(process._posterior._asked) == kept
 
 
 def test_no_data_is_the_prior_and_so_is_what_lies_far_from_all_data_but_for_what_all_rewards_share():
