@@ -33,17 +33,10 @@ class Transition:
 
 
 class TransitionStore(AgentFile):
-    """The transitions of one agent in the file of a run, which the processes of several agents may share.
-
-    Write-ahead log with full synchronisation: what `append` has returned from survives a kill and a power cut.
+    """The transitions of one agent in the file of a run; what `append` has returned from survives a kill and a power cut.
 
     Args:
-        path: the SQLite file; made if missing, its folder must exist.
-        agent: the name under which this agent's transitions are kept.
-        read_only: to look at what is on record, also where nothing may be written; nothing is made or changed then.
-
-    Raises:
-        MobeeError: from every method, in one line with the file and what to do.
+        path, agent, read_only: of the AgentFile, which says too what is raised.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
