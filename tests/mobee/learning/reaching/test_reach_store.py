@@ -74,11 +74,11 @@ def test_stopped_at_any_step_it_goes_on_as_if_it_had_not(tmp_path, strategy):
 def test_a_kill_leaves_all_that_was_reported(tmp_path):
     path = tmp_path / "run.sqlite"
     child = subprocess.Popen([sys.executable, "-c", LEARNER, str(path)], stdout=subprocess.PIPE, text=True, cwd=ROOT)
-    for _ in range(5):
-        child.stdout.readline()
+    reports = [child.stdout.readline() for _ in range(5)]
     time.sleep(0.05)
     child.send_signal(signal.SIGKILL)
-    reported = int(child.communicate()[0].split("\n")[-2])
+    reports += [line for line in child.communicate()[0].splitlines(keepends=True) if line.endswith("\n")]
+    reported = int(reports[-1])
     with ReachStore(path, PART) as store:
         steps = store.load()
         on = plant(1)
