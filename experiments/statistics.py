@@ -12,24 +12,34 @@ from mobee.robot.robot import Array, Ints
 
 RESAMPLES = 2000
 LEVEL = 0.95
-Statistic = Callable[[Array], float]
+Statistic = Callable[[Array], Array]  # of values along the last axis
 
 
 def interquartile_mean(values: ArrayLike) -> float:
     """The mean of what is left when a quarter of the values, rounded down, is cut off at either end; shape (n,), n at least 1."""
-    ordered = np.sort(_checked(values))
-    cut = len(ordered) // 4
-    return float(ordered[cut : len(ordered) - cut].mean())
+    return float(interquartile_means(_checked(values)))
+
+
+def interquartile_means(values: Array) -> Array:
+    """The same along the last axis of (..., n)."""
+    ordered = np.sort(values, axis=-1)
+    cut = values.shape[-1] // 4
+    found: Array = ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
+    return found
 
 
 def interval(
-    values: ArrayLike, statistic: Statistic = interquartile_mean, strata: ArrayLike | None = None, seed: int = 0, resamples: int = RESAMPLES
+    values: ArrayLike,
+    statistic: Statistic = interquartile_means,
+    strata: ArrayLike | None = None,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
 ) -> tuple[float, float]:
     """The 95 % interval of a statistic by the stratified bootstrap (percentiles).
 
     Args:
         values: (n,).
-        statistic: of a resample (n,), in which each value comes from the stratum of its place.
+        statistic: of resamples (resamples, n) along the last axis; in each, every value comes from the stratum of its place.
         strata: (n,) labels; values are drawn anew within each label.  None: one stratum.
         seed: of the draws.
         resamples: how many.
@@ -38,9 +48,7 @@ def interval(
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
     if labels.shape != given.shape:
         raise InvalidValue(f"strata of shape {labels.shape}: give one label for each of the {len(given)} values.")
-    places = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    rng = np.random.default_rng(seed)
-    found = [statistic(given[_drawn(places, len(given), rng)]) for _ in range(resamples)]
+    found = statistic(given[_drawn(labels, resamples, seed)])
     low, high = np.quantile(found, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
     return float(low), float(high)
 
@@ -51,26 +59,24 @@ def told(values: ArrayLike, digits: int = 2) -> str:
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def _drawn(places: list[Ints], count: int, rng: np.random.Generator) -> Ints:
-    chosen = np.empty(count, dtype=np.intp)
-    for mine in places:
-        chosen[mine] = mine[rng.integers(len(mine), size=len(mine))]
+def _drawn(labels: Array, resamples: int, seed: int) -> Ints:
+    """Places of values, drawn within each label, (resamples, n)."""
+    _, stratum, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(stratum, kind="stable")
+    first = (np.cumsum(sizes) - sizes)[stratum[order]]
+    chosen = np.empty((resamples, len(labels)), dtype=np.intp)
+    chosen[:, order] = order[first + np.random.default_rng(seed).integers(sizes[stratum[order]], size=chosen.shape)]
     return chosen
 
 
-def ratio(above: ArrayLike, below: ArrayLike, statistic: Statistic = interquartile_mean) -> float:
-    """The statistic of one group of runs over that of another."""
-    return statistic(_checked(above)) / statistic(_checked(below))
+def ratio(above: ArrayLike, below: ArrayLike) -> float:
+    """The interquartile mean of one group of runs over that of another."""
+    return interquartile_mean(above) / interquartile_mean(below)
 
 
-def ratio_interval(
-    above: ArrayLike, below: ArrayLike, statistic: Statistic = interquartile_mean, seed: int = 0, resamples: int = RESAMPLES
-) -> tuple[float, float]:
+def ratio_interval(above: ArrayLike, below: ArrayLike) -> tuple[float, float]:
     """The 95 % bootstrap interval of `ratio`, both groups drawn anew."""
-    first, second = _checked(above), _checked(below)
-    labels = np.repeat([0, 1], [len(first), len(second)])
-    both = np.concatenate([first, second])
-    return interval(both, lambda drawn: statistic(drawn[: len(first)]) / statistic(drawn[len(first) :]), labels, seed, resamples)
+    return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second))
 
 
 def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
@@ -83,17 +89,26 @@ def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.
 
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
     """How likely a run of the first group is above one of the second, a tie counting half (Mann-Whitney's U / nm)."""
-    mine, theirs = _checked(first), _checked(second)
-    difference = mine[:, None] - theirs[None, :]
-    return float((difference > 0.0).mean() + 0.5 * (difference == 0.0).mean())
+    return float(_improvements(_checked(first), _checked(second)))
 
 
-def improvement_interval(first: ArrayLike, second: ArrayLike, seed: int = 0, resamples: int = RESAMPLES) -> tuple[float, float]:
+def improvement_interval(first: ArrayLike, second: ArrayLike) -> tuple[float, float]:
     """The 95 % bootstrap interval of `probability_of_improvement`, both groups drawn anew."""
-    mine, theirs = _checked(first), _checked(second)
-    labels = np.repeat([0, 1], [len(mine), len(theirs)])
-    both = np.concatenate([mine, theirs])
-    return interval(both, lambda drawn: probability_of_improvement(drawn[: len(mine)], drawn[len(mine) :]), labels, seed, resamples)
+    return _of_both(first, second, _improvements)
+
+
+def _improvements(first: Array, second: Array) -> Array:
+    """Of groups along the last axes."""
+    difference = first[..., :, None] - second[..., None, :]
+    found: Array = (difference > 0.0).mean(axis=(-2, -1)) + 0.5 * (difference == 0.0).mean(axis=(-2, -1))
+    return found
+
+
+def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Array], Array]) -> tuple[float, float]:
+    """The interval of what compares two groups along the last axes."""
+    groups = [_checked(first), _checked(second)]
+    sizes = [len(group) for group in groups]
+    return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), np.repeat([0, 1], sizes))
 
 
 def _checked(values: ArrayLike) -> Array:

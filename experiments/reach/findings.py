@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -154,7 +155,7 @@ def _choices(runs: Mapping[str, Runs]) -> list[Claim]:
     few = FEW.measured(f"states of half the reaches: {text}; the two most frequent: {favourite[0]}, {favourite[1]}", all_hold(verdicts))
     named = np.array([float(set(np.argsort(-one)[:2].tolist()) in NAMED) for one in mine.chosen(6400)])
     text = f"they are in {named.sum():.0f} of {len(named)} runs; over all runs {favourite[0]} and {favourite[1]}"
-    those = THOSE.measured(text, decides(interval(named, np.mean), least=0.5))
+    those = THOSE.measured(text, decides(interval(named, partial(np.mean, axis=-1)), least=0.5))
     height = runs["random"].height(6400)
     return [agree, few, those, HIGH.measured(f"{told(100.0 * height, 1)} cm above the mean of all states", rises(height))]
 
