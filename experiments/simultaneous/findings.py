@@ -26,7 +26,11 @@ SOONER = {
     way: Claim(_SOURCE, f"model and reaches at once need no more actions to {SHARE:.0%} of the final score of {told_of} first", "no number")
     for way, told_of in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
 }
-LEVEL = Claim(_SOURCE, "with the same total of actions they end with no lower score than the better of these", "no number")
+LEVEL = Claim(
+    _SOURCE,
+    f"with the same total of actions they end with no lower score than the better of these (at most {EVEN:.0%} below)",
+    "no number",
+)
 CLEAN = Claim(_SOURCE, "contact keeps the model clean: its error is smaller than if all failures are the model's", "no number")
 HEARD = Claim(_SOURCE, "the reaches are better than if all failures are the target's", "no number")
 CLAIMS = (*SOONER.values(), LEVEL, CLEAN, HEARD)
@@ -92,7 +96,7 @@ def judged(runs: Mapping[str, Runs]) -> list[Claim]:
     for way, claim in SOONER.items():
         least = SHARE * float(ends[way].mean())
         ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[way]))
-        text = f"{told(ours, 0)} against {told(theirs, 0)} actions to a score of {least:.1f}"
+        text = f"{_told_actions(ours)} against {_told_actions(theirs)} actions to a score of {least:.1f}"
         found.append(claim.measured(text, no_more(ours, theirs)))
     text = "score " + ", ".join(f"{way} {told(ends[way])}" for way in (CONTACT, *FIRST))
     found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[way] for way in FIRST])))
@@ -104,14 +108,19 @@ def judged(runs: Mapping[str, Runs]) -> list[Claim]:
     return found
 
 
+def _told_actions(needed: Array) -> str:
+    never = int(np.isinf(needed).sum())
+    return f"never in {never} of {len(needed)} runs" if never else told(needed, 0)
+
+
 def _of_observed(mine: Runs) -> str:
     last = mine.observed[:, -1]
     return f" ({told(last, 3)} of transitions observed)" if np.isfinite(last).all() else ""
 
 
 def actions_to(least: float, actions: Ints, scores: Array) -> Array:
-    """After how many actions each run's scores (N, L) have come to that, on straight lines between the looks, (N,); the last if never."""
-    found = np.full(len(scores), float(actions[-1]))
+    """After how many actions each run's scores (N, L) have come to that, on straight lines between the looks, (N,); inf if never."""
+    found = np.full(len(scores), np.inf)
     for n, mine in enumerate(scores):
         enough = np.flatnonzero(mine >= least)
         if len(enough):
@@ -122,7 +131,12 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 
 
 def no_more(ours: Array, theirs: Array) -> bool | None:
-    """Whether our runs (N,) need at most as many actions as theirs of the same seeds; None where the interval leaves that open."""
+    """Whether our runs (N,) need at most as many actions as theirs of the same seeds.
+
+    None where the interval leaves that open, and where a run never came to the score: how many it needs was not measured.
+    """
+    if not np.isfinite([ours, theirs]).all():
+        return None
     return decides(interval(ours - theirs), most=0.0)
 
 

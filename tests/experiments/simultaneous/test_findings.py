@@ -39,12 +39,23 @@ def verdicts(found):
 
 def test_a_score_is_come_to_between_two_looks():
     scores = np.array([[2.0, 4.0, 8.0], [6.0, 2.0, 6.0], [1.0, 2.0, 3.0], [np.nan, 6.0, 7.0]])
-    assert actions_to(5.0, LOOKS, scores).tolist() == [2500.0, 1000.0, 4000.0, 2000.0]
+    assert actions_to(5.0, LOOKS, scores).tolist() == [2500.0, 1000.0, np.inf, 2000.0]
 
 
 @pytest.mark.parametrize(("ours", "expected"), [(2000.0, True), (3000.0, True), (3500.0, False)])
 def test_as_many_actions_are_no_more(ours, expected):
     assert no_more(np.full(SEEDS, ours), np.full(SEEDS, 3000.0)) is expected
+
+
+@pytest.mark.parametrize("never", [(1000.0, np.inf), (np.inf, 1000.0), (np.inf, np.inf)])
+def test_how_many_actions_a_run_needs_that_never_comes_to_the_score_is_open(never):
+    ours, theirs = (np.where(np.arange(SEEDS) == 2, last, 1000.0) for last in never)
+    assert no_more(ours, theirs) is None
+
+
+def test_a_claim_tells_how_many_runs_never_came_to_the_score():
+    sooner = judged(runs(contact=((1.0, 2.0, 3.0), 0.05)))[0]
+    assert sooner.verdict == "open" and sooner.ours.startswith(f"never in {SEEDS} of {SEEDS} runs against 4000")
 
 
 def test_a_difference_that_its_interval_leaves_open_is_open():
@@ -64,7 +75,8 @@ def test_all_claims_hold_where_contact_tells_whose_fault_it_is():
 
 
 def test_all_claims_fail_where_the_others_do_better():
-    worse = runs(contact=((1.0, 2.0, 3.0), 0.4), **{"first-3000": ((np.nan, 9.0, 9.0), 0.01)})
+    late = {"first-3000": ((np.nan, 9.0, 9.0), 0.01), "first-1000": ((1.0, 9.0, 10.0), 0.02), "target": ((3.0, 9.0, 10.0), 0.3)}
+    worse = runs(contact=((1.0, 2.0, 9.05), 0.4), **late)
     assert verdicts(worse) == ["refuted"] * len(CLAIMS)
 
 
