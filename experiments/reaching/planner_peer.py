@@ -28,8 +28,8 @@ NEAREST = 8  # goals that are planned to
 ESCAPES = 64  # poses tried, to come away from where it touches something
 Memory = Literal["none", "blocked", "missed"]
 MEMORIES: tuple[Memory, ...] = ("none", "blocked", "missed")
-Ended = Literal["there", "blocked", "no plan"]
-ENDS: tuple[Ended, ...] = ("there", "blocked", "no plan")
+Ended = Literal["there", "used up", "no plan"]
+ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 
 
@@ -37,7 +37,8 @@ Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 class PeerTry:
     """How a try ended.
 
-    `missing`: m, truly.  `ended`: held to be "there", "blocked" until the actions were used up, or with "no plan" left.
+    `missing`: m, truly.  `ended`: held to be "there", with "no plan" left, or when the actions were "used up": motions were blocked, or
+    the target moved.
     `actions`, `plans`: how many.
     `seconds`: of plant time.  `planning`: s of this machine's time.  `looks`: poses looked at.
     """

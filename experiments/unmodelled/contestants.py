@@ -15,8 +15,8 @@ from mobee.learning.reaching.problems import Problems
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Array
 
-FATES = ("reached", "missed", "blocked", "no plan")
-"""How a try ends: within reach of the target; not, though it went as planned; not, for motions were blocked; not, for no way was known."""
+FATES = ("reached", "missed", "used up", "no plan")
+"""How a try ends: within 2 cm of the target; not, though it went as planned; not before the actions were used up; with no way known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
