@@ -16,19 +16,32 @@ from mobee.robot.robot import Array
 SCENES = ("perfect", "noise", "moving")
 WHO = ("learner", "peer")
 TOLD = {"perfect": "a perfect model", "noise": "encoder noise five times the usual", "moving": "a target that never rests"}
+PEER = dict.fromkeys(SCENES, "inverse kinematics and RRT-Connect") | {
+    "moving": "inverse kinematics and RRT-Connect, each of whose motions aims where the target was when it began"
+}
 EVEN = 0.05  # of success: as much below still counts as equal
 FEASIBLE, SMOOTHED = 10.0, 125.0  # s, published
+SLOW = 0.1  # of the published times: a planner that takes as much is too slow
 CLAIMS = (
     *(
         Claim(
             "thesis 9.3; aim of this reproduction",
-            f"with {what} the learned reacher is no worse than inverse kinematics and RRT-Connect",
+            f"with {TOLD[scene]} the learned reacher is no worse than {PEER[scene]} (at most {100.0 * EVEN:.0f} points of success below)",
             "-",
         )
-        for what in TOLD.values()
+        for scene in SCENES
     ),
-    Claim("thesis 1.5", "single query planning is too slow to be used online: both arms (12 DOF) around a table's edge to a cup", "10 s"),
-    Claim("thesis 1.5", "and its way is circuitous and has to be smoothed", "another 125 s"),
+    Claim(
+        "thesis 1.5",
+        "single query planning is too slow to be used online: both arms (12 DOF) around a table's edge to a cup take it at least "
+        f"{SLOW * FEASIBLE:.0f} s, a tenth of the published time",
+        f"{FEASIBLE:.0f} s",
+    ),
+    Claim(
+        "thesis 1.5",
+        f"and smoothing its circuitous way at least {SLOW * SMOOTHED:.1f} s more, a tenth of the published time",
+        f"another {SMOOTHED:.0f} s",
+    ),
 )
 
 
@@ -39,9 +52,10 @@ def of_cases(done: Mapping[str, CellResult], scene: str, who: str, measure: str)
 
 
 def of_queries(done: Mapping[str, CellResult], measure: str) -> Array:
-    """The median over the queries of each seed, of both arms, (seeds,)."""
-    found = sorted((one for one in done.values() if one.cell.settings["scene"] == "two arms"), key=lambda one: one.cell.seed)
-    return np.array([float(np.median(one.values[measure])) for one in found])
+    """The median over the queries of each seed, of both arms, (seeds,); but for the planning times, of those with a way alone."""
+    ordered = sorted((one for one in done.values() if one.cell.settings["scene"] == "two arms"), key=lambda one: one.cell.seed)
+    counted = [one.values[measure][slice(None) if measure == "seconds" else one.values["found"].astype(bool)] for one in ordered]
+    return np.array([float(np.median(values)) for values in counted if len(values)])
 
 
 def claims(done: Mapping[str, CellResult]) -> list[Claim]:
@@ -55,8 +69,11 @@ def claims(done: Mapping[str, CellResult]) -> list[Claim]:
     share = np.array([one.values["found"].mean() for one in done.values() if one.cell.settings["scene"] == "two arms"])
     for claim, measure, published in ((CLAIMS[3], "seconds", FEASIBLE), (CLAIMS[4], "smoothing", SMOOTHED)):
         took = of_queries(done, measure)
+        if not len(took):
+            found.append(claim.measured("no way was found", None))
+            continue
         text = f"{told(took, 3)} s with a compiled test of poses; a way is found in {told(share)} of the queries"
-        found.append(claim.measured(text, decides(interval(took), least=published / 10.0)))
+        found.append(claim.measured(text, decides(interval(took), least=SLOW * published)))
     return found
 
 
@@ -74,4 +91,9 @@ def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
         for who in WHO
     ]
     measures = ("seconds", "smoothing", "corners", "missing")
-    return {"cases": rows, "both arms": {measure: told(of_queries(done, measure), 3) for measure in measures}, "within [m]": GOOD}
+    arms = {measure: of_queries(done, measure) for measure in measures}
+    return {
+        "cases": rows,
+        "both arms": {name: told(values, 3) if len(values) else None for name, values in arms.items()},
+        "within [m]": GOOD,
+    }
