@@ -22,7 +22,7 @@ WRONG = ("nothing", "planners", "everyone")
 SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m by which targets, rad by which joints are not where they are believed
 UNSEEN = "unseen"
 RADIUS = 0.05  # m, of the ball that nobody sees
-AWAY = 0.12  # m, from its middle to that of any target
+AWAY = 0.12  # m, from its middle to that of any of the thesis' targets
 LEAST, MOST = 0.08, 0.3  # share of the straight ways between two states that it blocks
 DRAWS = 400
 
@@ -56,7 +56,10 @@ class Scene:
 
 
 def make_scene(seed: int, wrong: str) -> Scene:
-    """A ball in the way of many motions, not in that of any target, and errors of the sizes above; the same for all who are `wrong`."""
+    """A ball in the way of many motions, and errors of the sizes above; the same for all who are `wrong`.
+
+    Targets of `reachable` that cannot be touched beside the ball are left out.
+    """
     rng = np.random.default_rng([seed, 86])
     ball = _ball(rng, grid())
     shift = rng.normal(size=3)
