@@ -37,8 +37,9 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     thinking.set(ylabel="planning a try [ms]", yscale="log")
     queries = [one for one in done.values() if one.cell.settings["scene"] == "two arms"]
     for measure, color, label in (("seconds", "tab:blue", "a way"), ("smoothing", "tab:cyan", "shortened")):
-        took = np.sort(np.concatenate([one.values[measure] for one in queries]))
-        arms.plot(took, np.arange(1, len(took) + 1) / len(took), color=color, label=label)
+        each = [one.values[measure][one.values["found"].astype(bool)] for one in queries]
+        took = np.sort(np.concatenate(each))
+        arms.plot(took, np.arange(1, len(took) + 1) / sum(len(one.values["found"]) for one in queries), color=color, label=label)
     arms.axvline(FEASIBLE, color="0.5", linestyle="--", label="BT-RRT, published: a way")
     arms.set(xscale="log", xlabel="both arms around the table's edge: planning [s]", ylabel="share of queries", ylim=(0.0, 1.02))
     arms.legend(fontsize=8)
