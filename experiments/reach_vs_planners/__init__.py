@@ -14,6 +14,7 @@ corner, and the last motion, of a second or more, aims where the target was when
 is compared there is following with aiming, not with a planner that predicts.
 The two arms' problem is drawn anew for each query, as no drawing of it was published: so the times compare orders of magnitude only, and
 today's processor with that of 2011.
+Seed 0 was looked at while the peer was made: what is reported begins with --seed 1.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ The learner knows the transitions of its lattice from 3000 curious ones without 
 tries, each of the target least tried, from where the arm is.  The peer has inverse kinematics and RRT-Connect (OMPL) with the compiled
 validity test, 20 actions a try to the learner's 10, and remembers: nothing, where motions were blocked, or also which poses missed.
 Who has used up the actions of a try has failed, whatever it was that used them up.
-The seeds draw the ball, the errors, noise and starts.
+The seeds draw the ball, the errors, noise and starts.  Seed 0 was looked at while scene and peer were made: what is reported begins with
+--seed 1.
 """
 
 from __future__ import annotations
