@@ -20,7 +20,7 @@ def _entries(results: Mapping[str, Any], indent: str, width: int) -> Iterator[st
     for columns, group in groupby(results.items(), key=lambda entry: _columns(entry[1])):
         rows = dict(group)
         if columns and len(rows) > 1:
-            yield from _table(rows, columns, indent, width)
+            yield from _table([_words(label) for label in rows], list(rows.values()), columns, indent, width)
         else:
             for key, value in rows.items():
                 yield from _entry(_words(key), value, indent, width)
@@ -32,6 +32,12 @@ def _columns(value: Any) -> tuple[str, ...]:
 
 
 def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
+    if isinstance(value, list) and value and all(map(_columns, value)):
+        yield f"{indent}{label}:"
+        first, *columns = dict.fromkeys(name for row in value for name in row)
+        labels = [_cell(row.get(first)) for row in value]
+        yield from _table(labels, value, columns, indent + " " * STEP, width, _words(first))
+        return
     if not isinstance(value, dict) or not value:
         yield textwrap.fill(
             f"{label}: {_cell(value)}",
@@ -46,18 +52,20 @@ def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
     yield from _entries(value, indent + " " * STEP, width)
 
 
-def _table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str], indent: str, width: int) -> Iterator[str]:
-    """A row a result, over it the names of what is in its columns, a word a line."""
-    labels = [_words(label) for label in rows]
-    stub = len(indent) + max(map(len, labels))
-    cells = {name: [_cell(row[name]) for row in rows.values()] for name in columns}
+def _table(
+    labels: Sequence[str], rows: Sequence[Mapping[str, Any]], columns: Sequence[str], indent: str, width: int, head: str = ""
+) -> Iterator[str]:
+    """A row a result, over it the names of what is in its columns, a word a line; `head`: that of what the labels are."""
+    stub = len(indent) + max(map(len, [head, *labels]))
+    cells = {name: [_cell(row.get(name)) for row in rows] for name in columns}
     widths = {name: max(map(len, [*_words(name).split(), *cells[name]])) for name in columns}
     for block in _blocks(columns, widths, width - stub):
         heads = [_words(name).split() for name in block]
-        height = max(map(len, heads))
-        lines = [[""] * (height - len(head)) + head for head in heads]
-        for row in zip(*lines, strict=True):
-            yield (" " * stub + _line(row, block, widths)).rstrip()
+        height = max(map(len, heads), default=1)
+        lines = list(zip(*([""] * (height - len(words)) + words for words in heads), strict=True)) or [()]
+        for line in lines[:-1]:
+            yield (" " * stub + _line(line, block, widths)).rstrip()
+        yield (f"{indent}{head}".ljust(stub) + _line(lines[-1], block, widths)).rstrip()
         for i, label in enumerate(labels):
             yield f"{indent}{label}".ljust(stub) + _line([cells[name][i] for name in block], block, widths)
 

@@ -7,7 +7,10 @@ from mobee_cli.results_text import results_text
 
 NAMES = st.text("abcdefgh_", min_size=1, max_size=12)
 SCALARS = st.none() | st.booleans() | st.integers(-999, 999) | st.floats(-1e3, 1e3) | st.text("abc ", max_size=12)
-RESULTS = st.recursive(SCALARS | st.lists(SCALARS, max_size=2), lambda inner: st.dictionaries(NAMES, inner, max_size=5), max_leaves=20)
+ROWS = st.lists(st.dictionaries(NAMES, SCALARS, max_size=3), max_size=3)
+RESULTS = st.recursive(
+    SCALARS | st.lists(SCALARS, max_size=2) | ROWS, lambda inner: st.dictionaries(NAMES, inner, max_size=5), max_leaves=20
+)
 
 
 def test_results_of_the_same_names_are_a_table():
@@ -18,6 +21,18 @@ def test_results_of_the_same_names_are_a_table():
         "                mm    pair",
         "  left hand      0       -",
         "  chest      1.235  a in b",
+    ]
+
+
+def test_a_list_of_results_is_a_table_whose_first_names_the_rows():
+    found = {"ways": [{"way": "contact", "score at 5": 1, "tries": 2}, {"way": "first-3", "tries": 4, "L1": 0.5}]}
+    assert results_text(found, 40).splitlines() == [
+        "ways:",
+        "           score",
+        "              at",
+        "  way          5  tries   L1",
+        "  contact      1      2    -",
+        "  first-3      -      4  0.5",
     ]
 
 
