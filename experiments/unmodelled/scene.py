@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -60,12 +61,17 @@ def make_scene(seed: int, wrong: str) -> Scene:
 
     Targets of `reachable` that cannot be touched beside the ball are left out.
     """
+    return replace(_drawn(seed), wrong=wrong)
+
+
+@cache
+def _drawn(seed: int) -> Scene:
     rng = np.random.default_rng([seed, 86])
     ball = _ball(rng, grid())
     shift = rng.normal(size=3)
     knowing = arm_belief(_world(ball))
     targets = [target for target in reachable() if touchable(knowing, target)]
-    return Scene(targets, ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), wrong)
+    return Scene(targets, ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), WRONG[0])
 
 
 def _world(ball: Array) -> World:
