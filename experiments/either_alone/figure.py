@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.drawn import draw_bars
 from experiments.either_alone.cases import SCENES
 from experiments.either_alone.findings import LAWS, MEASURE, measured
 from experiments.either_alone.trial import WAYS
 from experiments.matplotlib_figure import new_figure
-from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
@@ -24,8 +24,6 @@ TITLES = {
     "between": "obstacle\nbetween",
     "moving": "target moves",
 }
-
-
 LABEL_OF = {"success": "palm within 2 cm of the surface", "reward": "reward (eq. 8.4)"}
 
 
@@ -37,10 +35,7 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     for axes, law in zip(drawing.subplots(1, len(LAWS)), LAWS, strict=True):
         for number, way in enumerate(WAYS):
             values = [measured(done, law, scene, way, MEASURE[law]) for scene in SCENES]
-            means, bounds = np.array([interquartile_mean(v) for v in values]), np.array([interval(v) for v in values])
-            spread = np.maximum(np.stack([means - bounds[:, 0], bounds[:, 1] - means]), 0.0)
-            at = np.arange(len(SCENES)) + 0.26 * (number - 1)
-            axes.bar(at, means, 0.24, yerr=spread, color=COLORS[way], label=LABELS[way], capsize=3)
+            draw_bars(axes, np.arange(len(SCENES)) + 0.26 * (number - 1), values, 0.24, COLORS[way], LABELS[way])
         axes.set_xticks(range(len(SCENES)), [TITLES[scene] for scene in SCENES])
         axes.set(title=f"{law} law", ylabel=LABEL_OF[MEASURE[law]], ylim=(0.0, None))
         axes.grid(alpha=0.2, axis="y")

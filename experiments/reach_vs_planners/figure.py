@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.drawn import draw_bars
 from experiments.matplotlib_figure import new_figure
 from experiments.reach_vs_planners.findings import FEASIBLE, SCENES, TOLD, WHO, of_cases
-from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
@@ -27,9 +27,7 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     for axes, measure, factor in ((success, "success", 1.0), (thinking, "thinking", 1000.0)):
         for number, who in enumerate(WHO):
             values = [factor * of_cases(done, scene, who, measure) for scene in SCENES]
-            means, bounds = np.array([interquartile_mean(v) for v in values]), np.array([interval(v) for v in values])
-            spread = np.maximum(np.stack([means - bounds[:, 0], bounds[:, 1] - means]), 0.0)
-            axes.bar(np.arange(3) + 0.4 * (number - 0.5), means, 0.38, yerr=spread, color=COLORS[who], label=LABELS[who], capsize=3)
+            draw_bars(axes, np.arange(3) + 0.4 * (number - 0.5), values, 0.38, COLORS[who], LABELS[who])
         axes.set_xticks(range(3), [TOLD[scene].replace(" that", "\nthat").replace(" five", "\nfive") for scene in SCENES], fontsize=8)
         axes.grid(alpha=0.2, axis="y")
     success.set(ylabel="palm within 2 cm of the surface", ylim=(0.0, 1.02))

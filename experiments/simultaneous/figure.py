@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from experiments.drawn import draw_curve
 from experiments.matplotlib_figure import new_figure
 from experiments.simultaneous.findings import runs_of
-from experiments.statistics import interquartile_mean, interval
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints
@@ -47,9 +47,5 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
 def _curve(axes: Any, actions: Ints, values: Array, way: str) -> None:
     """Interquartile mean and interval of the runs, at the looks that all of them have."""
     known = np.isfinite(values).all(axis=0)
-    if not known.any():
-        return
-    means = [interquartile_mean(column) for column in values[:, known].T]
-    bounds = np.array([interval(column) for column in values[:, known].T])
-    axes.plot(actions[known], means, "o-", color=COLORS[way], label=LABELS[way], markersize=3)
-    axes.fill_between(actions[known], bounds[:, 0], bounds[:, 1], color=COLORS[way], alpha=0.15, linewidth=0.0)
+    if known.any():
+        draw_curve(axes, actions[known], values[:, known], COLORS[way], LABELS[way])

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from experiments.drawn import draw_curve
 from experiments.matplotlib_figure import new_figure
 from experiments.reaching.planner_peer import MEMORIES
-from experiments.statistics import interquartile_mean, interval
+from experiments.statistics import interquartile_mean
 from experiments.sweep import CellResult
 from experiments.unmodelled.findings import EQUAL_BY, crossover, success
 from experiments.unmodelled.scene import WRONG
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 COLORS = {"learner": "tab:red", "none": "0.5", "blocked": "tab:blue", "missed": "tab:cyan"}
 LABELS = {
@@ -40,7 +40,7 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
         for who, color in COLORS.items():
             tries, values = success(done, who, wrong)
             if len(values):
-                _curve(axes, tries, values, color, LABELS[who])
+                draw_curve(axes, tries, values, color, LABELS[who])
         _mark_crossover(axes, done, wrong)
         axes.axvline(EQUAL_BY, color="0.8", linewidth=0.8, zorder=0)
         axes.set(title=TITLES[wrong], xlabel="tries", xscale="log", ylim=(0.0, 1.02))
@@ -51,13 +51,6 @@ def draw(done: Mapping[str, CellResult], path: Path) -> Path:
     drawing.axes[1].legend(fontsize=8, loc="lower right")  # all four are there
     drawing.savefig(path, dpi=110)
     return path
-
-
-def _curve(axes: Any, tries: list[int], values: Array, color: str, label: str) -> None:
-    means = [interquartile_mean(column) for column in values.T]
-    bounds = np.array([interval(column) for column in values.T])
-    axes.plot(tries, means, "o-", color=color, label=label, markersize=4)
-    axes.fill_between(tries, bounds[:, 0], bounds[:, 1], color=color, alpha=0.15, linewidth=0.0)
 
 
 def _mark_crossover(axes: Any, done: Mapping[str, CellResult], wrong: str) -> None:
