@@ -8,11 +8,12 @@ from typing import Literal
 
 from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
-from mobee import ActionInterrupted, CuriousAgent, Lattice
+from mobee import CuriousAgent, Lattice
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
 from services.agents.learned import LearnedStream
+from services.agents.work import Work
 from services.common.bus_plant import BusPlant
 from services.common.delivery import EVENTS
 from services.common.service import Service
@@ -33,12 +34,12 @@ class AgentNode:
     """A curious agent on the live plant; every transition is on disk before the next action."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        self._service, self._config = service, config
+        self._config = config
         self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
-        self._plant = BusPlant(service, robot, (config.part,))
+        plant = BusPlant(service, robot, (config.part,))
         self._agent = CuriousAgent(
             published_space(robot, config),
-            self._plant,
+            plant,
             explorer=config.explorer,
             seed=config.seed,
             discount=config.discount,
@@ -54,23 +55,15 @@ class AgentNode:
         )
         self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
         self._learned = LearnedStream(service.bus, self._agent)
+        self._work = Work(service, plant)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
         """Act until the wanted number of transitions is made."""
-        self._service.ready()
-        if self._agent.transitions:
-            self._service.bus.event("info", "resumed", f"{self._config.part} goes on after {self._agent.transitions} transitions")
-        while not self._config.transitions or self._agent.transitions < self._config.transitions:
-            try:
-                self._step()
-            except ActionInterrupted as interruption:
-                self._interrupted += 1
-                self._service.bus.event("warning", "interrupted", str(interruption))
-            self._service.spin(time.monotonic())
-        if self._service.locked:
-            self._plant.leave()
+        agent, wanted = self._agent, self._config.transitions
+        resumed = f"{self._config.part} goes on after {agent.transitions} transitions" if agent.transitions else ""
+        self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
 
     def _step(self) -> None:
         state = self._agent.state
@@ -99,7 +92,7 @@ class AgentNode:
         self._learned.put(time.monotonic())
 
     def _mark(self) -> None:
-        self._made = self._timeouts = self._interrupted = 0
+        self._made = self._timeouts = self._work.interrupted = 0
         self._seconds = 0.0
 
     def _describe(self) -> tuple[str, dict[str, float]]:
@@ -107,7 +100,7 @@ class AgentNode:
             "transitions": self._made,
             "transitions_ever": self._agent.transitions,
             "timeouts": self._timeouts,
-            "interrupted": self._interrupted,
+            "interrupted": self._work.interrupted,
             "action_time_mean": self._seconds / self._made if self._made else -1.0,
         }
         return f"{self._agent.transitions} transitions, {self._made} now", numbers

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 
-from mobee import ActionInterrupted, ReachTarget
+from mobee import ReachTarget
 from mobee.learning.learned import load_learned
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
@@ -15,6 +14,7 @@ from mobee.robot.robot import Robot
 from mobee.store import STORE
 from services.agents.config import Config
 from services.agents.node import published_space
+from services.agents.work import Work
 from services.common.bus_plant import BusPlant
 from services.common.service import Service
 
@@ -23,14 +23,14 @@ class ReachNode:
     """A reach agent on the live plant; every action is on disk before the next."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        self._service, self._config = service, config
+        self._config = config
         self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
-        self._plant = BusPlant(service, robot, (config.part,))
+        plant = BusPlant(service, robot, (config.part,))
         known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
         side = "left" if config.part.startswith("left") else "right"
         self._agent = ReachAgent(
             published_space(robot, config) if known is None else known.space,
-            self._plant,
+            plant,
             None if known is None else known.model.debiased(),
             marker=config.marker or f"{side}_palm",
             predictor=config.predictor,
@@ -40,23 +40,15 @@ class ReachNode:
             seed=config.seed,
             store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
         )
+        self._work = Work(service, plant)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
         """Make problem-tries until there are as many as wanted."""
-        self._service.ready()
-        if self._agent.steps:
-            self._service.bus.event("info", "resumed", f"{self._config.part} goes on after {self._agent.tries} problem-tries")
-        while not self._config.tries or self._agent.tries < self._config.tries:
-            try:
-                self._try()
-            except ActionInterrupted as interruption:
-                self._interrupted += 1
-                self._service.bus.event("warning", "interrupted", str(interruption))
-            self._service.spin(time.monotonic())
-        if self._service.locked:
-            self._plant.leave()
+        agent, wanted = self._agent, self._config.tries
+        resumed = f"{self._config.part} goes on after {agent.tries} problem-tries" if agent.steps else ""
+        self._work.run(resumed, lambda: 0 < wanted <= agent.tries, self._try)
 
     def _try(self) -> None:
         agent = self._agent
@@ -72,7 +64,7 @@ class ReachNode:
         self._missing += made.missing
 
     def _mark(self) -> None:
-        self._made = self._failures = self._reached = self._interrupted = 0
+        self._made = self._failures = self._reached = self._work.interrupted = 0
         self._rewards = self._missing = 0.0
 
     def _describe(self) -> tuple[str, dict[str, float]]:
@@ -81,7 +73,7 @@ class ReachNode:
             "tries_ever": self._agent.tries,
             "reaches": self._reached,
             "failures": self._failures,
-            "interrupted": self._interrupted,
+            "interrupted": self._work.interrupted,
             "reward_mean": self._rewards / self._made if self._made else -1.0,
             "missing_mean": self._missing / self._reached if self._reached else -1.0,
         }
