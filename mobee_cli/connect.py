@@ -25,7 +25,5 @@ def connected(endpoint: str) -> Iterator[Any]:
         session = open_client(endpoint, patience=_PATIENCE)
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
-    try:
+    with session:
         yield session
-    finally:
-        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types

@@ -18,19 +18,18 @@ from bus_schema.messages import Reach
 from bus_schema.rpc import Config, Empty
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
-from mobee.reach import Aim, ReachOutcome, ReachTarget
+from mobee.reach import ReachOutcome
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Array, Robot
+from mobee_cli.connect import connected
 from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
 from mobee_cli.reach_stage import Stage
 from services.common import rpc
 from services.common.bus_plant import BusPlant
 from services.common.config import ServiceConfig
 from services.common.service import Service
-from services.common.session import BusUnreachable, open_client
 
 WHO = f"mobee_reach_{os.getpid()}"  # so that of two who present a target the second is told
-PATIENCE = 0.3  # s for a system that runs to answer
 CONTROL = 8.0  # s for the part to come under control and its goal to be free
 LONGEST = 300.0  # s of the clock on the wall for a reach, whatever the robot does
 NOTED = 1.0  # s from the request for which commands are noted
@@ -122,25 +121,17 @@ class LivePlant(BusPlant):
 @contextmanager
 def live(endpoint: str, part: str) -> Iterator[Stage]:
     """The robot of the system at `endpoint`; its part is taken, and given back at the end.  Raises UserError where there is none."""
-    try:
-        session = open_client(endpoint, patience=PATIENCE)
-    except BusUnreachable as error:
-        raise UserError(str(error), ENVIRONMENT) from None
-    try:
-        settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=3).config)
-    except rpc.CallFailed as failed:
-        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
-        raise UserError(f"no controller answers at {endpoint} ({failed}): `mobee status` says what runs", ENVIRONMENT) from None
-    robot = load_robot(settings["robot"])
-    robot.part(part)
-    with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the reach, and that the verb has to tell
-        logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
-        plant = LivePlant(service, robot, part)
-        service.ready()
-
-        def present_object(name: str, aim: Aim) -> ReachTarget:
-            return plant.present_object(name, aim)
-
-        yield Stage(robot, plant, plant.q, present_object, plant.first_motion)
-        plant.leave()
+    with connected(endpoint) as session:
+        try:
+            settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=3).config)
+        except rpc.CallFailed as failed:
+            raise UserError(f"no controller answers at {endpoint} ({failed}): `mobee status` says what runs", ENVIRONMENT) from None
+        robot = load_robot(settings["robot"])
+        robot.part(part)
+        with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the reach, and that the verb has to tell
+            logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
+            plant = LivePlant(service, robot, part)
+            service.ready()
+            yield Stage(robot, plant, plant.q, plant.present_object, plant.first_motion)
+            plant.leave()

@@ -8,6 +8,7 @@ import secrets
 import signal
 import time
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
 
@@ -57,11 +58,10 @@ class Service(Listener):
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
         session = session or open_client(config.endpoint, namespace=config.namespace, lease=lease)
-        try:
+        with ExitStack() as failed:
+            failed.enter_context(session)  # closed: an open callback would keep the interpreter from exiting
             self._begin(session, robot, inbox or Inbox(), prompt)
-        except BaseException:
-            session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
-            raise
+            failed.pop_all()
 
     def _begin(self, session: zenoh.Session, robot: Robot | None, inbox: Inbox, prompt: bool) -> None:
         locked = self.config.mode == "lock"
@@ -90,12 +90,10 @@ class Service(Listener):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        try:
+        with self.bus.session:  # closed even if a signal comes in between: an open callback would keep the interpreter from exiting
             _ignore_signals()
             if error is not None and not isinstance(error, SystemExit) and not self._says_all(error):
                 self.log.error("ended by %s", error, exc_info=error)
-        finally:  # even if a signal came in between
-            self.bus.session.close()  # type: ignore[no-untyped-call]  # an open callback would keep the interpreter from exiting
 
     def _says_all(self, error: BaseException) -> bool:
         """Whether its text is enough for a person (entry.py prints it); a wrong value once all runs is a fault of ours."""

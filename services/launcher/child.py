@@ -95,9 +95,9 @@ class Child:
         return self.process is not None and self.process.poll() is None
 
     def terminate(self) -> None:
-        """Ask the process to end."""
-        if self.running():
-            self.process.terminate()  # type: ignore[union-attr]  # running() says that there is one
+        """Ask the process to end, if there is one that runs."""
+        if self.process is not None:
+            self.process.terminate()
 
     def kill(self) -> None:
         """End the process and whatever it started, and wait until it is gone."""

@@ -83,17 +83,17 @@ def launch(options: Options) -> int:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before anything was started; what is compiled of the engine so far is kept", INTERRUPTED)
-    try:
-        directory = make_run_directory(options.runs, scenario, endpoint)
-        service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
-        service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
-    except OSError as error:
-        session.close()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
-        return _refuse(
-            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
-        )
-    with service:
-        return _Run(service, scenario, directory, options).execute(started)
+    with session:
+        try:
+            directory = make_run_directory(options.runs, scenario, endpoint)
+            service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
+            service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
+        except OSError as error:
+            return _refuse(
+                f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
+            )
+        with service:
+            return _Run(service, scenario, directory, options).execute(started)
 
 
 def _refuse(text: str, code: int) -> int:
@@ -114,9 +114,14 @@ class _Run:
     def execute(self, started: float) -> int:
         """Start, watch, stop, summarise; `started`: monotonic time from which readiness is counted."""
         self._listen_for_stop()
-        token = self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance))
-        self._service.describe = self._describe
-        self._service.ready()
+        with self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance)):
+            self._service.describe = self._describe
+            self._service.ready()
+            ready, duration = self._live(started)
+        return self._report(ready, duration)
+
+    def _live(self, started: float) -> tuple[float | None, float]:
+        """From the first service to the last; s until all were ready, None if they never were, and s from then on."""
         ready = begun = None
         try:
             self._draw()
@@ -139,8 +144,7 @@ class _Run:
         finally:
             self._supervisor.kill_all()
             self._screen.draw(self._children, self._directory, last=True)
-        token.undeclare()  # type: ignore[no-untyped-call]  # Zenoh leaves it without types
-        return self._report(ready, duration)
+        return ready, duration
 
     def _over(self) -> bool:
         """Whether somebody asked for the end, or nobody waits at a robot that is stopped for good."""
