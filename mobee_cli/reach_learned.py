@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.acting import move
+from mobee.learning.reaching.failures import has_failed
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import ReachTarget
 
@@ -25,7 +26,7 @@ def go_to_pre_reach(agent: ReachAgent, target: ReachTarget) -> tuple[tuple[int, 
         values, _ = agent.planning.values(expected, agent.failures.rewards(target.position))
         action = plan.actions[0]
         _, following = move(agent.plant, agent.space, state, action)
-        if values[following] <= values[state]:
+        if has_failed(values, state, following):
             agent.failures.add(state, action, target.position, agent.penalty)
         state = following
         path.append(state)

@@ -15,6 +15,7 @@ from experiments.reaching.arm import GOOD, MARKER, PART, arm_belief, arm_plant, 
 from mobee import MotorParameters, OfflinePlant
 from mobee.learning.explorers import choose
 from mobee.learning.reaching.acting import move
+from mobee.learning.reaching.failures import has_failed
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import RADIUS, reward_of
 from mobee.robot.robot import Array
@@ -115,7 +116,7 @@ class _Course:
             if action == space.goals.shape[1]:
                 return
             _, following = move(self._plant, space, self._state, action)
-            failed = values[following] <= values[self._state]
+            failed = has_failed(values, self._state, following)
             self._failures.add(self._state, action, target, self._agent.penalty if failed else 0.0)
             self._state = following
 

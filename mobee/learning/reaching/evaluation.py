@@ -10,6 +10,7 @@ import numpy as np
 
 from mobee.learning.explorers import choose
 from mobee.learning.reaching.acting import move, reach
+from mobee.learning.reaching.failures import has_failed
 from mobee.reach import ReachTarget, reward_of
 from mobee.robot.robot import Array, Ints
 
@@ -103,7 +104,7 @@ class _Trial:
                 return
             outcome, following = move(agent.plant, agent.space, self.state, action)
             found.duration[at] += outcome.duration
-            failed = bool(values[following] <= values[self.state])
+            failed = has_failed(values, self.state, following)
             self.failures.add(self.state, action, position, agent.penalty if failed else 0.0)
             self.state = following
             if failed:

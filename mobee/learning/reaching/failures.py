@@ -46,6 +46,11 @@ class Failures:
         return other
 
 
+def has_failed(values: Array, state: int, following: int) -> bool:
+    """Whether a transition did not climb the values (S,) of the plan that it was part of (thesis 8.1)."""
+    return bool(values[following] <= values[state])
+
+
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
     """What remembers failures in that way: "spread", "local", see `Failures`, or "alike", see `AlikeFailures`.
 

@@ -9,7 +9,7 @@ import numpy as np
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.draws import Draws
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.failures import failures_of
+from mobee.learning.reaching.failures import failures_of, has_failed
 from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.problems import Problems
@@ -102,9 +102,8 @@ class ReachLearner:
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
-        """Whether a transition did not climb the values of the plan (thesis 8.1)."""
-        values = self._planned()[0]
-        return bool(values[following] <= values[state])
+        """Whether a transition did not climb the values of the plan under way."""
+        return has_failed(self._planned()[0], state, following)
 
     def expected(self, state: int) -> float:
         """The reward expected of reaching from a state, for the target of the problem-try."""

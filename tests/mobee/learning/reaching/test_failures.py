@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from mobee.errors import UnknownName
-from mobee.learning.reaching.failures import FAILURES, Failures, failures_of
+from mobee.learning.reaching.failures import FAILURES, Failures, failures_of, has_failed
 from mobee.learning.reaching.predictors import Reaches
 from tests.mobee.learning.reaching.toy import HANDS, SPACE
 
 HERE, THERE = np.zeros(3), np.array([0.2, 0.0, 0.0])
+
+
+def test_a_transition_fails_that_does_not_climb_the_values():
+    values = np.array([0.5, 0.6, 0.5])
+    assert [has_failed(values, 0, following) for following in range(3)] == [True, False, True]
 
 
 def test_nothing_is_expected_to_fail_at_first():
