@@ -30,7 +30,7 @@ from experiments.either_alone.cases import SCENES, make_cases
 from experiments.either_alone.figure import draw
 from experiments.either_alone.findings import CLAIMS, LAWS, claims, summary
 from experiments.either_alone.trial import WAYS, attempt, trained
-from experiments.reaching.arm import LEARNED
+from experiments.reaching.scene import LEARNED
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 
 NAME = "either-alone"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.reaching.arm import arm_belief, reachable, touchable
+from experiments.reaching.arm import arm_belief, touchable, touchable_targets
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import approach
 from mobee import World, sphere
@@ -62,9 +62,9 @@ class Case:
 
 
 def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
-    """That many cases of one of the SCENES, with the targets of `reachable`; nothing solid touches where they begin."""
+    """That many cases of one of the SCENES, with the targets of `touchable_targets`; nothing solid touches where they begin."""
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
-    targets, belief = reachable(law, free), arm_belief(law=law)
+    targets, belief = touchable_targets(law, free), arm_belief(law=law)
     found: list[Case] = []
     for _ in range(DRAWS):
         case = _case(scene, targets[rng.integers(len(targets))], belief, rng)

@@ -11,7 +11,7 @@ import numpy as np
 from experiments.claims import Claim
 from experiments.either_alone.cases import SCENES
 from experiments.either_alone.trial import WAYS
-from experiments.reaching.arm import GOOD
+from experiments.reaching.targets import GOOD
 from experiments.statistics import interval, told
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array

@@ -11,7 +11,8 @@ import numpy as np
 
 from experiments.control.ride import place
 from experiments.either_alone.cases import Case
-from experiments.reaching.arm import GOOD, MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, reachable
+from experiments.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, touchable_targets
+from experiments.reaching.targets import GOOD
 from mobee import MotorParameters, OfflinePlant
 from mobee.learning.explorers import choose
 from mobee.learning.reaching.acting import move
@@ -41,10 +42,10 @@ class Attempt:
 
 
 def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
-    """A reach learner that has tried the targets of `reachable`, in an empty world."""
+    """A reach learner that has tried the targets of `touchable_targets`, in an empty world."""
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
-    agent.learn(reachable(law, free), tries)
+    agent.learn(touchable_targets(law, free), tries)
     return agent
 
 

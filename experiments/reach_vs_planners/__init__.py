@@ -32,9 +32,11 @@ from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.reach_vs_planners.figure import draw
 from experiments.reach_vs_planners.findings import CLAIMS, SCENES, claims, summary
 from experiments.reach_vs_planners.two_arms import query
-from experiments.reaching.arm import GOOD, LEARNED, PART, arm_belief
+from experiments.reaching.arm import arm_belief
 from experiments.reaching.judged_plant import JudgedPlant
 from experiments.reaching.planner_peer import PlannerPeer
+from experiments.reaching.scene import LEARNED, PART
+from experiments.reaching.targets import GOOD
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import MotorParameters
 from mobee.reach import reward_of

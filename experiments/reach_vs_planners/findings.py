@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims import Claim
-from experiments.reaching.arm import GOOD
+from experiments.reaching.targets import GOOD
 from experiments.statistics import decides, interquartile_mean, interval, told
 from experiments.sweep import CellResult
 from mobee.robot.robot import Array

@@ -17,16 +17,14 @@ from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.learning.published import robot as published_robot
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import goals
-from experiments.reaching.scene import MARKER, PART, laws
+from experiments.reaching.scene import LEARNED, MARKER, PART, laws
 from experiments.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import ReachPlant, ReachTarget
 from mobee.robot.robot import Array, Robot
 
-GOOD = 0.02  # m from the surface
 TARGETS = 27
-LEARNED = 3000  # curious transitions before the first target (thesis 7.2.2: 2987)
 PREDICTOR, STRATEGY = "gp", "ucb"
 
 
@@ -44,7 +42,7 @@ def space(law: str = "default") -> Lattice:
 
 @cache
 def hands(law: str = "default") -> Array:
-    """Where the palm is in each state, (S, 3) m, root frame."""
+    """Where the palm is in each state, (S, 3) m, root frame: the wrist is rigid at home, and not at rest as in the space's targets."""
     robot = body(law)
     poses = np.tile(robot.home, (len(space(law)), 1))
     poses[:, [robot.motor_index(name) for name in RIGHT]] = space(law).samples
@@ -72,7 +70,7 @@ def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = LEARN
 
 
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
-    """The learner: the shipped predictor, failures remembered locally, the model learned on (thesis 9.4.1)."""
+    """The learner: the shipped predictor, the model learned on (thesis 9.4.1); failures count where they were, as for the planner peer."""
     return ReachAgent(
         space(law),
         plant,
@@ -87,7 +85,7 @@ def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str =
 
 
 @cache
-def reachable(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
+def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
     """TARGETS that the palm can touch in an empty world: those of the thesis' 27, and others drawn between them.
 
     So that no solid but the hand's is in the target, cables hold, and, if `free`, no joint limit pushes.

@@ -1,4 +1,7 @@
-"""The nearest that a marker can come to a place, by least squares from many poses: no planner, no law, kinematics alone."""
+"""The nearest that a marker can come to a place, by least squares from many poses: no planner, no law, kinematics alone.
+
+Other than `mobee.reachable`, which is for a glance, it keeps the clauses and moves the named motors alone.
+"""
 
 from __future__ import annotations
 

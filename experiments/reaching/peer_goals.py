@@ -1,4 +1,7 @@
-"""Poses that reach a target: damped least squares with restarts, all of them at once (Wampler 1986)."""
+"""Poses that reach a target: damped least squares with restarts, all of them at once (Wampler 1986).
+
+Many poses, of an arm that is believed to stand elsewhere than its encoders say: `mobee.reachable` and inverse.py find the nearest alone.
+"""
 
 from __future__ import annotations
 

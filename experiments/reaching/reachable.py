@@ -10,13 +10,12 @@ import sys
 from experiments.learning.published import RIGHT, robot
 from experiments.reaching.inverse import nearest_pose
 from experiments.reaching.scene import MARKER, PART
-from experiments.reaching.targets import between, grid
+from experiments.reaching.targets import GOOD, between, grid
 from mobee import Model
 from mobee.reach import RADIUS
 from mobee.robot.robot import Array
 
 AT_CENTRE = 2e-3  # m: the palm is at the centre
-NEAR_SURFACE = 0.02  # m, from the surface as reached counts in `mobee reach`
 
 
 def joints_of(count: int) -> tuple[str, ...]:
@@ -30,9 +29,9 @@ def distances(places: Array, joints: tuple[str, ...]) -> list[float]:
     return [nearest_pose(model, MARKER, place, joints, good=AT_CENTRE / 10.0).distance for place in places]
 
 
-def reachable(found: list[float]) -> tuple[int, int]:
+def counts(found: list[float]) -> tuple[int, int]:
     """At how many the palm can be at the centre, and within 2 cm of the surface."""
-    return sum(d <= AT_CENTRE for d in found), sum(d <= RADIUS + NEAR_SURFACE for d in found)
+    return sum(d <= AT_CENTRE for d in found), sum(d <= RADIUS + GOOD for d in found)
 
 
 def table() -> str:
@@ -43,7 +42,7 @@ def table() -> str:
         for name, places in (("the 27 of the grid", grid()), ("the 8 between", between())):
             found = distances(places, joints_of(count))
             each[count, name] = found
-            lines.append(f"| {count} | {name} | {reachable(found)[0]} | {reachable(found)[1]} |")
+            lines.append(f"| {count} | {name} | {counts(found)[0]} | {counts(found)[1]} |")
     lines += ["", "| target | x | y | z | nearest with 4 joints [cm] | with 7 |", "| --- | --- | --- | --- | --- | --- |"]
     name = "the 27 of the grid"
     for number, (place, four, seven) in enumerate(zip(grid(), each[4, name], each[7, name], strict=True)):

@@ -15,6 +15,7 @@ import numpy as np
 from mobee.reach import Aim, ReachTarget
 from mobee.robot.robot import Array
 
+GOOD = 0.02  # m from the surface, within which a target counts as reached, as in `mobee reach`
 X, Y, Z = (-0.3, -0.2, -0.1), (0.0, 0.2, 0.4), (0.0, 0.2, 0.4)  # m
 
 

@@ -8,8 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from experiments.reaching.arm import GOOD, PART, learned_transitions, reach_agent, space
+from experiments.reaching.arm import PART, learned_transitions, reach_agent, space
 from experiments.reaching.planner_peer import ENDS, Memory, PeerTry, PlannerPeer
+from experiments.reaching.targets import GOOD
 from experiments.unmodelled.scene import Scene
 from mobee.learning.reaching.problems import Problems
 from mobee.reach import ReachTarget

@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from experiments.learning.published import RIGHT
-from experiments.reaching.arm import arm_belief, arm_plant, body, reachable, space, straight_ways, touchable
+from experiments.reaching.arm import arm_belief, arm_plant, body, space, straight_ways, touchable, touchable_targets
 from experiments.reaching.judged_plant import Errors, JudgedPlant
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.targets import grid
@@ -59,7 +59,7 @@ class Scene:
 def make_scene(seed: int, wrong: str) -> Scene:
     """A ball in the way of many motions, and errors of the sizes above; the same for all who are `wrong`.
 
-    Targets of `reachable` that cannot be touched beside the ball are left out.
+    Targets of `touchable_targets` that cannot be touched beside the ball are left out.
     """
     return replace(_drawn(seed), wrong=wrong)
 
@@ -70,7 +70,7 @@ def _drawn(seed: int) -> Scene:
     ball = _ball(rng, grid())
     shift = rng.normal(size=3)
     knowing = arm_belief(_world(ball))
-    targets = [target for target in reachable() if touchable(knowing, target)]
+    targets = [target for target in touchable_targets() if touchable(knowing, target)]
     return Scene(targets, ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), WRONG[0])
 
 

@@ -8,7 +8,8 @@ import pytest
 from experiments.reaching.arm import MARKER, PART, arm_belief, arm_plant, body
 from experiments.reaching.judged_plant import Errors, JudgedPlant
 from experiments.reaching.peer_goals import approach, goals
-from experiments.reaching.planner_peer import GOOD, PlannerPeer
+from experiments.reaching.planner_peer import PlannerPeer
+from experiments.reaching.targets import GOOD
 from mobee import Model, World, sphere
 from mobee.reach import ReachTarget
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.learning.published import RIGHT, robot
 from experiments.reaching.inverse import nearest_pose
-from experiments.reaching.reachable import AT_CENTRE, distances, joints_of, reachable
+from experiments.reaching.reachable import AT_CENTRE, counts, distances, joints_of
 from experiments.reaching.scene import MARKER, PART
 from experiments.reaching.targets import between, grid, targets_at
 from mobee import Model
@@ -26,7 +26,7 @@ def test_the_grid_is_three_places_a_direction_and_its_cells_lie_between():
 def test_what_the_page_says_is_reachable_is():
     page = PAGE.read_text()
     for count in (4, 7):
-        centre, surface = reachable(distances(between(), joints_of(count)))
+        centre, surface = counts(distances(between(), joints_of(count)))
         assert f"| {count} | the 8 between | {centre} | {surface} |" in page
 
 
