@@ -31,7 +31,7 @@ REACHES = {"published": 1, "default": 3}  # a case; the thesis reached once
 class Attempt:
     """How it ended.
 
-    `missing`: m from the target's surface to the palm.  `seconds`: of plant time.  `thinking`: s of this machine's time in which plans
+    `missing`: m from the target's surface to the palm.  `seconds`: of plant time.  `thinking`: s of processor time in which plans
     were made.  `reward`: thesis eq. 8.4, of what the law aims at.
     """
 
@@ -101,19 +101,19 @@ class _Course:
         self._state = -1
         self._spent: list[int] = []
         self.thinking = 0.0
-        """s of this machine's time spent on plans."""
+        """s of processor time spent on plans."""
 
     def go(self) -> None:
         """Follow the plan to where ending it is worth most, or until the actions are used up."""
         space = self._agent.space
         self._state = space.state_of(self._plant.measure(PART)[space.columns])
         for _ in range(LIMIT - 1):
-            target, asked = self._case.target_at(self._plant.time - self._begun), time.perf_counter()
+            target, asked = self._case.target_at(self._plant.time - self._begun), time.process_time()
             worth = np.maximum(self._worth(target), 0.0)
             worth[self._spent] = 0.0
             values, action_values = self._agent.planning.values(worth, self._failures.rewards(target))
             action = choose(action_values[self._state], self._rng)
-            self.thinking += time.perf_counter() - asked
+            self.thinking += time.process_time() - asked
             if action == space.goals.shape[1]:
                 return
             _, following = move(self._plant, space, self._state, action)

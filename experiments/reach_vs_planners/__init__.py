@@ -8,7 +8,8 @@ The right arm of today's robot under the default law; targets (where no joint li
 learner has 3000 curious transitions and 800 tries behind it and learns nothing here; the peer (experiments/reaching/planner_peer.py)
 knows the robot, its cables and the target's place, plans anew on every change, and is executed through MoBeE.  "noise": encoder noise of
 0.5 degrees, five times the usual; "moving": the target goes to and fro by 5 to 12 cm at 3 cm/s and never rests.  Success: the palm within
-2 cm of the surface; the learner may reach three times, the peer has 20 actions.  Plant time stands still while anybody plans.
+2 cm of the surface; the learner may reach three times, the peer has 20 actions.  Plant time stands still while anybody plans; that is
+told in processor time.
 A target that never rests is hard on this peer: after every motion it is elsewhere, so that all but straight ways are planned anew at each
 corner, and the last motion, of a second or more, aims where the target was when it began.  The learner's reach follows the target.  What
 is compared there is following with aiming, not with a planner that predicts.

@@ -72,7 +72,7 @@ def claims(done: Mapping[str, CellResult]) -> list[Claim]:
         if not len(took):
             found.append(claim.measured("no way was found", None))
             continue
-        text = f"{told(took, 3)} s with a compiled test of poses; a way is found in {told(share)} of the queries"
+        text = f"{told(took, 3)} s of processor time with a compiled test of poses; a way is found in {told(share)} of the queries"
         found.append(claim.measured(text, decides(interval(took), least=SLOW * published)))
     return found
 

@@ -32,7 +32,7 @@ NEAR = 0.02  # m
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """How it went: whether a way was found, s to find it, s to shorten it, corners; and what the palms missed in the end, m."""
+    """Whether a way was found, s of processor time to find and to shorten it, corners; and what the palms missed in the end, m."""
 
     found: bool
     seconds: float
@@ -48,14 +48,14 @@ def query(seed: int) -> Query:
     both = _belief(model, tuple(SIDES))
     starts = _sound(both, [_beside(part, rng) for part in SIDES], rng)
     ends = _sound(both, [_at_cup(part, rng) for part in SIDES], rng)[:ENDS]
-    begun = time.perf_counter()
+    begun = time.process_time()
     path = rrt_connect(both, starts[0], ends, seed, extensions=EXTENSIONS)
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     if path is None:
         return Query(False, seconds, 0.0, 0, np.inf)
-    begun = time.perf_counter()
+    begun = time.process_time()
     path = shortened(both, path, rng)
-    smoothing = time.perf_counter() - begun
+    smoothing = time.process_time() - begun
     return Query(True, seconds, smoothing, len(path), _followed(both, path, seed))
 
 

@@ -37,7 +37,7 @@ class PeerTry:
     `missing`: m, truly.  `ended`: held to be "there", with "no plan" left, or when the actions were "used up": motions were blocked, or
     the target moved.
     `actions`, `plans`: how many.
-    `seconds`: of plant time.  `planning`: s of this machine's time.  `looks`: poses looked at.
+    `seconds`: of plant time.  `planning`: s of processor time.  `looks`: poses looked at.
     """
 
     missing: float
@@ -138,9 +138,9 @@ class PlannerPeer:
         return True
 
     def _plan(self, target: ReachTarget) -> tuple[Array, Array] | None:
-        begun = time.perf_counter()
+        begun = time.process_time()
         found = self._ways.way(target, self._here, self._known)
-        self._plans, self._planning = self._plans + 1, self._planning + time.perf_counter() - begun
+        self._plans, self._planning = self._plans + 1, self._planning + time.process_time() - begun
         return found
 
     def _go(self, q: Array) -> Array:

@@ -86,7 +86,7 @@ class Planner:
         self.peer = PlannerPeer(self._plant, scene.belief(), PART, memory, seed)
         self._problems = Problems()
         self.planning: list[float] = []
-        """Of all tries so far, s of this machine's time."""
+        """Of all tries so far, s of processor time."""
 
     def learn(self, tries: int) -> None:
         """See Contestant."""
