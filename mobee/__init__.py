@@ -16,6 +16,8 @@ from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
+from mobee.roadmap.nes import NES
+from mobee.roadmap.search import Restart, minimize
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
@@ -35,6 +37,7 @@ __all__ = [
     "MobeeError",
     "Model",
     "MotorParameters",
+    "NES",
     "OfflinePlant",
     "Outcome",
     "Plan",
@@ -47,6 +50,7 @@ __all__ = [
     "ReachPlant",
     "ReachTarget",
     "Reacher",
+    "Restart",
     "Robot",
     "RobotFileError",
     "Space",
@@ -62,6 +66,7 @@ __all__ = [
     "join_robots",
     "load_robot",
     "load_world",
+    "minimize",
     "policy_iteration",
     "reach_path",
     "run",

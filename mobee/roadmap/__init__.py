@@ -1,0 +1,1 @@
+"""Whole-body motions from cost functions: evolution strategies, and inverse kinematics by them (thesis chapter 3)."""
