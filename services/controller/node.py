@@ -30,6 +30,7 @@ from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 from services.controller.reaches import Reaches
 from services.controller.telling import Telling
+from services.controller.warm import warm
 
 BAD_INPUT = 2  # exit code: the same again would not help
 OLDEST = 3  # ticks: with forces older than that the robot holds
@@ -57,6 +58,7 @@ class ControllerNode:
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
+        warm(self._law, robot)
         self._reaches = Reaches(service.bus, robot, self._law, self._actions, lambda: self._q)
         self._goals = GoalDesk(service, robot, self._law, self._actions, self._reaches, self._stay, self._amend)
         service.on_run(self._new_run)

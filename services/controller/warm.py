@@ -1,0 +1,34 @@
+"""What the first reach would have to wait for is done before the robot moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus_schema import VERSION, decode, encode, encoding_of
+from bus_schema.rpc import ReachFor
+from mobee import Controller
+from mobee.collision.touch import links_moved
+from mobee.control import Forces
+from mobee.reach import ReachTarget
+from mobee.robot.robot import Robot
+
+TICK = 0.01  # s
+
+
+def warm(law: Controller, robot: Robot) -> None:
+    """Begin, step and end a reach of each part with each marker, and read a request for one; then the law is at rest at home."""
+    asked = ReachFor(
+        v=VERSION, id="0", who="warm", epoch=0, action_id="0", marker="none", object="none", position=[0.0] * 3, radius=1.0, aim="centre"
+    )
+    decode(ReachFor, encode(asked), encoding_of(ReachFor))
+    nothing = np.zeros(len(robot.motors))
+    moved = links_moved(robot)
+    here = law.model.evaluate(robot.home)
+    for part in robot.parts:
+        for name, marker in robot.markers.items():
+            if marker.link in moved[part]:
+                law.reach_toward(part, name, ReachTarget(here.position(name)))
+                law.step(robot.home, min(TICK, 0.5 * law.max_dt), Forces(nothing, nothing, nothing))
+                law.still_nears(part)
+                law.end_reach(part)
+    law.reset(robot.home)

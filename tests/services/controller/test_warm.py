@@ -1,0 +1,20 @@
+"""What is warmed leaves no trace in the law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee import Controller, Gains, Model
+from services.controller.warm import warm
+from tests.services.controller.stage import ROBOT
+
+
+@pytest.mark.parametrize("gains", ["default", "published_2014"])
+def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
+    warmed, new = (Controller(Model(ROBOT), Gains.named(gains), "velocity") for _ in range(2))
+    warm(warmed, ROBOT)
+    q = ROBOT.home + 0.01
+    for _ in range(3):
+        assert np.array_equal(warmed.step(q, 0.01).velocity, new.step(q, 0.01).velocity)
+    assert not len(warmed.reaches[0])
