@@ -1,0 +1,137 @@
+"""Live reach: the learned reacher on the live PyBullet robot, in lockstep, beside the planner.
+
+Claim: trained offline and refined live, it brings the palm to within 2 cm of the surface of at least 95 % of the thesis' 27 targets that
+can be reached, and of 90 % of fresh random ones, from random poses, without a solid contact deeper than 2 mm.
+Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: half an hour a start on 2 cores.
+
+The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet, with gravity.  A start: a
+learner (gp, ucb, alike) of 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified motors, then
+81 live tries in the same record; then, without learning, each of the 27 and 50 fresh targets from a pose of its own, up to three
+reaches a try.  The planner peer (inverse kinematics and RRT-Connect, planned anew on every change) has the same targets, poses and
+robot, and the true model; the target repels nothing while it moves, for it plans around it.
+A target can be reached if inverse kinematics finds a pose that holds limits and cables, with the palm within 2 cm of the surface, and in
+which no solid touches anything but the hand the target (experiments/reaching/README.md has which grid it is).  Fresh targets are such.
+Judged by the simulator's joints, not by encoders: where the palm was when the force ended, or the planner held that it was there.
+First motion is measured with ticks of 2 ms: from the tick of the request to the first in which another command is in force.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.live_reach.figure import draw
+from experiments.live_reach.findings import CLAIMS, claims, misses, table
+from experiments.live_reach.job import Job
+from experiments.live_reach.live import perform
+from experiments.live_reach.measured import BLOCK, POSITIONS, Block, measure, read_block, write_block
+from experiments.live_reach.problems import fresh_problems, grid_problems, grid_targets, touchable
+from experiments.live_reach.settings import RATE, belief
+from experiments.live_reach.training import TRANSITIONS, train
+from experiments.options import positive_whole
+from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
+from experiments.progress import Progress
+from mobee.errors import InvalidValue
+from mobee.store import STORE
+from services.launcher.engine import EngineMissing, compile_engine
+
+NAME = "live-reach"
+CLAIM = "the learned reacher puts the palm on what can be reached, live, and touches nothing else"
+SOURCE = "aim of this reproduction; thesis 8, 9.3"
+__all__ = ["CLAIM", "CLAIMS", "NAME", "SOURCE", "add_arguments", "figure", "run"]
+
+TRIES, LIVE, FRESH_TARGETS = 800, 81, 50
+PIECE = 27  # tries of a launch
+FAST, FIRST = 500.0, 10  # Hz; reaches that are looked at for their first motion
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is done of a start."""
+
+    transitions: int = TRANSITIONS
+    tries: int = TRIES
+    live: int = LIVE
+    grid: int = 27
+    fresh: int = FRESH_TARGETS
+    first: int = FIRST
+
+
+QUICK = Sizes(500, 30, 2, 2, 2, 2)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the experiment."""
+    parser.add_argument(
+        "--starts", type=positive_whole, default=3, metavar="N", help="learners, with poses and fresh targets of their own (default: 3)"
+    )
+    parser.add_argument("--quick", action="store_true", help="a short version that shows whether it works")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Train, refine and evaluate; what is there already is not done again.  Raises OmplMissing before anything is begun."""
+    require_ompl()
+    try:
+        compile_engine()
+    except EngineMissing as error:
+        raise InvalidValue(str(error)) from None
+    sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts
+    with Progress() as progress:
+        for number in range(starts):
+            seed, place = arguments.seed + number, folder / f"start-{number}"
+            place.mkdir(exist_ok=True)
+            progress.show(number / starts, f"start {number + 1} of {starts}: learns offline")
+            train(place / STORE, seed, sizes.transitions, sizes.tries)
+            jobs = list(_jobs(place, seed, sizes))
+            for done, (name, job, rate) in enumerate(jobs):
+                progress.show((number + done / len(jobs)) / starts, f"start {number + 1} of {starts}: {name}")
+                _do(place / name, job, seed, rate)
+    blocks, known = _blocks(folder), _touchable()
+    return {
+        "claims": [claim.record() for claim in claims(blocks, known)],
+        "tries": table(blocks, known),
+        "missed": misses(blocks, known),
+        "reachable": sorted(known),
+        "repeatable": all(block.repeatable for block in blocks),
+    }
+
+
+def figure(folder: Path) -> Path:
+    """Distances and times."""
+    return draw(_blocks(folder), _touchable(), folder / "live-reach.png")
+
+
+def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, float]]:
+    """The blocks of a start in their order: name, what is done, ticks a second."""
+    store = str((place / STORE).resolve())
+    grid, fresh = grid_problems(seed)[: sizes.grid], fresh_problems(seed, sizes.fresh)
+    for made in range(0, sizes.live, PIECE):
+        yield f"refine-{made:03}", Job("refine", seed, store, tries=sizes.tries + min(made + PIECE, sizes.live)), RATE
+    pieces = [grid, *(fresh[i : i + PIECE] for i in range(0, len(fresh), PIECE))]
+    for who in ("learner", "peer"):
+        for number, piece in enumerate(pieces):
+            yield f"{who}-{number}", Job(who, seed, store, piece), RATE
+    yield "first", Job("first motion", seed, store, fresh[: sizes.first]), FAST
+
+
+def _do(folder: Path, job: Job, seed: int, rate: float) -> None:
+    if not (folder / BLOCK).exists():
+        repeatable = perform(folder, job, seed, rate)
+        write_block(folder, measure(folder, job, rate, repeatable))
+        (folder / POSITIONS).unlink()
+
+
+def _blocks(folder: Path) -> list[Block]:
+    blocks = [read_block(path.parent) for path in sorted(folder.glob(f"start-*/*/{BLOCK}"))]
+    if not blocks:
+        raise InvalidValue(f"{folder} has no finished block: it was stopped before the first was over.")
+    return blocks
+
+
+def _touchable() -> frozenset[int]:
+    """Those of the 27 that can be reached."""
+    known = belief()
+    return frozenset(number for number, target in enumerate(grid_targets()) if touchable(known, target))
