@@ -23,11 +23,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.babbling.measured import POSITIONS
 from experiments.live_reach.figure import draw
 from experiments.live_reach.findings import CLAIMS, claims, misses, table
 from experiments.live_reach.job import Job
 from experiments.live_reach.live import perform
-from experiments.live_reach.measured import BLOCK, POSITIONS, Block, measure, read_block, write_block
+from experiments.live_reach.measured import BLOCK, Block, measure, read_block, write_block
 from experiments.live_reach.problems import fresh_problems, grid_problems, grid_targets, touchable
 from experiments.live_reach.settings import RATE, belief
 from experiments.live_reach.training import TRANSITIONS, train

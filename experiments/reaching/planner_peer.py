@@ -10,17 +10,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
-from experiments.reaching.judged_plant import JudgedPlant
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_memory import Knowledge, PeerMemory, place_of
 from experiments.reaching.peer_plans import PeerPlans
 from experiments.reaching.targets import GOOD
+from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachTarget
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Robot
 
 OFF = 0.05  # of a motor's range, from where a motion was to end: more was blocked
 LIMIT = 20  # actions a try
@@ -49,6 +49,36 @@ class PeerTry:
     looks: int
 
 
+class PeerPlant(Protocol):
+    """What the peer drives; the target repels no hand of it."""
+
+    @property
+    def robot(self) -> Robot:
+        """Of the plant."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """Plant time in s."""
+        ...
+
+    def measure(self, part: str) -> Array:
+        """See Plant."""
+        ...
+
+    def go(self, part: str, target: Array, marker: str) -> Outcome:
+        """As `Plant.act`, but the marker's hand does not feel the target."""
+        ...
+
+    def present(self, target: ReachTarget | None) -> None:
+        """See ReachPlant."""
+        ...
+
+    def missing(self, marker: str) -> float:
+        """How far the marker is from where it is to be, now; m."""
+        ...
+
+
 class PlannerPeer:
     """Brings a marker to targets, one try after the other, from wherever the robot is.
 
@@ -62,9 +92,7 @@ class PlannerPeer:
         limit: actions a try.
     """
 
-    def __init__(
-        self, plant: JudgedPlant, belief: PeerBelief, part: str, memory: Memory = "none", seed: int = 0, limit: int = LIMIT
-    ) -> None:
+    def __init__(self, plant: PeerPlant, belief: PeerBelief, part: str, memory: Memory = "none", seed: int = 0, limit: int = LIMIT) -> None:
         self._plant, self._belief, self._part, self._memory, self._limit = plant, belief, part, memory, limit
         self._columns = belief.columns - plant.robot.part(part).start
         self._rest = plant.measure(part)

@@ -16,7 +16,7 @@ from services.common.service import Service
 THING, OBSTACLE = "thing", "obstacle"  # the target that moves; the world file's obstacle
 EVERY = 5  # ticks, after which it is moved on
 AWAY = np.array([0.6, 0.9, 0.6])  # m, where an obstacle is in nobody's way
-UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+UPRIGHT, SPHERE = [1.0, 0.0, 0.0, 0.0], Geometry(kind="sphere", size=[RADIUS])
 
 
 class Mover:
@@ -35,9 +35,7 @@ class Mover:
         """Move a thing between two places from now on, beginning at the first."""
         self._ends, self._begin = np.array(ends), self._k
         if name == THING:
-            self._call(
-                "add", AddObject, geometry=Geometry("sphere", [RADIUS]), position=ends[0], quaternion=UPRIGHT, role="target", of=name
-            )
+            self._call("add", AddObject, of=name, geometry=SPHERE, position=ends[0], quaternion=UPRIGHT, role="target")
         self._name = name
         self._put(self.at(self._k))
 
