@@ -25,6 +25,7 @@ EXPERIMENTS = {
     "identify": "experiments.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
+    "live-reach": "experiments.live_reach",
     "live-table": "experiments.live_table",
     "planner": "experiments.planner",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
