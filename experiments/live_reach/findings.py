@@ -10,9 +10,9 @@ from scipy.stats import binomtest
 
 from experiments.claims import Claim
 from experiments.live_reach.measured import Block, Judged
-from experiments.live_reach.problems import FRESH, GRID
+from experiments.live_reach.problems import FRESH, GRID, OBSTACLE_MOVES, TARGET_MOVES
 
-WHO = ("learner", "peer")
+WHO, MOVING = ("learner", "peer"), "moving"
 TOLD = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
 LEAST = {GRID: 0.95, FRESH: 0.9}
 SOON = 5e-3  # s
@@ -92,12 +92,13 @@ def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, 
         f"the {27 - len(touchable)} others": (GRID, frozenset(range(27)) - touchable),
         "fresh": (FRESH, None),
     }
+    sets |= {TARGET_MOVES: (TARGET_MOVES, None), OBSTACLE_MOVES: (OBSTACLE_MOVES, None)}
     rows = []
-    for who in WHO:
+    for who in (*WHO, MOVING):
         for name, (kind, numbers) in sets.items():
             tries = tries_of(blocks, who, kind, numbers)
             if tries:
-                rows.append({"who": TOLD[who], "targets": name, "success": share(tries), **_spent(tries)})
+                rows.append({"who": TOLD.get(who, TOLD["learner"]), "targets": name, "success": share(tries), **_spent(tries)})
     return rows
 
 

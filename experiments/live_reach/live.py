@@ -8,6 +8,7 @@ from experiments.launched import summary_of
 from experiments.live_reach.job import Job, write_job
 from experiments.live_reach.settings import GAINS, RATE, ROBOT, WORLD
 
+WITH_OBSTACLE = Path(__file__).with_name("obstacle.xml")
 LONGEST = 120.0  # s of robot time for a try, on average over a block
 PATIENCE = 60.0  # s for a tick: a plan is made in one
 
@@ -35,12 +36,13 @@ run_dir = "{folder}"
 """
 
 
-def perform(folder: Path, job: Job, seed: int, rate: float = RATE, world: Path = WORLD) -> bool:
+def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
     """Launch a system with one job, leave its record of every tick in the folder; whether the run can be repeated.
 
     `seed`: of the simulated robot.  Raises LaunchFailed.
     """
     write_job(folder, job)
+    world = WITH_OBSTACLE if job.kind == "moving" else WORLD
     text = _SCENARIO.format(
         kind=job.kind, robot=ROBOT, world=world, gains=GAINS, seed=seed, patience=PATIENCE, rate=rate, folder=folder.resolve()
     )

@@ -50,7 +50,8 @@ def touchable(known: PeerBelief, target: ReachTarget) -> bool:
     Limits and cables hold in it, and no solid touches anything but the hand the target.
     """
     known.present(target)
-    starts = np.random.default_rng(27).uniform(*known.range.T, (POSES, len(known.columns)))
+    low, high = known.range.T
+    starts = np.random.default_rng(27).uniform(low, high, (POSES, len(known.columns)))
     poses, missing = approach(known, starts, target.position, target.radius + GOOD - CLOSE, known.range)
     poses = poses[missing <= CLOSE]
     return len(poses) > 0 and bool(known.sound(poses, "grasping").any())
@@ -111,10 +112,11 @@ def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> li
 
 def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: np.random.Generator) -> Problem:
     """From a pose in which nothing is felt; not even the target, unless it lies in the body."""
+    low, high = known.limits.T
     for there in (target, AWAY):
         known.present(there)
         for _ in range(DRAWS):
-            q = rng.uniform(*known.limits.T)
+            q: Array = rng.uniform(low, high)
             if known.sound(q[None], "fields")[0] and known.sound(q[None])[0]:
                 return Problem(kind, number, target.position.tolist(), posture(known, q).tolist())
     raise InvalidValue(f"no pose to begin in was found in {DRAWS} draws: take another seed.")

@@ -35,7 +35,9 @@ class Mover:
         """Move a thing between two places from now on, beginning at the first."""
         self._ends, self._begin = np.array(ends), self._k
         if name == THING:
-            self._call("add", AddObject, of=name, geometry=SPHERE, position=ends[0], quaternion=UPRIGHT, role="target")
+            self._service.call(
+                keys.world_rpc("add"), AddObject, Done, name=name, geometry=SPHERE, position=ends[0], quaternion=UPRIGHT, role="target"
+            )
         self._name = name
         self._put(self.at(self._k))
 
@@ -43,7 +45,7 @@ class Mover:
         """Take it away."""
         name, self._name = self._name, ""
         if name == THING:
-            self._call("remove", OneName, of=name)
+            self._service.call(keys.world_rpc("remove"), OneName, Done, name=name)
         elif name:
             self._place(name, AWAY)
 
@@ -71,13 +73,13 @@ class Mover:
 
     def _put(self, position: Array) -> None:
         if self._name == THING:
-            self._call("move", MoveObject, position=position.tolist(), of=THING)
+            self._move(THING, position)
         else:
             self._place(self._name, position)
 
     def _place(self, name: str, position: Array) -> None:
-        self._call("move", MoveObject, position=position.tolist(), of=name)
+        self._move(name, position)
         self._service.call(keys.sim("place"), Place, Done, name=name, position=position.tolist(), tries=3)
 
-    def _call(self, verb: str, request: type[AddObject] | type[MoveObject] | type[OneName], of: str, **fields: object) -> None:
-        self._service.call(keys.world_rpc(verb), request, Done, tries=3, name=of, **fields)
+    def _move(self, name: str, position: Array) -> None:
+        self._service.call(keys.world_rpc("move"), MoveObject, Done, name=name, position=position.tolist())

@@ -14,7 +14,7 @@ from experiments.live_reach.performer.contestants import Ended, contestant
 from experiments.live_reach.performer.hand import Hand
 from experiments.live_reach.performer.mover import Mover
 from experiments.live_reach.problems import Problem, grid_targets
-from experiments.live_reach.settings import PART
+from experiments.live_reach.settings import PART, WRIST
 from experiments.live_reach.training import learner
 from mobee import ActionInterrupted
 from mobee.robot.robot import Robot
@@ -46,7 +46,7 @@ def _tried(hand: Hand, problem: Problem, attempt: Callable[[Problem], Ended]) ->
     try:
         hand.present(None)
         hand.act(PART, hand.robot.home[hand.robot.part(PART).slice])
-        off = float(np.abs(hand.act(PART, start).q - start).max())
+        off = float(np.abs(hand.act(PART, start).q - start)[:WRIST].max())
         begin = hand.tick
         made = attempt(problem)
     except ActionInterrupted as error:
