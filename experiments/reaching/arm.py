@@ -1,7 +1,7 @@
 """The right arm, today's under the default law or that of 2014 under the published one: states, plant, and what a planner knows of it.
 
 The four joints of the published lattice move, the wrist and the fingers are rigid at home.  A try succeeds if the palm comes within 2 cm
-of the surface of a target of 10 cm.
+of the surface of a target of 10 cm.  scene.py has what was published: the robot of 2014 under either law, and equidistant neighbours.
 """
 
 from __future__ import annotations
