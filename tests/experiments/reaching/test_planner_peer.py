@@ -40,6 +40,21 @@ def test_goals_touch_with_the_hand_alone_and_the_poses_before_them_with_nothing(
     assert max(TARGET.missing(palm) for palm in palms) < 3e-3
 
 
+def test_what_fields_feel_is_not_sound_but_for_the_hand_at_the_target(belief):
+    belief.present(TARGET)
+    low, high = belief.range.T
+    befores = np.clip(goals(belief, TARGET, np.random.default_rng(0))[1], low, high)
+    q = np.concatenate([befores + width * np.random.default_rng(1).normal(size=befores.shape) for width in (0.0, 0.05, 0.1, 0.3)])
+    q = np.concatenate([np.clip(q, low, high), np.random.default_rng(2).uniform(low, high, (200, 4))])
+    sound, seen = belief.sound(q, "solids"), Model(body(), belief.model.world)
+    seen.reaching = MARKER
+    felt = np.bincount(seen.evaluate(belief.whole(q)).table.pose, minlength=len(q)) > 0
+    seen.reaching = None
+    hand_alone = sound & ~felt & (np.bincount(seen.evaluate(belief.whole(q)).table.pose, minlength=len(q)) > 0)
+    assert hand_alone.any() and (sound & felt).any()
+    assert belief.sound(q, "fields").tolist() == (sound & ~felt).tolist()
+
+
 def test_what_was_blocked_is_kept_away_from(belief):
     pose = belief.limits.mean(axis=1)
     assert belief.sound(pose[None])[0]
