@@ -2,7 +2,7 @@
 
 Claim: a coarse discrete planner with a reactive reach does more than either alone; the planner may have few states, the reach closes what
 is left, and only together do they bring the hand from arbitrary poses around the targets.
-Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: ten minutes on 2 cores.
+Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: three minutes on 2 cores.
 
 The right arm, that of 2014 under the published law and today's under the default one; 27 targets that the palm can touch, 19 of the
 thesis' and others drawn between them, and arbitrary poses to begin in (no home pose, no lattice state).
