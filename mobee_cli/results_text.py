@@ -34,9 +34,10 @@ def _columns(value: Any) -> tuple[str, ...]:
 def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
     if isinstance(value, list) and value and all(map(_columns, value)):
         yield f"{indent}{label}:"
-        first, *columns = dict.fromkeys(name for row in value for name in row)
-        labels = [_cell(row.get(first)) for row in value]
-        yield from _table(labels, value, columns, indent + " " * STEP, width, _words(first))
+        names = list(dict.fromkeys(name for row in value for name in row))
+        count = _needed([[_cell(row.get(name)) for name in names] for row in value])
+        stubs = _aligned([list(map(_words, names[:count])), *([_cell(row.get(name)) for name in names[:count]] for row in value)])
+        yield from _table(stubs[1:], value, names[count:], indent + " " * STEP, width, stubs[0])
         return
     if not isinstance(value, dict) or not value:
         yield textwrap.fill(
@@ -50,6 +51,17 @@ def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
         return
     yield f"{indent}{label}:"
     yield from _entries(value, indent + " " * STEP, width)
+
+
+def _needed(rows: Sequence[Sequence[str]]) -> int:
+    """How many of the first cells tell the rows apart; 1 if all do not."""
+    return next((count for count in range(1, len(rows[0]) + 1) if len({tuple(row[:count]) for row in rows}) == len(rows)), 1)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Cells side by side, each as wide as the widest of its column."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [(" " * GAP).join(cell.ljust(wide) for cell, wide in zip(row, widths, strict=True)) for row in rows]
 
 
 def _table(

@@ -36,6 +36,11 @@ def test_a_list_of_results_is_a_table_whose_first_names_the_rows():
     ]
 
 
+def test_rows_have_as_many_names_as_tell_them_apart():
+    found = {"rows": [{"law": "old", "who": "both", "x": 1}, {"law": "old", "who": "reach", "x": 2}, {"law": "new", "who": "both", "x": 3}]}
+    assert results_text(found, 40).splitlines() == ["rows:", "  law  who    x", "  old  both   1", "  old  reach  2", "  new  both   3"]
+
+
 def test_columns_beyond_the_width_are_in_a_further_table():
     found = {str(row): {"one": 1, "two": 2, "three": 3} for row in (7, 8)}
     assert results_text(found, 12).splitlines() == ["   one  two", "7    1    2", "8    1    2", "   three", "7      3", "8      3"]
