@@ -21,22 +21,27 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from experiments.babbling.measured import POSITIONS
 from experiments.live_reach.figure import draw
 from experiments.live_reach.findings import CLAIMS, claims, misses, table
+from experiments.live_reach.held_off import nearest_reach
 from experiments.live_reach.job import Job
 from experiments.live_reach.live import perform
 from experiments.live_reach.measured import BLOCK, Block, measure, read_block, write_block
 from experiments.live_reach.problems import fresh_problems, grid_problems, grid_targets, moving_problems, touchable
-from experiments.live_reach.settings import RATE, belief
+from experiments.live_reach.settings import AIM, GOOD, RATE, belief, offline_plant
 from experiments.live_reach.training import TRANSITIONS, train
 from experiments.options import positive_whole
 from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.progress import Progress
 from mobee.errors import InvalidValue
+from mobee.reach import ReachTarget
 from mobee.store import STORE
 from services.launcher.engine import EngineMissing, compile_engine
 
@@ -93,11 +98,14 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 progress.show((number + done / len(jobs)) / starts, f"start {number + 1} of {starts}: {name}")
                 _do(place / name, job, seed, rate)
     blocks, known = _blocks(folder), _touchable()
+    targets = grid_targets()
+    left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= GOOD)
     return {
-        "claims": [claim.record() for claim in claims(blocks, known)],
+        "claims": [claim.record() for claim in claims(blocks, known, left)],
         "tries": table(blocks, known),
-        "missed": misses(blocks, known),
+        "missed": misses(blocks, known, _why),
         "reachable": sorted(known),
+        "held off by the robot's own fields": sorted(known - left),
         "repeatable": all(block.repeatable for block in blocks),
     }
 
@@ -126,6 +134,17 @@ def _do(folder: Path, job: Job, seed: int, rate: float) -> None:
         repeatable = perform(folder, job, seed, rate)
         write_block(folder, measure(folder, job, rate, repeatable))
         (folder / POSITIONS).unlink()
+
+
+@cache
+def _nearest(place: tuple[float, float, float]) -> tuple[float, str]:
+    """How near a reach from any state comes to a target offline."""
+    return nearest_reach(offline_plant(0), ReachTarget(np.array(place), aim=AIM))
+
+
+def _why(place: tuple[float, float, float]) -> str:
+    off, felt = _nearest(place)
+    return f"offline the nearest reach from any state ends {1e3 * off:.0f} mm off" + (f", kept by {felt} mm" if off > GOOD else "")
 
 
 def _blocks(folder: Path) -> list[Block]:

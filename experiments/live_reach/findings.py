@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ WHO, MOVING = ("learner", "peer"), "moving"
 TOLD = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
 LEAST = {GRID: 0.95, FRESH: 0.9}
 SOON = 5e-3  # s
+FEW = 20  # tries: of fewer no verdict is made
 CLAIMS = (
     Claim(
         "aim of this reproduction",
@@ -46,7 +47,7 @@ def share(tries: Sequence[Judged]) -> str:
 
 def enough(tries: Sequence[Judged], least: float) -> bool | None:
     """Whether their share of successes is as large as that; None: less, but by chance perhaps."""
-    if not tries:
+    if len(tries) < FEW:
         return None
     made = sum(tried.success for tried in tries)
     if made >= least * len(tries):
@@ -54,8 +55,8 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
     return False if binomtest(made, len(tries)).proportion_ci(method="wilson").high < least else None
 
 
-def claims(blocks: Sequence[Block], touchable: frozenset[int]) -> list[Claim]:
-    """The claims with our numbers; `touchable`: those of the 27."""
+def claims(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset[int]) -> list[Claim]:
+    """The claims with our numbers; `touchable`: those of the 27, `left`: those of them that MoBeE's fields let a palm come to."""
     grid, fresh = tries_of(blocks, "learner", GRID, touchable), tries_of(blocks, "learner", FRESH)
     deep = [touch for block in blocks if block.kind in ("refine", "learner") for touch in block.deep]
     hours = sum(block.seconds for block in blocks if block.kind in ("refine", "learner")) / 3600.0
@@ -63,10 +64,14 @@ def claims(blocks: Sequence[Block], touchable: frozenset[int]) -> list[Claim]:
     ticks = sorted({1e3 / block.rate for block in blocks if block.kind == "first motion"})
     rivals = {who: tries_of(blocks, who, GRID, touchable) + tries_of(blocks, who, FRESH) for who in WHO}
     worst = f"deepest {1e3 * max(touch.depth for touch in deep):.1f} mm ({max(deep, key=lambda t: t.depth).pair}), " if deep else ""
+    apart = (
+        f"of the {len(left)} that the robot's own fields let a palm come to {share(tries_of(blocks, 'learner', GRID, left))}; "
+        f"of all 27 {share(tries_of(blocks, 'learner', GRID))}"
+    )
     return [
-        CLAIMS[0].measured(f"{share(grid)}; of all 27: {share(tries_of(blocks, 'learner', GRID))}", enough(grid, LEAST[GRID])),
+        CLAIMS[0].measured(f"{share(grid)} of {len(touchable)}; {apart}", enough(grid, LEAST[GRID])),
         CLAIMS[1].measured(share(fresh), enough(fresh, LEAST[FRESH])),
-        CLAIMS[2].measured(f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if hours > 0.0 else None),
+        CLAIMS[2].measured(f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if len(grid) + len(fresh) >= FEW else None),
         CLAIMS[3].measured(
             f"{max(first):g} ms at most to the first command that moves ({len(first)} reaches, ticks of {ticks[0]:g} ms)"
             if first
@@ -80,7 +85,7 @@ def claims(blocks: Sequence[Block], touchable: frozenset[int]) -> list[Claim]:
 def _no_worse(rivals: Mapping[str, Sequence[Judged]]) -> bool | None:
     """By the tries, which are the same for both."""
     learner, peer = (np.array([tried.success for tried in rivals[who]]) for who in WHO)
-    if not len(learner) or len(learner) != len(peer):
+    if len(learner) < FEW or len(learner) != len(peer):
         return None
     return bool(learner.mean() >= peer.mean()) or None
 
@@ -113,16 +118,15 @@ def _spent(tries: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def misses(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:
-    """Which targets that can be touched were missed, by whom, and by how much."""
+def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tuple[float, float, float]], str]) -> list[dict[str, Any]]:
+    """Which targets that can be touched were missed, by whom and by how much; `why` says it of those that the learner missed."""
     return [
         {
             "who": block.kind,
-            "target": [round(x, 2) for x in tried.position],
-            "number": f"{tried.kind} {tried.number}",
+            "target": f"{tried.kind} {tried.number} at {tuple(round(x, 2) for x in tried.position)}",
             "off [mm]": None if np.isinf(tried.off) else round(1e3 * tried.off),
             "reaches": tried.reaches,
-            "why": tried.why,
+            "why": tried.why or (why((tried.position[0], tried.position[1], tried.position[2])) if block.kind == WHO[0] else ""),
         }
         for block in blocks
         if block.kind in WHO
