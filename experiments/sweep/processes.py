@@ -37,8 +37,9 @@ def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterato
         for worker in workers.values():
             worker.give(waiting.popleft())
         while busy := [answers for answers, worker in workers.items() if worker.cell is not None]:
-            for ready in connection.wait(busy):
-                worker = workers.pop(ready)  # type: ignore[call-overload]  # wait gives back what it was given
+            ready = connection.wait(busy)
+            for answers in [one for one in busy if one in ready]:
+                worker = workers.pop(answers)
                 done = worker.take()
                 if not worker.is_whole and waiting:
                     worker = _Worker(work)
