@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from mobee.model import Model
 from mobee.robot.robot import Array, Ints
 
 POINT = 1e-3  # m, radius of what stands for a place
+SHELL, FAR = 0.02, 0.5  # m
 STEPS, STARTS = 60, 24
 DAMPING = 0.02  # m, below which errors are no longer damped away
 STEP = 0.3  # rad, a motor's longest in one step
@@ -65,6 +67,22 @@ def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
     moved = links_moved(robot)[part]
     inside = [int(link) for link in table.first_link[(table.second_link < 0) & (table.kind == 0)] if int(link) not in moved]
     return robot.links[inside[0]] if inside else None
+
+
+def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Array) -> Array | None:
+    """About the nearest place to `position` (3,) m that is outside the body, see `body_at`, and to which the part can bring the marker.
+
+    Within FAR, on shells that are SHELL apart; None if there is none.
+    """
+    where = np.asarray(position, dtype=np.float64)
+    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    nearest = nearest_posture(model, part, marker, where, q).distance
+    for distance in np.arange(max(nearest, SHELL), FAR, SHELL):
+        for place in where + distance * ways:
+            if body_at(model, part, place, q) is None and nearest_posture(model, part, marker, place, q).distance < SHELL:
+                return np.asarray(place)
+    return None
 
 
 def _movers(model: Model, part: str, marker: str) -> Ints:

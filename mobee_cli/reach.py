@@ -14,7 +14,7 @@ from mobee.errors import ActionInterrupted, MobeeError
 from mobee.learning.reaching.load import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
-from mobee.reachable import body_at, nearest_posture
+from mobee.reachable import body_at, nearest_outside, nearest_posture
 from mobee.robot.robot import Array, Robot
 from mobee.store import STORE
 from mobee_cli.connect import add_endpoint
@@ -79,10 +79,11 @@ def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
         raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
     if arguments.object is None:
         target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)
-        _require_outside(stage, part, target.position)
+        _require_outside(stage, part, marker, target.position)
         stage.plant.present(target)
     else:
         target = stage.present_object(arguments.object, arguments.aim)
+        _require_outside(stage, part, marker, target.position)
     found = nearest_posture(stage.model, part, marker, target.position, stage.q())
     stage.plant.measure(part)
     way: dict[str, Any] = {}
@@ -108,11 +109,17 @@ def _learned(arguments: argparse.Namespace, stage: Stage) -> ReachAgent | None:
     return load_reaches(file, stage.plant, arguments.part)
 
 
-def _require_outside(stage: Stage, part: str, position: Array) -> None:
-    link = body_at(stage.model, part, position, stage.q())
+def _require_outside(stage: Stage, part: str, marker: str, position: Array) -> None:
+    model, q = stage.model, stage.q()
+    link = body_at(model, part, position, q)
     if link is not None:
-        at = ", ".join(f"{x:g}" for x in position)
-        raise UserError(f"({at}) m is inside the robot's own {link}: choose a place outside its body", BAD_INPUT)
+        free = nearest_outside(model, part, marker, position, q)
+        advice = f"the nearest to which {part} can bring {marker} is about {_place(free)} m" if free is not None else "it is far from any"
+        raise UserError(f"{_place(position)} m is inside the robot's own {link}: choose a place outside its body; {advice}", BAD_INPUT)
+
+
+def _place(position: Array) -> str:
+    return f"({', '.join(f'{x:.3g}' for x in position)})"
 
 
 def _palm(robot: Robot, part: str) -> str:

@@ -34,15 +34,15 @@ CONTROL = 8.0  # s for the part to come under control and its goal to be free
 LONGEST = 300.0  # s of the clock on the wall for a reach, whatever the robot does
 NOTED = 1.0  # s from the request for which commands are noted
 _RESTLESS = f"has not come to rest in {LONGEST:g} s: is the robot paused? See `mobee status`"
-MOVES = 5e-3  # rad/s by which a command that moves differs from the last before the reach began
+MOVES = {"position": 5e-5, "velocity": 5e-3, "torque": 25e-3}  # rad, rad/s, N m: by more a command that moves differs from one at rest
 
 
 class LivePlant(BusPlant):
     """A BusPlant that is never waited for in vain, and that sees when its reaches begin to move the robot."""
 
-    def __init__(self, service: Service, robot: Robot, part: str) -> None:
+    def __init__(self, service: Service, robot: Robot, part: str, modality: str) -> None:
         super().__init__(service, robot, (part,))
-        self._link, self._where = service, robot.part(part).slice
+        self._link, self._where, self._moves = service, robot.part(part).slice, MOVES[modality]
         self._q: Array | None = None
         self._asked = self._begun = np.inf  # s, monotonic clock: the request, and when the controller began
         self._commands: list[tuple[float, Array]] = []  # when sent, what: the last before the request, and those after
@@ -81,11 +81,8 @@ class LivePlant(BusPlant):
 
     def first_motion(self) -> float | None:
         """From the last request to the first command that moves, in s; None if none came."""
-        before, *_ = [ref for sent, ref in reversed(self._commands) if sent < self._begun] or [None]
-        for sent, ref in self._commands:
-            if sent >= self._begun and before is not None and np.abs(ref - before).max() > MOVES:
-                return sent - self._asked
-        return None
+        moved = first_that_moves(self._commands, self._begun, self._moves)
+        return None if moved is None else moved - self._asked
 
     @contextmanager
     def _at_most(self, patience: float, why: str) -> Iterator[None]:
@@ -118,6 +115,13 @@ class LivePlant(BusPlant):
             self._commands.append((sent, np.array(commands.ref[self._where])))
 
 
+def first_that_moves(commands: list[tuple[float, Array]], begun: float, moves: float) -> float | None:
+    """When the first of the commands was sent, from the time on when a reach began, that differs by more from the last before."""
+    before = [ref for sent, ref in commands if sent < begun]
+    moving = (sent for sent, ref in commands if sent >= begun and before and np.abs(ref - before[-1]).max() > moves)
+    return next(moving, None)
+
+
 @contextmanager
 def live(endpoint: str, part: str) -> Iterator[Stage]:
     """The robot of the system at `endpoint`; its part is taken, and given back at the end.  Raises UserError where there is none."""
@@ -131,7 +135,7 @@ def live(endpoint: str, part: str) -> Iterator[Stage]:
         with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the reach, and that the verb has to tell
             logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
-            plant = LivePlant(service, robot, part)
+            plant = LivePlant(service, robot, part, settings["modality"])
             service.ready()
             yield Stage(robot, plant, plant.q, plant.present_object, plant.first_motion)
             plant.leave()

@@ -85,7 +85,10 @@ class WorldDesk:
         """Two who reach at a time would each move the other's target."""
         other = self._presenter
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
-            raise InvalidValue(f"{TARGET!r} is there for {other}: {who} can present one when that is taken away, or {other} has ended.")
+            raise InvalidValue(
+                f"{TARGET!r} is there for {other}, and one at a time can present a target: {who} can when {other} has ended. "
+                "A scenario can have one agent with targets."
+            )
         self._presenter = who
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mobee import InvalidValue, Model, UnknownName, load_robot
-from mobee.reachable import body_at, nearest_posture
+from mobee.reachable import body_at, nearest_outside, nearest_posture
 
 ROBOT = load_robot("icub")
 MODEL = Model(ROBOT)
@@ -47,6 +47,15 @@ def test_a_place_in_the_body_is_known_by_the_link_that_is_there() -> None:
     assert body_at(MODEL, "left_arm", left, ROBOT.home) is None  # it can be taken away from there
     assert body_at(MODEL, "right_arm", np.array([0.0, 0.0, 0.1]), ROBOT.home) in ROBOT.links
     assert body_at(MODEL, "right_arm", np.array([-0.4, 0.3, 0.3]), ROBOT.home) is None
+
+
+def test_the_place_outside_the_body_is_free_near_and_can_be_come_to() -> None:
+    inside = np.array([0.0, 0.0, 0.1])
+    free = nearest_outside(MODEL, "right_arm", "right_palm", inside, ROBOT.home)
+    assert free is not None and np.linalg.norm(free - inside) < 0.15
+    assert body_at(MODEL, "right_arm", free, ROBOT.home) is None
+    assert nearest_posture(MODEL, "right_arm", "right_palm", free, ROBOT.home).distance < 0.02
+    assert nearest_outside(MODEL, "right_arm", "right_palm", np.array([5.0, 0.0, 0.1]), ROBOT.home) is None
 
 
 def test_what_does_not_fit_together_is_told_with_what_does() -> None:

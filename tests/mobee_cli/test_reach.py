@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee import Lattice, Model, OfflinePlant, ReachTarget, load_robot, load_world
+from mobee import Lattice, Model, OfflinePlant, ReachTarget, World, load_robot, load_world
+from mobee.collision.geometry import sphere
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.store import STORE
@@ -59,6 +60,14 @@ def test_an_object_of_the_world_is_reached_for_by_name(capsys: pytest.CaptureFix
     assert result["target"] == {"position": [-0.35, 0.0, -0.07], "radius": 0.03, "aim": "centre"}
 
 
+def test_an_object_inside_the_body_is_refused_as_a_place_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    world = World()
+    world.add("pill", sphere(0.01), position=[0.0, 0.0, 0.1], role="target")
+    monkeypatch.setattr("mobee_cli.reach_stage.load_world", lambda name: world)
+    assert main(["reach", "--offline", "--object", "pill"]) == 2
+    assert "is inside the robot's own torso_2" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run in which the right arm has learned a little."""
@@ -96,7 +105,10 @@ def test_a_run_that_does_not_fit_is_refused_in_one_line(learned: Path, capsys: p
     [
         (["--target", "nan", "0", "0"], "three finite numbers"),
         (["--target", "0", "0", "0", "--radius", "-1"], "radius -1.0"),
-        (["--target", "0", "0", "0.1"], "is inside the robot's own torso_2: choose a place outside its body"),
+        (
+            ["--target", "0", "0", "0.1"],
+            "is inside the robot's own torso_2: choose a place outside its body; the nearest to which right_arm",
+        ),
         (["--target", "-0.3", "0.2", "0.1", "--part", "right_amr"], "Did you mean 'right_arm'?"),
         (["--target", "-0.3", "0.2", "0.1", "--marker", "left_palm"], "right_arm does not move the marker 'left_palm'. Valid: right_elbow"),
         (["--object", "balll"], "Did you mean 'ball'?"),
