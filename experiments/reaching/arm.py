@@ -43,11 +43,25 @@ def space(law: str = "default") -> Lattice:
 @cache
 def hands(law: str = "default") -> Array:
     """Where the palm is in each state, (S, 3) m, root frame: the wrist is rigid at home, and not at rest as in the space's targets."""
-    robot = body(law)
-    poses = np.tile(robot.home, (len(space(law)), 1))
-    poses[:, [robot.motor_index(name) for name in RIGHT]] = space(law).samples
-    found: Array = Model(robot).evaluate(poses).position(MARKER)
+    found: Array = Model(body(law)).evaluate(_poses(law)).position(MARKER)
     return found
+
+
+@cache
+def jacobians(law: str = "default") -> Array:
+    """How the joints move the palm in each state, (S, 3, 4) m/rad."""
+    return Model(body(law)).jacobian(_poses(law), MARKER)[:, :3, _motors(law)]
+
+
+def _poses(law: str) -> Array:
+    """All motors in each state, (S, n) rad: those that do not move at home."""
+    poses = np.tile(body(law).home, (len(space(law)), 1))
+    poses[:, _motors(law)] = space(law).samples
+    return poses
+
+
+def _motors(law: str) -> list[int]:
+    return [body(law).motor_index(name) for name in RIGHT]
 
 
 def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
@@ -80,6 +94,7 @@ def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str =
         failures="local",
         model=model,
         hands=hands(law),
+        jacobians=jacobians(law),
         seed=seed,
     )
 

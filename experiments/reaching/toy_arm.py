@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from experiments.learning.published import RIGHT, arm_space
-from experiments.reaching.toy_kinematics import hands, missing, swept
+from experiments.reaching.toy_kinematics import hands, jacobians, missing, swept
 from mobee import Lattice
 from mobee.errors import InvalidValue
 from mobee.learning.draws import Draws
@@ -40,6 +40,8 @@ class ToyArm(ReachTable):
         super().__init__(space, *ideal(space), self._of, seed=seed, start=start)
         self.hands: Array = hands(space.samples)
         """(S, 3) m, from the shoulder."""
+        self.jacobians: Array = jacobians(space.samples)
+        """(S, 3, 4) m/rad, how the joints move the hand."""
         self._starts = Draws("toy arm")
         self._place: Array = np.empty(3)
 
@@ -90,7 +92,16 @@ def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
     """An agent on a toy arm of its own that knows all mean rewards and all blocked actions, and learns nothing."""
     arm = ToyArm(seed)
     agent = ReachAgent(
-        arm.space, arm, arm, marker=MARKER, predictor=Truth(), strategy="greedy", failures="local", seed=seed, hands=arm.hands
+        arm.space,
+        arm,
+        arm,
+        marker=MARKER,
+        predictor=Truth(),
+        strategy="greedy",
+        failures="local",
+        seed=seed,
+        hands=arm.hands,
+        jacobians=arm.jacobians,
     )
     for target in targets:
         for state, action in np.argwhere(blocked(target.position)).tolist():

@@ -51,7 +51,16 @@ def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints:
     """Rewards as fractions of the oracle's after so many tries, shape (checkpoints,), and on targets never tried, NaN if not that far."""
     arm, problems, unseen = ToyArm(seed), grid(), np.nan
     agent = ReachAgent(
-        arm.space, arm, arm, marker=MARKER, predictor=predictor, strategy=strategy, failures=failures, seed=seed, hands=arm.hands
+        arm.space,
+        arm,
+        arm,
+        marker=MARKER,
+        predictor=predictor,
+        strategy=strategy,
+        failures=failures,
+        seed=seed,
+        hands=arm.hands,
+        jacobians=arm.jacobians,
     )
     found = []
     for tries in checkpoints:

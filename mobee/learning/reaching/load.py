@@ -10,7 +10,7 @@ from mobee.learning.learned import load_learned
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore, reaching_parts
-from mobee.learning.reaching.where import hands_of
+from mobee.learning.reaching.where import reaches_of
 from mobee.learning.recorded import space_from
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
@@ -19,7 +19,9 @@ from mobee.robot.robot import Array
 from mobee.store import TransitionStore
 
 
-def load_reaches(file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None) -> ReachAgent:
+def load_reaches(
+    file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None, jacobians: Array | None = None
+) -> ReachAgent:
     """Rebuild what was learned of reaching from a run's file, to be used: it is greedy, and writes nothing.
 
     Where transitions lead it believes as the transitions of the part in the same file say, if there are any.
@@ -29,6 +31,7 @@ def load_reaches(file: str | Path, plant: ReachPlant, part: str | None = None, h
         plant: through which to reach.
         part: whose reaches; needed where the file holds those of several.
         hands: as of the ReachAgent.
+        jacobians: as of the ReachAgent.
 
     Raises:
         MobeeError, UnknownName: no such file or part, nobody has learned to reach in it, or by a predictor of one's own.
@@ -39,18 +42,20 @@ def load_reaches(file: str | Path, plant: ReachPlant, part: str | None = None, h
         bound, learners, targets, steps = store.settings(), store.learners(), store.problems(), store.load()
     learner = learners[-1][1]
     space = space_from(bound["space"], plant.robot)
-    places = hands_of(space, bound["marker"]) if hands is None else hands
+    marker, scale = bound["marker"], bound["scale"]
+    reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)
     model = _model(file, space)
     agent = ReachAgent(
         space,
         plant,
         model.debiased(),
-        marker=bound["marker"],
-        predictor=_predictor(file, learner["predictor"], Reaches(space.samples, places, bound["scale"])),
+        marker=marker,
+        predictor=_predictor(file, learner["predictor"], reaches),
         strategy="greedy",
         model=model if learner["learns the model"] else None,
-        hands=places,
-        scale=bound["scale"],
+        hands=reaches.hands,
+        jacobians=reaches.jacobians,
+        scale=scale,
         **{name: learner[name] for name in ("failures", "discount", "penalty", "limit", "seed")},
     )
     agent.replay(targets, steps)

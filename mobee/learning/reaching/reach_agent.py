@@ -14,7 +14,7 @@ from mobee.learning.reaching.predictors import Reaches, RewardPredictor
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Step, Try
-from mobee.learning.reaching.where import hands_of
+from mobee.learning.reaching.where import reaches_of
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
@@ -45,6 +45,7 @@ class ReachAgent(ReachLearner):
         store: where steps go and come from.
         model: to be learned at the same time (thesis 9.4.1): transitions that touch nothing of the world are observed with it.
         hands: (S, 3) m, root frame, where the marker is in each state; None: by the robot's kinematics, other parts at home.
+        jacobians: (S, 3, d) m/rad, how the joints of the space move it there, where `hands` are given and these are known.
 
     Raises:
         UnknownName: no such predictor, strategy, way to remember failures, or marker.
@@ -70,10 +71,11 @@ class ReachAgent(ReachLearner):
         store: ReachStore | None = None,
         model: TransitionModel | None = None,
         hands: Array | None = None,
+        jacobians: Array | None = None,
     ) -> None:
         if plant.robot.motors != space.robot.motors:
             raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
-        reaches = Reaches(space.samples, hands_of(space, marker) if hands is None else hands, scale)
+        reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)
         super().__init__(space, reaches, beliefs, predictor, strategy, failures, discount, penalty, limit, seed, model)
         self.plant, self.marker, self.store = plant, marker, store
         self._state: int | None = None

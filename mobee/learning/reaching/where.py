@@ -1,13 +1,25 @@
-"""Where a marker is in each state of a space."""
+"""Where a marker is in each state of a space, and how the joints move it there."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mobee.errors import InvalidValue
+from mobee.learning.reaching.predictors.predictor import SCALE, Reaches
 from mobee.learning.space import Space
 from mobee.model import Model
 from mobee.robot.robot import Array
+
+
+def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:
+    """The reaches from each state by the robot's kinematics, all other parts at home; `scale` m: see `Reaches`.
+
+    Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
+    """
+    robot = space.robot
+    part = robot.part(space.part)
+    jacobians = Model(robot).jacobian(_poses(space), marker)[:, :3, part.start + space.columns]
+    return Reaches(space.samples, hands_of(space, marker), scale, jacobians)
 
 
 def hands_of(space: Space, marker: str) -> Array:
@@ -17,9 +29,15 @@ def hands_of(space: Space, marker: str) -> Array:
     """
     robot = space.robot
     robot.marker(marker)
-    q = np.tile(robot.home, (len(space), 1))
-    q[:, robot.part(space.part).slice] = [space.target(state) for state in range(len(space))]
-    hands = Model(robot).evaluate(q).position(marker)
+    hands = Model(robot).evaluate(_poses(space)).position(marker)
     if np.ptp(hands, axis=0).max() == 0.0:
         raise InvalidValue(f"the marker {marker!r} is moved by none of {', '.join(space.joints)}: take one that {space.part} carries.")
     return hands
+
+
+def _poses(space: Space) -> Array:
+    """All motors in each state, (S, n) rad."""
+    robot = space.robot
+    q = np.tile(robot.home, (len(space), 1))
+    q[:, robot.part(space.part).slice] = [space.target(state) for state in range(len(space))]
+    return q

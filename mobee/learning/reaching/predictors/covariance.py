@@ -1,7 +1,7 @@
 """How alike the rewards of two reaches are: the covariance of the Gaussian process.
 
 Reaches are alike from similar poses for near targets ("place"), from similar poses over a similar way from the hand to the target
-("approach"), over a similar distance whatever the pose ("distance"), and a little in any case.
+("approach"), with a similar distance left whatever the pose ("distance"), and a little in any case.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.robot.robot import Array, Ints
 
@@ -32,19 +33,22 @@ _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTA
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Reaches: from `state` (n,) for `target` (n, 3) m; `way` (n, 3) m: from the hand to the target, `length` (n,) m long."""
+    """Reaches: from `state` (n,) for `target` (n, 3) m.
+
+    `way`: (n, 3) m, from the hand to the target.  `left`: (n,) m, how much of it a linear arm would leave.
+    """
 
     state: Ints
     target: Array
     way: Array
-    length: Array
+    left: Array
 
 
-def points(reaches: Reaches, state: Ints, target: Array) -> Points:
+def points(arm: LinearArm, state: Ints, target: Array) -> Points:
     """Reaches from states (n,) for targets (n, 3) m, or for one (3,) m."""
     where = np.broadcast_to(target, (len(state), 3))
-    way = where - reaches.hands[state]
-    return Points(state, where, way, np.sqrt((way**2).sum(axis=1)))
+    way = where - arm.reaches.hands[state]
+    return Points(state, where, way, arm.left(state, way))
 
 
 def usual(reaches: Reaches) -> Array:
@@ -91,7 +95,7 @@ class Covariance:
         pair = np.ix_(a.state, b.state)
         place = self._by_place[pair] * np.exp(_squared(a.target, b.target) * (-0.5 / self._value[_PLACE_L] ** 2))
         approach = self._by_approach[pair] * np.exp(_squared(a.way, b.way) * (-0.5 / self._value[_APPROACH_L] ** 2))
-        distance = np.exp((a.length[:, None] - b.length) ** 2 * (-0.5 / self._value[_DISTANCE_L] ** 2))
+        distance = np.exp((a.left[:, None] - b.left) ** 2 * (-0.5 / self._value[_DISTANCE_L] ** 2))
         total: Array = place + approach + self._value[_DISTANCE] * distance + OFFSET
         return total
 
@@ -100,7 +104,7 @@ class Covariance:
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
         approach_far = _squared(a.way, a.way) / value[_APPROACH_L] ** 2
-        distance_far = (a.length[:, None] - a.length) ** 2 / value[_DISTANCE_L] ** 2
+        distance_far = (a.left[:, None] - a.left) ** 2 / value[_DISTANCE_L] ** 2
         place, approach = self._by_place[pair] * np.exp(-0.5 * place_far), self._by_approach[pair] * np.exp(-0.5 * approach_far)
         distance = value[_DISTANCE] * np.exp(-0.5 * distance_far)
         joints = [squares[pair] / length**2 for squares, length in zip(self._squares, value[_JOINTS:], strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import Covariance, points, usual
-from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.reached import Reached
 from mobee.robot.robot import Array
 
@@ -14,23 +14,24 @@ DOUBT = 1.0  # standard deviation of the logarithm of a parameter around its usu
 STEPS = 40  # of the search at most
 
 
-def surprise(logs: Array, reaches: Reaches, squares: Array, reached: Reached, mean: float) -> tuple[float, Array]:
+def surprise(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> tuple[float, Array]:
     """Minus the logarithm of the evidence and of how usual the parameters are, but for a constant, and its derivatives (P,).
 
-    The rewards of a pair enter by their average and their scatter, which is the same as each of them.
+    `expected`: (n,), what the pairs were to bring before anything was seen.  Their rewards enter by their average and their scatter,
+    which is the same as each of them.
     """
     from scipy.linalg import cho_factor, cho_solve
 
     chosen = np.unique(np.linspace(0, len(reached) - 1, min(len(reached), MOST)).round().astype(np.intp))
-    seen = points(reaches, reached.state[chosen], reached.places[reached.target[chosen]])
+    seen = points(arm, reached.state[chosen], reached.places[reached.target[chosen]])
     covariance = Covariance(squares, logs)
     matrix, slopes = covariance.with_slopes(seen, reached.count[chosen])
     factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
-    residual = reached.mean[chosen] - mean
+    residual = (reached.mean - expected)[chosen]
     weight = cho_solve(factor, residual, check_finite=False)
     inverse = cho_solve(factor, np.eye(len(chosen)), check_finite=False)
     repeats, scatter, noise = reached.tries - len(reached), reached.scatter, covariance.noise
-    unusual = (logs - usual(reaches)) / DOUBT
+    unusual = (logs - usual(arm.reaches)) / DOUBT
     value = 0.5 * residual @ weight + np.log(factor[0].diagonal()).sum()
     value += 0.5 * (repeats * np.log(noise) + scatter / noise) + 0.5 * unusual @ unusual
     slope = 0.5 * slopes(inverse - weight[:, None] * weight) + unusual / DOUBT
@@ -38,13 +39,13 @@ def surprise(logs: Array, reaches: Reaches, squares: Array, reached: Reached, me
     return float(value), slope
 
 
-def most_likely(logs: Array, reaches: Reaches, squares: Array, reached: Reached, mean: float) -> Array:
+def most_likely(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
     """Logarithms of the parameters, searched from `logs` (P,)."""
     from scipy.optimize import minimize
 
-    bounds = [(middle - 4.0 * DOUBT, middle + 4.0 * DOUBT) for middle in usual(reaches)]
+    bounds = [(middle - 4.0 * DOUBT, middle + 4.0 * DOUBT) for middle in usual(arm.reaches)]
     found = minimize(
-        surprise, logs, (reaches, squares, reached, mean), jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS}
+        surprise, logs, (arm, squares, reached, expected), jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS}
     )
     best: Array = found.x
     return best

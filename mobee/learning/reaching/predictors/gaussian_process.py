@@ -8,6 +8,7 @@ import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, usual
 from mobee.learning.reaching.predictors.evidence import most_likely
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.posterior import Posterior
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import Reached
@@ -18,7 +19,6 @@ MOST = 2500  # pairs of state and target: 50 MB
 REPEATS = 768  # reaches that repeat others, or pairs beyond the most, after which they are merged
 RASTER = 0.01, 1.25  # m: how near targets are merged first, and how much farther each next time
 COARSEST = 10.0  # m: then all targets of a state are one
-FIRST_MEAN = 0.3  # expected reward before the first fit
 JITTER = 1e-9  # of the variance: what rounding may cost
 
 
@@ -38,32 +38,29 @@ class GaussianProcess:
         self._reaches, self._refits = reaches, refits
         self._squares = joint_squares(reaches)
         self._covariance = Covariance(self._squares, usual(reaches))
-        self._mean, self._reached = FIRST_MEAN, Reached()
+        self._arm, self._reached = LinearArm(reaches), Reached()
         self._repeats = 0
         self._rebuild()
 
     @property
     def settings(self) -> dict[str, Any]:
         """Its name and settings, as plain JSON values."""
-        return {"name": "gp", "refits": list(self._refits)}
+        return {"name": "gp", "before": "linear arm", "refits": list(self._refits)}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
         """Learn how a reach went."""
         if self._reached.pair(state, target) is not None:
             self._repeats += 1
-        self._posterior.append(state, target, reward - self._mean)
+        self._posterior.append(state, target, reward - self._arm.rewards(np.array([state]), target).item())
         self._reached.add(state, target, reward)
         if self._reached.tries in self._refits:
-            self._mean = float(self._reached.mean.mean())
-            logs = most_likely(self._covariance.logs, self._reaches, self._squares, self._reached, self._mean)
-            self._covariance = Covariance(self._squares, logs)
-            self._rebuild()
+            self._fit()
         elif self._repeats >= REPEATS or len(self._posterior) >= self._room:
             self._rebuild()
 
     def mean(self, target: Array) -> Array:
         """Expected reward of reaching from each state, shape (S,)."""
-        return self._mean + self._posterior.about(target)[0]
+        return self._before(target) + self._posterior.about(target)[0]
 
     def deviation(self, target: Array) -> Array:
         """Standard deviation of the mean rewards, shape (S,)."""
@@ -74,13 +71,25 @@ class GaussianProcess:
         """One draw of the mean rewards of all states together, shape (S,)."""
         mean, covariance = self._posterior.about(target)
         spare = JITTER * self._covariance.prior * np.eye(len(mean))
-        drawn: Array = self._mean + mean + np.linalg.cholesky(covariance + spare) @ rng.standard_normal(len(mean))
+        drawn: Array = self._before(target) + mean + np.linalg.cholesky(covariance + spare) @ rng.standard_normal(len(mean))
         return drawn
+
+    def _before(self, target: Array) -> Array:
+        """What is expected of each state before anything was seen, shape (S,)."""
+        return self._arm.rewards(np.arange(len(self._reaches)), target)
+
+    def _fit(self) -> None:
+        known = self._reached
+        self._arm = self._arm.fitted(known)
+        expected = self._arm.rewards(known.state, known.places[known.target])
+        self._covariance = Covariance(self._squares, most_likely(self._covariance.logs, self._arm, self._squares, known, expected))
+        self._rebuild()
 
     def _rebuild(self) -> None:
         """Begin again from the averages of all pairs."""
         state, target, mean, count = thinned(self._reached, MOST)
-        self._posterior = Posterior(self._reaches, self._covariance, state, target, mean - self._mean, count)
+        residual = mean - self._arm.rewards(state, target)
+        self._posterior = Posterior(self._arm, self._covariance, state, target, residual, count)
         self._repeats, self._room = 0, max(len(state), MOST) + REPEATS
 
 

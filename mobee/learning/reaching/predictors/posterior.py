@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.predictors.covariance import Covariance, Points, points
-from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.room import forget
 from mobee.robot.robot import Array, Ints
 
@@ -31,17 +31,17 @@ class Posterior:
     """Mean and covariance of the rewards from all states, a target.
 
     Args:
-        reaches: the reach actions.
+        arm: whose reaches they are.
         covariance: of their mean rewards.
         state: (n,) of the reaches to begin with, for `target` (n, 3) m.
         residual: (n,) rewards less the prior mean, or averages of `count` (n,) rewards.
     """
 
-    def __init__(self, reaches: Reaches, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
+    def __init__(self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
         from scipy.linalg import cholesky, solve_triangular
 
-        self._reaches, self._covariance, self._solve = reaches, covariance, solve_triangular
-        self._all = np.arange(len(reaches))
+        self._arm, self._covariance, self._solve = arm, covariance, solve_triangular
+        self._all = np.arange(len(arm.reaches))
         self._used = len(state)
         room = -(-self._used // BLOCK) * BLOCK + 8 * BLOCK
         self._state, self._target = np.zeros(room, dtype=np.intp), np.zeros((room, 3))
@@ -49,7 +49,7 @@ class Posterior:
         self._asked: dict[bytes, Asked] = {}
         if self._used:
             self._state[: self._used], self._target[: self._used] = state, target
-            seen = points(reaches, state, target)
+            seen = points(arm, state, target)
             matrix = covariance.between(seen, seen) + np.diag(covariance.noise / count)
             factor = cholesky(matrix, lower=True, overwrite_a=True, check_finite=False)
             self._factor[: self._used, : self._used] = factor
@@ -87,7 +87,7 @@ class Posterior:
         key = target.tobytes()
         known = self._asked.pop(key, None)
         if known is None:
-            at = points(self._reaches, self._all, target)
+            at = points(self._arm, self._all, target)
             known = Asked(at, self._covariance.between(at, at), len(self._score))
         forget(self._asked, self._most)
         self._asked[key] = known
@@ -105,7 +105,7 @@ class Posterior:
     def _continued(self, known: Asked, first: int, end: int) -> tuple[Array, Array]:
         """Rows first to end of a target; returns mean and covariance with them."""
         new = slice(first, end)
-        seen = points(self._reaches, self._state[new], self._target[new])
+        seen = points(self._arm, self._state[new], self._target[new])
         rows = self._covariance.between(seen, known.at)
         rows -= self._factor[new, :first] @ known.rows[:first]
         rows = self._solve(self._factor[new, new], rows, lower=True, overwrite_b=True, check_finite=False)

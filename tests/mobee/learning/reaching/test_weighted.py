@@ -31,3 +31,9 @@ def test_the_unit_of_distances_is_the_scale():
 def test_reaches_that_do_not_fit_are_refused(samples, hands, scale):
     with pytest.raises(InvalidValue, match="hands"):
         Reaches(np.zeros(samples), np.zeros(hands), scale)
+
+
+@pytest.mark.parametrize("jacobians", [np.zeros((3, 2, 3)), np.full((3, 3, 2), np.nan)])
+def test_jacobians_that_do_not_fit_are_refused(jacobians):
+    with pytest.raises(InvalidValue, match="jacobians"):
+        Reaches(np.zeros((3, 2)), np.zeros((3, 3)), jacobians=jacobians)

@@ -5,7 +5,7 @@ import pytest
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.lattice import Lattice
-from mobee.learning.reaching.where import hands_of
+from mobee.learning.reaching.where import hands_of, reaches_of
 from mobee.model import Model
 from mobee.robot.load import load_robot
 
@@ -20,6 +20,18 @@ def test_the_marker_is_where_the_model_puts_it():
         q = ROBOT.home.copy()
         q[ROBOT.part("right_arm").slice] = ARM.target(state)
         assert hands[state] == pytest.approx(Model(ROBOT).evaluate(q).position("right_palm"), abs=1e-12)
+
+
+def test_the_jacobians_tell_how_the_joints_move_the_marker():
+    reaches, step, state = reaches_of(ARM, "right_palm"), 1e-6, 40
+    q = np.tile(ROBOT.home, (2, 1))
+    q[:, ROBOT.part("right_arm").slice] = ARM.target(state)
+    for joint, name in enumerate(ARM.joints):
+        turned = q.copy()
+        turned[:, ROBOT.motor_index(name)] += step, -step
+        ends = Model(ROBOT).evaluate(turned).position("right_palm")
+        assert reaches.jacobians[state, :, joint] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), abs=1e-7)
+    np.testing.assert_array_equal(reaches.hands, hands_of(ARM, "right_palm"))
 
 
 def test_a_marker_of_another_part_is_refused():

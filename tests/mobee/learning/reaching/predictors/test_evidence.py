@@ -6,6 +6,7 @@ import pytest
 from mobee.learning.reaching.predictors import evidence
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
 from mobee.learning.reaching.predictors.evidence import most_likely, surprise
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.reached import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches
 
@@ -17,11 +18,15 @@ def known(seen) -> Reached:
     return reached
 
 
+def before(reached: Reached):
+    return np.full(len(reached), 0.2)
+
+
 def test_differences_of_surprise_are_those_of_all_rewards_taken_one_by_one():
     made, seen = reaches(), drawn(reaches(), 60)
     squares, first = joint_squares(made), usual(reaches())
     state, where, value = (np.array(column) for column in zip(*seen, strict=True))
-    data = points(made, state, where)
+    data = points(LinearArm(made), state, where)
 
     def plain(logs):
         covariance = Covariance(squares, logs)
@@ -30,29 +35,31 @@ def test_differences_of_surprise_are_those_of_all_rewards_taken_one_by_one():
         return 0.5 * (residual @ np.linalg.solve(matrix, residual) + np.linalg.slogdet(matrix)[1] + (logs - first) @ (logs - first))
 
     other = first + np.random.default_rng(0).normal(0.0, 0.3, len(first))
-    merged = [surprise(logs, made, squares, known(seen), 0.2)[0] for logs in (first, other)]
+    merged = [surprise(logs, LinearArm(made), squares, known(seen), before(known(seen)))[0] for logs in (first, other)]
     assert merged[1] - merged[0] == pytest.approx(plain(other) - plain(first), abs=1e-8)
 
 
 def test_the_derivatives_are_those_of_the_surprise():
     made, seen = reaches(), drawn(reaches(), 50)
     logs, squares, step = usual(made) + 0.2, joint_squares(made), 1e-5
-    _, slope = surprise(logs, made, squares, known(seen), 0.1)
+    _, slope = surprise(logs, LinearArm(made), squares, known(seen), before(known(seen)))
     for axis, unit in enumerate(np.eye(len(logs))):
-        up, down = (surprise(logs + sign * step * unit, made, squares, known(seen), 0.1)[0] for sign in (1.0, -1.0))
+        up, down = (
+            surprise(logs + sign * step * unit, LinearArm(made), squares, known(seen), before(known(seen)))[0] for sign in (1.0, -1.0)
+        )
         assert slope[axis] == pytest.approx((up - down) / (2.0 * step), rel=1e-5, abs=1e-5)
 
 
 def test_the_most_likely_parameters_are_less_surprising_than_the_usual_ones():
     made, reached = reaches(), known(drawn(reaches(), 80))
     squares, first = joint_squares(made), usual(made)
-    found = most_likely(first, made, squares, reached, 0.2)
-    assert surprise(found, made, squares, reached, 0.2)[0] < surprise(first, made, squares, reached, 0.2)[0] - 1.0
+    rest = LinearArm(made), squares, reached, before(reached)
+    assert surprise(most_likely(first, *rest), *rest)[0] < surprise(first, *rest)[0] - 1.0
 
 
 def test_only_so_many_pairs_are_looked_at(monkeypatch):
     made, reached = reaches(), known(drawn(reaches(), 80))
     monkeypatch.setattr(evidence, "MOST", 10)
-    few, _ = surprise(usual(made), made, joint_squares(made), reached, 0.2)
+    few, _ = surprise(usual(made), LinearArm(made), joint_squares(made), reached, before(reached))
     monkeypatch.undo()
-    assert few != surprise(usual(made), made, joint_squares(made), reached, 0.2)[0]
+    assert few != surprise(usual(made), LinearArm(made), joint_squares(made), reached, before(reached))[0]

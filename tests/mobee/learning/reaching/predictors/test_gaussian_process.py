@@ -5,20 +5,22 @@ import pytest
 
 from mobee.learning.reaching.predictors import gaussian_process
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
-from mobee.learning.reaching.predictors.gaussian_process import FIRST_MEAN, GaussianProcess, thinned
+from mobee.learning.reaching.predictors.gaussian_process import GaussianProcess, thinned
+from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.posterior import BLOCK
 from mobee.learning.reaching.predictors.reached import Reached
 from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
 
 
-def dense(made, seen, target, logs, prior_mean):
+def dense(made, seen, target, logs):
     """Mean and covariance from all reaches at once, repeats as rows of their own."""
-    covariance = Covariance(joint_squares(made), logs)
+    covariance, arm, states = Covariance(joint_squares(made), logs), LinearArm(made), np.arange(len(made))
     state, where, value = (np.array(column) for column in zip(*seen, strict=True))
-    data, asked = points(made, state, where), points(made, np.arange(len(made)), target)
+    data, asked = points(arm, state, where), points(arm, states, target)
     inverse = np.linalg.inv(covariance.between(data, data) + covariance.noise * np.eye(len(seen)))
     cross = covariance.between(data, asked)
-    return prior_mean + cross.T @ inverse @ (value - prior_mean), covariance.between(asked, asked) - cross.T @ inverse @ cross
+    mean = arm.rewards(states, target) + cross.T @ inverse @ (value - arm.rewards(state, where))
+    return mean, covariance.between(asked, asked) - cross.T @ inverse @ cross
 
 
 @pytest.mark.parametrize("tries", [1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 3])
@@ -26,7 +28,7 @@ def test_mean_and_deviation_are_those_of_the_dense_posterior(tries):
     made, seen = reaches(), drawn(reaches(), tries)
     process = taught(GaussianProcess(made, refits=()), seen)
     for target in (*places()[:2], np.array([0.05, 0.0, -0.1])):
-        mean, covariance = dense(made, seen, target, usual(made), FIRST_MEAN)
+        mean, covariance = dense(made, seen, target, usual(made))
         np.testing.assert_allclose(process.mean(target), mean, rtol=0, atol=1e-10)
         np.testing.assert_allclose(process.deviation(target), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
 
@@ -35,7 +37,7 @@ def test_merging_repeats_changes_nothing(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 200)
     monkeypatch.setattr(gaussian_process, "REPEATS", 20)
     process = taught(GaussianProcess(made, refits=()), seen)
-    mean, covariance = dense(made, seen, places()[0], usual(made), FIRST_MEAN)
+    mean, covariance = dense(made, seen, places()[0], usual(made))
     np.testing.assert_allclose(process.mean(places()[0]), mean, rtol=0, atol=1e-10)
     np.testing.assert_allclose(process.deviation(places()[0]), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
 
@@ -66,11 +68,11 @@ def test_no_data_is_the_prior_and_so_is_what_lies_far_from_all_data_but_for_what
     made = reaches()
     fresh = GaussianProcess(made)
     covariance = Covariance(joint_squares(made), usual(made))
-    np.testing.assert_allclose(fresh.mean(places()[0]), FIRST_MEAN)
+    np.testing.assert_allclose(fresh.mean(places()[0]), LinearArm(made).rewards(np.arange(len(made)), places()[0]))
     np.testing.assert_allclose(fresh.deviation(places()[0]), np.sqrt(covariance.prior))
     process = taught(GaussianProcess(made, refits=()), drawn(made, 100))
-    far = process.mean(FAR)
-    np.testing.assert_allclose(far, np.full(len(made), far[0]), rtol=1e-12)
+    far = process.mean(FAR) - LinearArm(made).rewards(np.arange(len(made)), FAR)
+    np.testing.assert_allclose(far, np.full(len(made), far[0]), rtol=0, atol=1e-9)
     own = covariance.prior - 0.3**2
     assert (process.deviation(FAR) ** 2 > own).all()
     assert (process.deviation(FAR) ** 2 < covariance.prior).all()
