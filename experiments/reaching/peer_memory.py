@@ -53,7 +53,8 @@ class PeerMemory:
     def of(self, target: ReachTarget) -> tuple[Array, Array]:
         """What is to be kept away from: all, and what is left if that leaves no way, which is this target's alone; (B, d) rad each."""
         here = self._at_target.get(place_of(target), [])
-        return tuple(np.array(poses).reshape(-1, len(self._span)) for poses in (self._for_good + here, here))
+        everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._for_good + here, here))
+        return everything, alone
 
 
 def place_of(target: ReachTarget) -> bytes:
