@@ -87,7 +87,7 @@ def summary(done: Mapping[str, CellResult]) -> dict[str, Any]:
             if len(learner) and learner.shape == peer.shape:
                 each = crossover(tries, learner, peer)
                 text = ", ".join("never" if np.isinf(n) else f"{n:.0f}" for n in each)
-                crossings.append({"hidden from": wrong, "peer remembers": memory, "tries until the learner is not below it, by seed": text})
+                crossings.append({"hidden from": wrong, "peer remembers": memory, "learner no lower after [tries]": text})
     return {"success": rows, "crossover": crossings}
 
 

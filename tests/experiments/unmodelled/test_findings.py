@@ -74,5 +74,5 @@ def test_the_learner_has_crossed_over_where_it_is_not_below_the_peer_for_good():
 def test_the_table_has_a_row_of_everyone_and_says_where_nobody_crossed_over():
     table = summary(sweep([0.2, 0.4, 0.8], peers()))
     assert len(table["success"]) == 12 and table["success"][0]["success at 800"].startswith("0.80")
-    texts = {row["peer remembers"]: row["tries until the learner is not below it, by seed"] for row in table["crossover"]}
+    texts = {row["peer remembers"]: row["learner no lower after [tries]"] for row in table["crossover"]}
     assert set(texts["missed"].split(", ")) == {"never"} and set(texts["none"].split(", ")) == {"800"}
