@@ -27,6 +27,7 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
     if not runs:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
     drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 4.6)
+    drawing.get_layout_engine().set(w_pad=0.1)  # inches: labels do not touch the panel before
     above, middle, below = drawing.subfigures(3, 1, height_ratios=[5.0, 2.6 * len(runs), 4.6])
     scores, costs, fails = above.subplots(1, 3, width_ratios=[2.0, 1.0, 2.0])
     _scores(scores, runs)
@@ -69,11 +70,18 @@ def _costs(axes: Any, runs: Mapping[str, Runs]) -> None:
 
 def _failures(axes: Any, runs: Mapping[str, Runs]) -> None:
     """Negative rewards by state-action, sorted: where each strategy's runs fail (fig. 8.8)."""
+    most = 0.0
     for name, mine in runs.items():
         mean = np.mean([one["failures"] for one in mine.values], axis=0).sum(axis=1)
+        most = max(most, float(mean.max()))
         axes.step(range(len(mean)), mean, color=COLORS[name], where="mid", label=f"{TITLES[name]}: {mean.sum():.0f} a run", linewidth=1.0)
-    axes.set(xlabel="state in which the transition begins", ylabel="negative rewards, mean of the runs", title="fig. 8.8", yscale="symlog")
-    axes.legend(fontsize=8)
+    axes.set(xlabel="state in which the transition begins", ylabel="negative rewards, mean of the runs", title="fig. 8.8")
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.set(ylim=(0.0, 4.0 * most + 1.0))
+    ticks = [0, *(each for each in (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if each < 2.0 * most)]
+    axes.set_yticks(ticks, [f"{each:g}" for each in ticks])
+    axes.minorticks_off()
+    axes.legend(fontsize=8, loc="upper center")
 
 
 def _choices(axes: Any, mine: Runs, look: int, title: str) -> None:

@@ -44,7 +44,9 @@ def _pose(axes: Any, state: int) -> None:
     axes.plot(*grid().T, "o", color="tab:green", markersize=5.0, alpha=0.6)
     axes.set(xlabel="x", ylabel="y", zlabel="z", xlim=(-0.45, 0.25), ylim=(-0.2, 0.5), zlim=(-0.15, 0.55))
     axes.view_init(20.0, 145.0)
-    axes.tick_params(labelsize=6)
+    axes.set(xticks=(-0.4, -0.2, 0.0, 0.2), yticks=(-0.2, 0.0, 0.2, 0.4), zticks=(0.0, 0.2, 0.4))
+    axes.tick_params(labelsize=7, pad=0)
+    axes.set_box_aspect(None, zoom=0.85)  # so that the label of z is in the picture
 
 
 def _axis(position: Array, rotation: Array, length: float) -> Array:
