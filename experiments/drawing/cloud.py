@@ -18,8 +18,9 @@ from mobee.pose import Pose
 from mobee.robot.robot import Array
 
 RADIUS = 0.0045  # m, of a point
-LOW, HIGH = np.array([0.10, 0.28, 0.62]), np.array([0.99, 0.70, 0.20])  # colours of the least and the largest value
-MIDDLE = np.array([0.20, 0.66, 0.56])
+LOW, HIGH = np.array([0.16, 0.42, 0.92]), np.array([1.00, 0.70, 0.12])  # colours of the least and the largest value
+MIDDLE = np.array([0.20, 0.78, 0.58])
+VEILED = 0.2
 GROUP = -3
 
 
@@ -52,7 +53,7 @@ def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
     """The robot in a pose, the world about it, and the points (P, 3) m in the colours of their values (P,)."""
     low, high = float(values.min()), float(values.max())
     shares = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
-    points = [ball(place, RADIUS, _color(float(share)), group=GROUP) for place, share in zip(places, shares, strict=True)]
+    points = [ball(place, RADIUS, _color(float(share)), VEILED, GROUP) for place, share in zip(places, shares, strict=True)]
     return [*robot_solids(pose, bright=()), *object_solids(pose.objects), *points]
 
 
