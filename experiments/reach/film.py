@@ -10,6 +10,7 @@ targets drawn at random, each from a random state, those are drawn that tell mos
 from __future__ import annotations
 
 import argparse
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from experiments.drawing.camera import axes_named
 from experiments.drawing.filmstrip import Strip, filmstrip
 from experiments.drawing.motion import Motion, recorded
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.reach.telling import selected
 from experiments.reaching.scene import LEARNED, MARKER, PART
 from experiments.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
@@ -30,15 +32,12 @@ from mobee.learning.reaching.load import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget
-from mobee.robot.robot import Array
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60
 REACHED = 0.02  # m from the target's surface
-LAST = 0.10  # m of the way, from the end: whether it is from above
 NEAR = 0.002  # m: the hand has arrived
 VIEWS = ("oblique", "left")
-LEAST = 0.15  # m: the shortest way that is shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +56,7 @@ def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
     return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
 
 
-def learn(file: Path, seed: int, tries: int = TRIES, transitions: int = LEARNED) -> None:
+def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = LEARNED) -> None:
     """Learn transitions and then reaches at the table, on record in a file."""
     plant = table_plant(seed)
     space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)
@@ -93,40 +92,6 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
             away = np.linalg.norm(motion.way(agent.marker) - target.position, axis=1)
             found.append(Episode(target, done, motion.part(0, int(np.argmax(away <= away.min() + NEAR)))))
     return found
-
-
-def selected(ways: Sequence[Array]) -> dict[str, int]:
-    """Which of the ways (T, 3) m tells most of each kind, no way for two."""
-    left = [number for number, way in enumerate(ways) if _length(way) >= LEAST]
-    chosen: dict[str, int] = {}
-    for name, much in KINDS.items():
-        if left:
-            chosen[name] = left.pop(int(np.argmax([much(ways[number]) for number in left])))
-    return chosen
-
-
-def _length(way: Array) -> float:
-    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-
-
-def _descent(way: Array) -> float:
-    """How steeply the last piece of the way goes down: 1 straight, 0 level."""
-    before = way[np.linalg.norm(way - way[-1], axis=1) >= LAST]
-    if not len(before):
-        return -np.inf
-    return float((before[-1] - way[-1])[2] / np.linalg.norm(before[-1] - way[-1]))
-
-
-def _distance(way: Array) -> float:
-    return float(np.linalg.norm(way[-1] - way[0]))
-
-
-def _detour(way: Array) -> float:
-    """How many times as long as straight."""
-    return _length(way) / max(float(np.linalg.norm(way[-1] - way[0])), LAST)
-
-
-KINDS = {"From above": _descent, "Far": _distance, "Around the target": _detour}
 
 
 def _strip(name: str, one: Episode, marker: str, poses: int) -> Strip:
@@ -167,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Draw selected reaches of what was learned.")
     parser.add_argument("run", nargs="?", type=Path, metavar="RUN.sqlite", help="who learned; made if not there (default: made, not kept)")
     parser.add_argument("--out", type=Path, default=Path("reach_film.png"), metavar="PNG", help="default: %(default)s")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: %(default)s")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the states and targets (default: %(default)s)")
     parser.add_argument("--poses", type=int, default=6, metavar="N", help="pictures of each reach (default: %(default)s)")
     parser.add_argument("--height", type=int, default=260, metavar="PIXELS", help="of each picture (default: %(default)s)")
     options = parser.parse_args(argv)
@@ -175,7 +140,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         file = options.run or Path(folder) / "run.sqlite"
         try:
             if not file.exists():
-                learn(file, options.seed)
+                learn(Path(folder) / "learning.sqlite")
+                shutil.move(Path(folder) / "learning.sqlite", file)  # whole, or not there
             titles = film(file, options.out, options.seed, options.poses, options.height)
         except MobeeError as error:
             raise SystemExit(str(error)) from None

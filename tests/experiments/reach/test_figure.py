@@ -11,8 +11,9 @@ from experiments.sweep import Cell
 from tests.experiments.reach.test_findings import runs
 
 
-def test_a_run_is_drawn(tmp_path):
+def test_a_run_is_drawn(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
+    monkeypatch.setattr("experiments.reach.poses.HEIGHT", 40)  # small pictures take no time
     found = {}
     for strategy, mine in runs().items():
         for seed, values in enumerate(mine.values[:2]):
