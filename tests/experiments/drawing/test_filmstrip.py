@@ -101,6 +101,7 @@ def test_a_filmstrip_has_a_row_a_view_of_equal_pictures_and_captions_below_the_l
 
 
 def test_a_filmstrip_is_written_as_one_picture(motion: Motion, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
     path = filmstrip([Strip(motion.part(0, 5), PALM, poses=2, title="a motion")], tmp_path / "film.png", height=50)
     assert path.read_bytes().startswith(b"\x89PNG")
 
@@ -113,6 +114,7 @@ def test_a_cloud_has_a_point_where_the_marker_is_in_each_pose_coloured_by_its_va
 
 
 def test_a_cloud_is_written_and_needs_one_value_a_pose(model: mobee.Model, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
     q = np.tile(model.robot.home, (4, 1))
     assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=("top",), height=30).stat().st_size > 0
     with pytest.raises(InvalidValue, match="one value a pose"):

@@ -33,6 +33,7 @@ def test_episodes_show_the_target_all_the_time_end_with_the_hand_at_it_and_leave
 def test_the_command_draws_what_a_run_has_learned(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    pytest.importorskip("matplotlib")
     monkeypatch.setattr("experiments.reach.film.EPISODES", 4)
     main([str(run), "--out", str(tmp_path / "film.png"), "--poses", "2", "--height", "30"])
     assert (tmp_path / "film.png").stat().st_size > 1000
