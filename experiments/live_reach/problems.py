@@ -19,8 +19,10 @@ DRAWS = 1000
 AWAY = ReachTarget(np.array([0.0, 0.0, 10.0]))
 GRID, FRESH, TARGET_MOVES, OBSTACLE_MOVES = "grid", "fresh", "target moves", "obstacle moves"
 SPEED = 0.03  # m/s, of what moves
-FAR, NEAR = 0.15, 0.1  # m: how far a target moves; how near an obstacle comes to the target at most, measured from surface to surface
-OBSTACLE = 0.04  # m, its radius
+FAR = 0.15  # m that a target moves, and an obstacle to either side
+OBSTACLE, CLEAR = 0.04, 0.05  # m, its radius, and how far its surface stays from that of the target
+SPARE = 6  # fresh targets a problem
+WAYS = 8  # across, that are drawn
 
 
 class Problem(Struct, frozen=True):
@@ -79,7 +81,7 @@ def fresh_problems(seed: int, count: int) -> list[Problem]:
 def moving_problems(seed: int, count: int) -> list[Problem]:
     """Fresh targets that move, as many with an obstacle that crosses the way of the hand."""
     rng, known, found = np.random.default_rng([seed, 51]), belief(), list[Problem]()
-    for problem in fresh_problems(seed + 1000, 4 * count):
+    for problem in fresh_problems(seed + 1000, SPARE * count):
         if len(found) < count:
             to = rng.uniform(-1.0, 1.0, 3)
             other = problem.target.position + FAR * to / np.linalg.norm(to)
@@ -93,21 +95,25 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
 
 
 def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> list[list[float]] | None:
-    """Ends of a way through the middle between hand and target, across: none that comes too near to the target or through the body."""
+    """Ends of a way through the middle between hand and target, across it, that stays clear of the target and ends clear of the arm."""
     start = np.array(problem.start)[: len(known.columns)]
     target, hand = problem.target, known.model.evaluate(known.whole(start)).position(known.marker)
     out = target.position - hand
-    across = np.cross(out, rng.normal(size=3))
-    ends = [hand + 0.5 * out + sign * FAR * across / np.linalg.norm(across) for sign in (1.0, -1.0)]
-    known.present(target)
-    for share in np.linspace(0.0, 1.0, 9):
-        there = ReachTarget(ends[0] + share * (ends[1] - ends[0]), OBSTACLE + NEAR)
-        known.present(there)
-        if np.linalg.norm(there.position - target.position) < there.radius + target.radius:
+    for _ in range(WAYS):
+        across = np.cross(out, rng.normal(size=3))
+        ends = hand + 0.5 * out + FAR * np.array([[1.0], [-1.0]]) * across / np.linalg.norm(across)
+        places = ends[0] + np.linspace(0.0, 1.0, 9)[:, None] * (ends[1] - ends[0])
+        if np.linalg.norm(places - target.position, axis=1).min() < OBSTACLE + target.radius + CLEAR:
             return None
-        if not known.sound(start[None])[0] and share in (0.0, 1.0):
-            return None
-    return [end.tolist() for end in ends]
+        if all(_is_clear(known, start, end) for end in ends):
+            return [end.tolist() for end in ends]
+    return None
+
+
+def _is_clear(known: PeerBelief, start: Array, place: Array) -> bool:
+    """Whether an obstacle there touches nothing of the robot in that pose."""
+    known.present(ReachTarget(place, OBSTACLE + CLEAR))
+    return bool(known.sound(start[None])[0])
 
 
 def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: np.random.Generator) -> Problem:

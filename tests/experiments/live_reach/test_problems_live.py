@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.live_reach.problems import GRID, fresh_problems, grid_problems, grid_targets, touchable
-from experiments.live_reach.settings import WRIST, belief
+from experiments.live_reach.problems import (
+    GRID,
+    OBSTACLE_MOVES,
+    TARGET_MOVES,
+    fresh_problems,
+    grid_problems,
+    grid_targets,
+    moving_problems,
+    touchable,
+)
+from experiments.live_reach.settings import MARKER, WRIST, belief
 
 
 def test_of_the_27_targets_21_can_be_touched_and_no_other_solid_is_in_the_way() -> None:
@@ -27,3 +36,13 @@ def test_the_grid_has_all_27_each_with_a_start_of_its_own() -> None:
     problems = grid_problems(0)
     assert [(one.kind, one.number) for one in problems] == [(GRID, number) for number in range(27)]
     assert len({tuple(one.start) for one in problems}) == 27
+
+
+def test_an_obstacle_crosses_the_way_of_the_hand_clear_of_target_and_arm() -> None:
+    known, problems = belief(), moving_problems(0, 2)
+    assert [one.kind for one in problems] == [TARGET_MOVES] * 2 + [OBSTACLE_MOVES] * 2
+    for one in problems[2:]:
+        hand = known.model.evaluate(known.whole(np.array(one.start[:WRIST]))).position(MARKER)
+        first, last = np.array(one.way)
+        assert np.allclose(0.5 * (first + last), 0.5 * (hand + one.position))
+        assert abs((last - first) @ (hand - one.position)) < 1e-9
