@@ -63,9 +63,15 @@ def _write(figure: Any, path: Path, colors: int) -> None:
     written = io.BytesIO()
     figure.savefig(written, dpi=DPI, format="png")
     image = Image.open(written).convert("RGB")
-    shades, counts = np.unique(np.asarray(image).reshape(-1, 3), axis=0, return_counts=True)
+    pixels = np.asarray(image)
+    shades, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
     palette = Image.fromarray(np.repeat(shades, np.ceil(np.sqrt(counts)).astype(int), axis=0)[None]).quantize(colors, kmeans=2)
     entries = np.array(palette.getpalette()).reshape(-1, 3)
-    entries[entries.sum(axis=1).argmax()] = 255
+    white = int(entries.sum(axis=1).argmax())
+    entries[white] = 255
     palette.putpalette(entries.ravel().tolist())
-    image.quantize(palette=palette, dither=Image.Dither.NONE).save(path, optimize=True)
+    chosen = np.array(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    chosen[(pixels == 255).all(axis=2)] = white
+    found = Image.fromarray(chosen)
+    found.putpalette(entries.ravel().tolist())
+    found.save(path, optimize=True)

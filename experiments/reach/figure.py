@@ -26,9 +26,9 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
     runs = runs_of(found)
     if not runs:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
-    drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 4.6)
+    drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 3.9)
     drawing.get_layout_engine().set(w_pad=0.1)  # inches: labels do not touch the panel before
-    above, middle, below = drawing.subfigures(3, 1, height_ratios=[5.0, 2.6 * len(runs), 4.6])
+    above, middle, below = drawing.subfigures(3, 1, height_ratios=[5.0, 2.6 * len(runs), 3.9])
     scores, costs, fails = above.subplots(1, 3, width_ratios=[2.0, 1.0, 2.0])
     _scores(scores, runs)
     _costs(costs, runs)

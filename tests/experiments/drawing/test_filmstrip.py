@@ -102,8 +102,13 @@ def test_a_filmstrip_has_a_row_a_view_of_equal_pictures_and_captions_below_the_l
 
 def test_a_filmstrip_is_written_as_one_picture(motion: Motion, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
+    from PIL import Image
+
     path = filmstrip([Strip(motion.part(0, 5), PALM, poses=2, title="a motion")], tmp_path / "film.png", height=50)
-    assert path.read_bytes().startswith(b"\x89PNG")
+    with Image.open(path) as picture:
+        pixels = np.asarray(picture.convert("RGB"))
+    assert (pixels[0] == 255).all() and len(pixels) == 50 + 22 + 30 + 20  # picture, caption, title, margins
+    assert (np.ptp(pixels.astype(int), axis=2) > 60).any()  # the trail and the arm are in colour
 
 
 def test_a_cloud_has_a_point_where_the_marker_is_in_each_pose_coloured_by_its_value(motion: Motion, model: mobee.Model) -> None:
