@@ -222,7 +222,7 @@ class Transition(Message, frozen=True, kw_only=True):
     a: Count
     goal: Count  # state the action meant to reach
     s_next: Count
-    reward: float  # 'Kail' divergence, nats
+    reward: float  # 'Kail' divergence, nats; of an agent that reaches 0, or the penalty of a failure
     value: float  # V(s) before the action
     settled: bool
     duration: float  # s
@@ -246,7 +246,7 @@ class Learned(Message, frozen=True, kw_only=True):
     s: Count  # where it is
     space: Annotated[str, Meta(max_length=1_000_000)]  # JSON of the space's settings, from which it can be made again
     tries: bytes  # (S A) little-endian uint32; 0 too where a state has no such action
-    reward: bytes  # (S A) little-endian float32, nats; -inf where a state has no such action
+    reward: bytes  # (S A) little-endian float32, nats, or failures as in Transition; -inf where a state has no such action
     value: bytes  # (S A) little-endian float32, of the plan; -inf likewise
     surprises: list[Surprise]
 

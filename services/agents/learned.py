@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
 
 import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import Learned, Surprise
-from mobee import CuriousAgent, TransitionModel
+from mobee import TransitionModel
+from mobee.robot.robot import Array
 from services.common.bus import Bus
 from services.common.delivery import NEWEST
 
@@ -20,27 +23,29 @@ MOST = 2000  # surprises in a message: more cannot be told apart in a picture
 class LearnedStream:
     """Puts `Learned` after a transition, unless the last one is too recent."""
 
-    def __init__(self, bus: Bus, agent: CuriousAgent) -> None:
-        self._agent = agent
-        self._space = json.dumps(agent.space.settings)
-        self._stream = bus.publisher(keys.learned(agent.part), Learned, NEWEST)
+    def __init__(self, bus: Bus, model: TransitionModel) -> None:
+        """`model`: of what the agent has observed."""
+        self._model, self._part = model, model.space.part
+        self._space = json.dumps(model.space.settings)
+        self._stream = bus.publisher(keys.learned(self._part), Learned, NEWEST)
         self._next = -np.inf  # s, monotonic clock
 
-    def put(self, now: float) -> None:
-        """Tell, if it is time."""
+    def put(self, n: int, s: int, numbers: Callable[[], tuple[Array, Array]]) -> None:
+        """Tell, if it is time.  `n`, `s`: as in `Learned`; `numbers`: rewards and values (S, A)."""
+        now = time.monotonic()
         if now < self._next:
             return
         self._next = now + PERIOD
-        agent, model = self._agent, self._agent.model
+        reward, value = numbers()
         self._stream.put(
-            agent=agent.part,
-            n=agent.transitions,
-            s=agent.state,
+            agent=self._part,
+            n=n,
+            s=s,
             space=self._space,
-            tries=model.tries.astype("<u4").tobytes(),
-            reward=model.reward.astype("<f4").tobytes(),
-            value=agent.plan()[1].astype("<f4").tobytes(),
-            surprises=surprises(model),
+            tries=self._model.tries.astype("<u4").tobytes(),
+            reward=reward.astype("<f4").tobytes(),
+            value=value.astype("<f4").tobytes(),
+            surprises=surprises(self._model),
         )
 
 

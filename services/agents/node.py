@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Literal
 
@@ -54,7 +53,7 @@ class AgentNode:
             goal_weight=config.goal_weight or None,
         )
         self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
-        self._learned = LearnedStream(service.bus, self._agent)
+        self._learned = LearnedStream(service.bus, self._agent.model)
         self._work = Work(service, plant)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
@@ -89,7 +88,8 @@ class AgentNode:
             duration=made.duration,
             touched=list(made.touched),
         )
-        self._learned.put(time.monotonic())
+        agent = self._agent
+        self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 
     def _mark(self) -> None:
         self._made = self._timeouts = self._work.interrupted = 0

@@ -14,6 +14,7 @@ from mobee.robot.robot import Robot
 from mobee.store import STORE
 from services.agents.config import Config
 from services.agents.node import published_space
+from services.agents.reach_stream import ReachStream
 from services.agents.work import Work
 from services.common.bus_plant import BusPlant
 from services.common.service import Service
@@ -40,6 +41,7 @@ class ReachNode:
             seed=config.seed,
             store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
         )
+        self._told = ReachStream(service.bus, self._agent)
         self._work = Work(service, plant)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
@@ -56,7 +58,14 @@ class ReachNode:
             target = agent.problems.least_tried(self._targets, agent.problem_draws())
         else:
             target = agent.problems.targets[agent.under_way]
-        made = agent.try_problem(target)
+        agent.begin(target)
+        agent.plant.present(target)
+        while agent.under_way is not None:
+            plan = agent.planned()
+            self._told.put(agent.step(), target, plan)
+        made = agent.last
+        if made is None:
+            return
         self._made += 1
         self._failures += made.failures
         self._reached += made.reach_state is not None

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bus_schema import VERSION, keys
-from bus_schema.messages import Event, Reach
+from bus_schema.messages import Event, Learned, Reach, Transition
 from bus_schema.rpc import AddObject, Done, OneName, ReachFor, Started
 from mobee import load_robot
 from mobee.reach import TARGET
@@ -86,7 +87,7 @@ def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: t
     made, controller = stage
     stored: list[int] = []
     controller.on_goal = lambda goal: stored.append(len(steps(made)))
-    assert agent(made, "--tries", "4").wait(30.0) == 0
+    assert agent(made, "--tries", "4", "--strategy", "random").wait(30.0) == 0
     kept = steps(made)
     assert len(kept) == len(controller.goals) + len(controller.reaches)
     moves = [row["n"] - 1 for row in kept if row["a"] >= 0]
@@ -96,6 +97,25 @@ def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: t
     assert all(row["missing"] == MISSING and row["reward"] == pytest.approx(1.0 / 3.0) for row in reached)
     assert {(asked.marker, asked.object, asked.stay) for asked in controller.reaches} == {("right_palm", TARGET, False)}
     assert [asked.position for asked in controller.reaches] == controller.presented
+
+
+def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, FakeReaches]) -> None:
+    made, _ = stage
+    transitions = made.record(keys.transition("right_arm"), Transition)
+    learned = made.record(keys.learned("right_arm"), Learned)
+    assert agent(made, "--tries", "4", "--strategy", "random").wait(30.0) == 0
+    kept = [row for row in steps(made) if row["a"] >= 0]
+    wait_for(lambda: len(transitions) >= len(kept) > 0 and learned, "what was done to be told")
+    assert [(seen.n, seen.s, seen.a, seen.s_next, seen.reward, seen.settled) for seen in transitions] == [
+        (n, row["s"], row["a"], row["s_next"], row["reward"], bool(row["settled"])) for n, row in enumerate(kept, 1)
+    ]
+    told = learned[0]
+    tries, value = np.frombuffer(told.tries, "<u4").reshape(81, 16), np.frombuffer(told.value, "<f4").reshape(81, 16)
+    expected = np.zeros((81, 16), dtype=int)
+    for row in kept[: told.n]:
+        expected[row["s"], row["a"]] += 1
+    np.testing.assert_array_equal(tries, expected)
+    assert value.max() > 0.0 and told.agent == "right_arm"
 
 
 def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeReaches]) -> None:

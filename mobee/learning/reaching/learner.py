@@ -96,14 +96,22 @@ class ReachLearner:
             self._end()
             self._problem = problem
 
+    def planned(self) -> tuple[Array, Array]:
+        """V (S,) and Q (S, A + 1) of the plan of the problem-try under way, see `ReachPlanning.values`; InvalidValue between two."""
+        if self._plan is None:
+            if self._worth is None:
+                self._worth = self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries))
+            self._plan = self.planning.values(self._worth, self.failures.rewards(self._target))
+        return self._plan
+
     def decide(self, state: int) -> int:
         """The action to take in a state, or REACH."""
-        chosen = choose(self._planned()[1][state], self._draws.at(self.seed, self.steps))
+        chosen = choose(self.planned()[1][state], self._draws.at(self.seed, self.steps))
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
         """Whether a transition did not climb the values of the plan under way."""
-        return has_failed(self._planned()[0], state, following)
+        return has_failed(self.planned()[0], state, following)
 
     def expected(self, state: int) -> float:
         """The reward expected of reaching from a state, for the target of the problem-try."""
@@ -132,7 +140,7 @@ class ReachLearner:
                 self._end()
                 self.begin(targets[step.problem])
             if under_way and step.number == under_way[0].number:
-                self._planned()
+                self.planned()
             self.observe(step)
 
     def problem_draws(self) -> np.random.Generator:
@@ -154,13 +162,6 @@ class ReachLearner:
             self.planning.refresh()
         if step.failed:
             self._plan = None
-
-    def _planned(self) -> tuple[Array, Array]:
-        if self._plan is None:
-            if self._worth is None:
-                self._worth = self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries))
-            self._plan = self.planning.values(self._worth, self.failures.rewards(self._target))
-        return self._plan
 
     def _end(self) -> None:
         if self._problem is not None and self._made:

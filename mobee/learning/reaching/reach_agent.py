@@ -99,7 +99,7 @@ class ReachAgent(ReachLearner):
         self.begin(target)
         self.plant.present(target)
         while self.under_way is not None:
-            self._step()
+            self.step()
         assert self.last is not None
         return self.last
 
@@ -124,7 +124,8 @@ class ReachAgent(ReachLearner):
         finally:
             self._state = None
 
-    def _step(self) -> None:
+    def step(self) -> Step:
+        """One action of the problem-try under way, whose target is presented; raises ActionInterrupted if the plant does."""
         state = self.state
         action = self.decide(state)
         self._state = None  # whatever breaks off the action, or its record
@@ -133,6 +134,7 @@ class ReachAgent(ReachLearner):
             self.store.append(step, self.problems.targets)
         self.observe(step)
         self._state = step.s_next
+        return step
 
     def _moved(self, state: int, action: int) -> Step:
         outcome, following = move(self.plant, self.space, state, action)
