@@ -87,7 +87,7 @@ def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: t
     made, controller = stage
     stored: list[int] = []
     controller.on_goal = lambda goal: stored.append(len(steps(made)))
-    assert agent(made, "--tries", "4", "--strategy", "random").wait(30.0) == 0
+    assert agent(made, "--tries", "4", "--strategy", "random").wait(60.0) == 0
     kept = steps(made)
     assert len(kept) == len(controller.goals) + len(controller.reaches)
     moves = [row["n"] - 1 for row in kept if row["a"] >= 0]
@@ -103,7 +103,7 @@ def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, Fak
     made, _ = stage
     transitions = made.record(keys.transition("right_arm"), Transition)
     learned = made.record(keys.learned("right_arm"), Learned)
-    assert agent(made, "--tries", "4", "--strategy", "random").wait(30.0) == 0
+    assert agent(made, "--tries", "4", "--strategy", "random").wait(60.0) == 0
     kept = [row for row in steps(made) if row["a"] >= 0]
     wait_for(lambda: len(transitions) >= len(kept) > 0 and learned, "what was done to be told")
     assert [(seen.n, seen.s, seen.a, seen.s_next, seen.reward, seen.settled) for seen in transitions] == [
@@ -125,7 +125,7 @@ def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeR
     wait_for(lambda: len(controller.reaches) >= 3, "three reaches")
     assert first.stop(signal.SIGKILL) == -signal.SIGKILL
     before = steps(made)
-    assert agent(made, "--tries", "6").wait(30.0) == 0
+    assert agent(made, "--tries", "6").wait(60.0) == 0
     assert steps(made)[: len(before)] == before
     assert sum(row["a"] < 0 for row in steps(made)) == 6
     assert [event.code for event in events] == ["resumed"]
@@ -136,6 +136,6 @@ def test_a_predictor_that_there_is_none_of_is_told_in_one_line(stage: tuple[Rig,
     program = made.spawn(
         "-m", "services.agents", "--endpoint", made.endpoint, "--part", "right_arm", "--targets", *PLACES, "--predictor", "wieghted"
     )
-    assert program.wait(20.0) == 2
+    assert program.wait(60.0) == 2
     assert "Did you mean 'weighted'?" in program.says
     assert "Traceback" not in program.says
