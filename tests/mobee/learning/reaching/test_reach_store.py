@@ -11,7 +11,7 @@ import pytest
 
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.store import ReachStore, reaching_parts
 from mobee.reach import ReachTarget
 from mobee.store import Transition, TransitionStore
 from tests.mobee.learning.reaching.toy import HANDS, PLACES, SPACE, TARGETS, agent, plant
@@ -88,6 +88,17 @@ def test_a_kill_leaves_all_that_was_reported(tmp_path):
     whole = agent(1, strategy="random")
     whole.learn(TARGETS, steps[-1].number - 1)
     assert again.tries in (whole.tries, whole.tries + 1) and whole.steps <= len(steps)
+
+
+def test_a_file_says_which_parts_have_reached(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with TransitionStore(path, PART):
+        pass
+    assert reaching_parts(path) == ()
+    with ReachStore(path, PART) as store:
+        assert reaching_parts(path) == ()
+        agent(store=store).try_problem(TARGETS[0])
+    assert reaching_parts(path) == (PART,)
 
 
 def test_problems_are_kept_whole(tmp_path):
