@@ -39,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--part", default="right_arm", help="what reaches (default: %(default)s)")
     parser.add_argument("--marker", metavar="NAME", help="what is put there (default: the part's palm)")
     parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="of the target [m] (default: %(default)g)")
-    parser.add_argument("--aim", choices=AIMS, default=AIMS[0], help="where on it the marker is to come (default: %(default)s)")
+    where = "where on it the marker is to come (default: the centre of a place, the surface of an object, which may be solid)"
+    parser.add_argument("--aim", choices=AIMS, help=where)
     parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that learned to reach, or its file {STORE}")
     parser.add_argument("--stay", action="store_true", help="stay there, instead of being drawn back")
     parser.add_argument("--offline", action="store_true", help="on the offline plant, the iCub at its table")
@@ -49,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reach, and tell how it went."""
+    if arguments.aim is None:
+        arguments.aim = "centre" if arguments.object is None else "surface"
     try:
         with _stage(arguments) as stage:
             result = _reach(arguments, stage)

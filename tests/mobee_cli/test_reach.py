@@ -57,7 +57,7 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest
 
 def test_an_object_of_the_world_is_reached_for_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     _, result = reach("--object", "ball", capsys=capsys)
-    assert result["target"] == {"position": [-0.35, 0.0, -0.07], "radius": 0.03, "aim": "centre"}
+    assert result["target"] == {"position": [-0.35, 0.0, -0.07], "radius": 0.03, "aim": "surface"}
 
 
 def test_an_object_inside_the_body_is_refused_as_a_place_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
