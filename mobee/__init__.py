@@ -16,7 +16,9 @@ from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
+from mobee.roadmap import costs
 from mobee.roadmap.nes import NES
+from mobee.roadmap.ngik import IK, solve_ik
 from mobee.roadmap.search import Restart, minimize
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
@@ -32,6 +34,7 @@ __all__ = [
     "Forces",
     "Gains",
     "Geometry",
+    "IK",
     "InvalidValue",
     "Lattice",
     "MobeeError",
@@ -62,6 +65,7 @@ __all__ = [
     "box",
     "capsule",
     "constraint_forces",
+    "costs",
     "cylinder",
     "join_robots",
     "load_robot",
@@ -71,6 +75,7 @@ __all__ = [
     "reach_path",
     "run",
     "run_batch",
+    "solve_ik",
     "sphere",
     "value_iteration",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -125,6 +126,14 @@ class Pose:
             name: thing if thing.link is None else placed(thing, link_pose(self, thing.link))
             for name, thing in self._snapshot.objects.items()
         }
+
+    def each(self) -> Iterator[Pose]:
+        """The poses of a batch one by one; their contacts are found anew when they are asked for."""
+        transforms = self.transforms.reshape(-1, *self.transforms.shape[-3:])
+        for q, placed_links in zip(self._flat, transforms, strict=True):
+            one = Pose(self.robot, self._engine, q, self._snapshot, self._reaching)
+            one._transforms = placed_links
+            yield one
 
     def feel(self, finder: Finder) -> None:
         """Have the contacts found now, and by other means than the model's own."""

@@ -24,6 +24,7 @@ MODULES = (
     "mobee.learning.sweeps",
     "mobee.learning.gains",
     "mobee.learning.reaching.sums",
+    "mobee.engine.descent",
     "mobee.engine.evaluate",
 )
 PATIENCE = 300.0  # s that a process waits for another that compiles

@@ -66,9 +66,10 @@ class Search:
         first = np.array(start, dtype=np.float64)
         if limits is None and restart is not None:
             raise InvalidValue("a restart begins at a random place of the box, so it needs limits (d, 2).")
-        self._low, self._width = np.zeros(first.shape), np.ones(first.shape)
+        self._low, self._high = np.zeros(first.shape), np.ones(first.shape)
         if limits is not None:
-            self._low, self._width = _box(limits, first)
+            self._low, self._high = _box(limits, first)
+        self._width = self._high - self._low
         self._boxed = limits is not None
         self._restart = restart
         self._rng = np.random.default_rng(seed)
@@ -88,13 +89,12 @@ class Search:
     def ask(self) -> Array:
         """The next generation, (population, d), inside the box."""
         places = self._nes.ask()
-        if self._boxed:
-            inside = np.clip(places, 0.0, 1.0)
-            self._beyond = ((places - inside) ** 2).sum(axis=1)
-            # Rounding must not leave the box either.
-            self._asked = np.clip(self._low + inside * self._width, self._low, self._low + self._width)
-        else:
+        if not self._boxed:
             self._asked = places
+            return places
+        inside = np.minimum(np.maximum(places, 0.0), 1.0)
+        self._beyond = ((places - inside) ** 2).sum(axis=1)
+        self._asked = np.minimum(self._low + inside * self._width, self._high)  # rounding must not leave the box either
         return self._asked
 
     def tell(self, costs: ArrayLike) -> None:
@@ -148,10 +148,10 @@ def minimize(
 
 
 def _box(limits: ArrayLike, start: Array) -> tuple[Array, Array]:
-    """Its low corner and its widths."""
+    """Its low and its high corner."""
     box = np.array(limits, dtype=np.float64)
     if box.shape != (*start.shape, 2) or not np.isfinite(box).all() or not (box[:, 0] < box[:, 1]).all():
         raise InvalidValue(
             f"limits have shape {box.shape}; they must be ({len(start)}, 2) finite numbers, the first of a row below the second."
         )
-    return box[:, 0], box[:, 1] - box[:, 0]
+    return box[:, 0], box[:, 1]

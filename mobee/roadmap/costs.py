@@ -1,0 +1,240 @@
+"""Costs of poses: those of thesis table 3.1, and more; any plain function of pose and contacts is one too.
+
+A term weighs about 1 at ten times its tolerance.  Angles are in rad, places in m in the root frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.collision.contact import ContactTable
+from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
+from mobee.errors import InvalidValue
+from mobee.pose import Pose
+from mobee.roadmap.centre_of_mass import centre_of_mass
+from mobee.roadmap.function import Function
+from mobee.roadmap.term import Aim, Residual, Term, angle_between
+from mobee.robot.robot import Array, Robot
+
+PER_METRE, PER_RAD, PER_DEPTH = 20.0, 2.0, 20.0
+METRES, RADIANS = 0.005, float(np.deg2rad(5.0))
+_NONE, _UPRIGHT = np.zeros(3), np.eye(3)
+
+
+def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Put a marker on a place (3,) m (table 3.1)."""
+    goal = _vector("place", place)
+
+    def residual(pose: Pose) -> Array:
+        return _length(pose.position(marker) - goal)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        return (Aim(PLACE, m.link, m.position, _UPRIGHT, 0, goal, _UPRIGHT),)
+
+    return _term(f"position {marker}", residual, weight, tolerance, aims)
+
+
+def orientation(marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Let a marker's normal point along a direction (3,), or turn the whole marker to a rotation (3, 3) (table 3.1).
+
+    The residual is the angle between them: u.u* + 1, as printed, is that of opposite directions, and flat at both its ends.
+    """
+    wanted = np.array(goal, dtype=np.float64)
+    if wanted.shape == (3, 3):
+        return _rotation(marker, wanted, tolerance, weight)
+    direction = _unit("goal", wanted)
+
+    def residual(pose: Pose) -> Array:
+        return angle_between(pose.normal(marker), direction)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        return (Aim(ALONG, m.link, m.position, _frame(m.normal), 0, _NONE, _frame(direction)),)
+
+    return _term(f"orientation {marker}", residual, weight, tolerance, aims)
+
+
+def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Hold two markers at a distance [m] from each other (table 3.1)."""
+
+    def residual(pose: Pose) -> Array:
+        found: Array = np.abs(_length(pose.position(first) - pose.position(second)) - distance)
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        a, b = robot.marker(first), robot.marker(second)
+        return (Aim(HOLD, a.link, a.position, _UPRIGHT, b.link, b.position, _UPRIGHT, distance),)
+
+    return _term(f"hold {first} {second}", residual, weight, tolerance, aims)
+
+
+def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Turn two markers' normals to each other: each points along the line to the other marker; the residual is the larger angle."""
+
+    def residual(pose: Pose) -> Array:
+        way = _units(pose.position(second) - pose.position(first))
+        found: Array = np.maximum(angle_between(pose.normal(first), way), angle_between(pose.normal(second), -way))
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        a, b = robot.marker(first), robot.marker(second)
+        return (
+            Aim(FACING, a.link, a.position, _frame(a.normal), b.link, b.position, _UPRIGHT),
+            Aim(FACING, b.link, b.position, _frame(b.normal), a.link, a.position, _UPRIGHT),
+        )
+
+    return _term(f"palm_to_palm {first} {second}", residual, weight, tolerance, aims)
+
+
+def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Let a marker's normal point to a place (3,) m, or to another marker."""
+    at = goal if isinstance(goal, str) else _vector("goal", goal)
+
+    def residual(pose: Pose) -> Array:
+        there = pose.position(at) if isinstance(at, str) else at
+        return angle_between(pose.normal(marker), _units(there - pose.position(marker)))
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        link, point = (robot.marker(at).link, robot.marker(at).position) if isinstance(at, str) else (0, at)
+        return (Aim(FACING, m.link, m.position, _frame(m.normal), link, point, _UPRIGHT),)
+
+    return _term(f"gaze {marker}", residual, weight, tolerance, aims)
+
+
+def collision(by: str = "depth", weight: float | None = None) -> Term:
+    """No solid contacts: by their summed depth [m], which tells the way out, or by their number |K| (table 3.1)."""
+    if by not in ("depth", "count"):
+        raise InvalidValue(f"collision by {by!r}: valid are 'depth' and 'count'.")
+
+    def residual(pose: Pose) -> Array:
+        table = pose.table
+        solid = table.kind == 0
+        depths = table.depth[solid] if by == "depth" else None
+        found: Array = np.bincount(table.pose[solid], depths, minlength=len(pose.q)).astype(np.float64)
+        return found
+
+    heavy = (PER_DEPTH if by == "depth" else 1.0) if weight is None else weight
+    return _term("collision", residual, heavy, 0.0)
+
+
+def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
+    """Stay near a posture (n,) rad, None: the robot's home; the residual is the distance in ranges of the motors (table 3.1)."""
+    given = None if posture is None else np.array(posture, dtype=np.float64)
+
+    def residual(pose: Pose) -> Array:
+        limits = pose.robot.limits
+        return _length((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
+
+    return _term("home", residual, weight, None)
+
+
+def comfort(weight: float = 0.5) -> Term:
+    """Keep away from the motors' limits: the mean of ((q - middle) / half range)^4, 1 where all motors are at a limit."""
+
+    def residual(pose: Pose) -> Array:
+        low, high = pose.robot.limits.T
+        found: Array = (((2.0 * pose.q - low - high) / (high - low)) ** 4).mean(axis=-1)
+        return found
+
+    return _term("comfort", residual, weight, None)
+
+
+def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
+    """Keep the centre of mass above a place (2,) m, None: where it is at home; the residual is horizontal [m]."""
+    above = None if place is None else np.array(place, dtype=np.float64)
+    if above is not None and above.shape != (2,):
+        raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")
+
+    def residual(pose: Pose) -> Array:
+        weighed = centre_of_mass(pose.robot)
+        return _length(weighed.of(pose.transforms)[..., :2] - (weighed.at_home[:2] if above is None else above))
+
+    return _term("balance", residual, weight, tolerance)
+
+
+def constraints(weight: float = PER_RAD) -> Term:
+    """Keep the robot's own linear constraints (thesis eqs. 5.14-5.17): the sum of what its clauses miss, rad."""
+
+    def residual(pose: Pose) -> Array:
+        missing: Array = np.zeros(pose.q.shape[:-1])
+        for clause in pose.robot.clauses:
+            missing = missing + np.maximum(0.0, -(pose.q @ clause.a.T + clause.b).max(axis=-1))
+        return missing
+
+    return _term("constraints", residual, weight, 0.0)
+
+
+def term(
+    function: Callable[[Pose, ContactTable], ArrayLike], tolerance: float | None = METRES, weight: float | None = None, name: str = ""
+) -> Term:
+    """A function of pose and contacts as a term; solved when it is no more than the tolerance, None: only as small as may be.
+
+    `function`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their
+    contacts, and returns N numbers; or it is written for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) and
+    returns one number: then it is called pose by pose, which takes longer.  `weight`: None: 1 at ten times the tolerance.
+    """
+    if not callable(function):
+        raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
+    if weight is None:
+        weight = 0.1 / tolerance if tolerance else 1.0
+    return _term(name or getattr(function, "__name__", "term"), Function(function), weight, tolerance)
+
+
+def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Term:
+    if not np.allclose(wanted @ wanted.T, np.eye(3), atol=1e-6) or np.linalg.det(wanted) < 0.0:
+        raise InvalidValue(f"goal of {marker!r} is no rotation: its rows must be a right-handed set of unit vectors.")
+
+    def residual(pose: Pose) -> Array:
+        apart = np.sqrt(((pose.rotation(marker) - wanted) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
+        angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
+        return angle
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        return (Aim(TURNED, m.link, m.position, m.rotation, 0, _NONE, wanted),)
+
+    return _term(f"orientation {marker}", residual, weight, tolerance, aims)
+
+
+def _term(
+    name: str, residual: Residual, weight: float, tolerance: float | None, aims: Callable[[Robot], tuple[Aim, ...]] | None = None
+) -> Term:
+    if not (np.isfinite(weight) and weight > 0.0):
+        raise InvalidValue(f"weight of {name!r} is {weight!r}; it must be finite and above 0.")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
+        raise InvalidValue(f"tolerance of {name!r} is {tolerance!r}; it must be finite and at least 0, or None.")
+    return Term(name, residual, weight, tolerance, aims)
+
+
+def _vector(name: str, given: ArrayLike) -> Array:
+    vector = np.array(given, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
+    return vector
+
+
+def _unit(name: str, given: Array) -> Array:
+    vector = _vector(name, given)
+    if not np.linalg.norm(vector) > 0.0:
+        raise InvalidValue(f"{name} is {given!r}; it must be a direction (3,), or a rotation (3, 3).")
+    return _units(vector)
+
+
+def _length(vectors: Array) -> Array:
+    length: Array = np.sqrt((vectors**2).sum(axis=-1))
+    return length
+
+
+def _units(vectors: Array) -> Array:
+    units: Array = vectors / np.maximum(_length(vectors)[..., None], 1e-12)
+    return units
+
+
+def _frame(direction: Array) -> Array:
+    """What an aim takes for a direction: the first three numbers count."""
+    return np.concatenate([direction, np.zeros(6)])

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.roadmap import costs
+from mobee.roadmap.least_squares import Descent, least_squares
+from mobee.roadmap.problem import Problem
+
+PALMS = "left_palm", "right_palm"
+
+
+def tight(term):
+    return dataclasses.replace(term, tolerance=1e-9)
+
+
+def terms_at(model: mobee.Model, q: np.ndarray) -> dict[str, object]:
+    """Terms that are met at q."""
+    pose = model.evaluate(q)
+    eyes, ahead = pose.position("head"), pose.normal("head")
+    left, right = (pose.position(name) for name in PALMS)
+    return {
+        "position": costs.position(PALMS[1], right),
+        "normal": costs.orientation(PALMS[1], pose.normal(PALMS[1])),
+        "rotation": costs.orientation(PALMS[0], pose.rotation(PALMS[0])),
+        "hold": costs.hold(*PALMS, float(np.linalg.norm(left - right))),
+        "gaze": costs.gaze(eyes + 0.3 * ahead),
+    }
+
+
+@pytest.mark.parametrize("name", ["position", "normal", "rotation", "hold", "gaze"])
+def test_near_a_solution_it_converges_at_once(free: mobee.Model, icub: mobee.Robot, name: str) -> None:
+    """The slopes are right: with a wrong one the last digits take many steps."""
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        goal = icub.limits.mean(axis=1) + 0.25 * rng.uniform(-1.0, 1.0, len(icub.motors)) * (icub.limits[:, 1] - icub.limits[:, 0])
+        start = goal + 0.05 * rng.standard_normal(len(goal))
+        term = tight(terms_at(free, goal)[name])
+        problem = Problem(free, [term], start, None)
+        met = Descent(problem).run(problem.start[None])
+        assert len(met) == 1 and problem.evaluations <= 10
+        assert term.residual(free.evaluate(met))[0] <= 1e-9
+
+
+def test_gaze_at_a_moving_marker_and_palms_that_face_each_other_converge(free: mobee.Model, icub: mobee.Robot) -> None:
+    for term in (costs.gaze("left_palm"), costs.palm_to_palm()):
+        problem = Problem(free, [tight(term)], None, None)
+        met = Descent(problem).run(problem.start[None])
+        assert len(met) == 1 and problem.evaluations <= 25
+        assert term.residual(free.evaluate(met))[0] <= 1e-9
+
+
+def test_all_terms_at_once(free: mobee.Model, icub: mobee.Robot) -> None:
+    terms = terms_at(free, icub.limits.mean(axis=1))
+    problem = Problem(free, list(terms.values()), None, None)
+    found = least_squares(problem, np.random.default_rng(0))
+    assert found is not None
+    pose = free.evaluate(found[None])
+    assert all(one.residual(pose)[0] <= one.tolerance for one in terms.values())
+
+
+def test_only_the_free_motors_move_and_all_stay_within_their_limits(free: mobee.Model, icub: mobee.Robot, postures: np.ndarray) -> None:
+    goal = free.evaluate(icub.limits[:, 1]).position("right_palm")  # in a corner of the box
+    problem = Problem(free, [costs.position("right_palm", goal)], None, ["torso", "r_elbow"])
+    starts = problem.whole(np.random.default_rng(0).uniform(*problem.limits.T, (20, 4)))
+    ends = starts.copy()
+    descent = Descent(problem)
+    descent._enough[:] = np.inf  # all ends, wherever they are
+    ends = descent.run(starts)
+    held = np.setdiff1d(np.arange(len(icub.motors)), problem.free)
+    assert len(ends) == 20
+    np.testing.assert_array_equal(ends[:, held], starts[:, held])
+    assert (ends >= icub.limits[:, 0]).all() and (ends <= icub.limits[:, 1]).all()
+
+
+def test_what_cannot_be_met_ends_soon(free: mobee.Model) -> None:
+    problem = Problem(free, [costs.position("right_palm", [2.0, 0.0, 0.0])], None, None)
+    assert least_squares(problem, np.random.default_rng(0)) is None
+    assert problem.evaluations <= 41 * 61
+
+
+def test_a_half_turn_is_no_trap(free: mobee.Model, icub: mobee.Robot) -> None:
+    normal = free.evaluate(icub.home).normal("right_palm")
+    problem = Problem(free, [costs.orientation("right_palm", -normal)], None, None)
+    assert least_squares(problem, np.random.default_rng(0)) is not None
+
+
+def test_without_aims_there_is_nothing_to_do(free: mobee.Model) -> None:
+    problem = Problem(free, [costs.collision()], None, None)
+    assert least_squares(problem, np.random.default_rng(0)) is None
+    assert problem.evaluations == 0
