@@ -101,7 +101,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(running: Launched) -> None:
     assert echo.stdout and echo.stderr
     echo.stdout.readline()
     echo.stdout.close()
-    assert echo.wait(timeout=10) == 0
+    assert echo.wait(timeout=60) == 0
     assert echo.stderr.read() == ""
 
 
@@ -130,12 +130,12 @@ def test_the_router_alone_serves_services_started_by_hand(free_port: int) -> Non
     router = subprocess.Popen([sys.executable, "-m", "mobee_cli", "router", "--listen", endpoint], stderr=subprocess.DEVNULL)
     toy = subprocess.Popen([sys.executable, "-m", "tests.services.toy_service", "--endpoint", endpoint], stderr=subprocess.DEVNULL)
     try:
-        give_up = time.monotonic() + 10
+        give_up = time.monotonic() + 60
         while '"toy"' not in mobee("status", "--json", "--endpoint", endpoint).stdout and time.monotonic() < give_up:
             time.sleep(0.05)
         assert mobee("stop", "--endpoint", endpoint).returncode == 0
-        assert router.wait(timeout=10) == 0
-        assert toy.wait(timeout=10) == 0
+        assert router.wait(timeout=30) == 0
+        assert toy.wait(timeout=30) == 0
     finally:
         for process in (router, toy):
             process.kill()

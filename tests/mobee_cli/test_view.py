@@ -39,7 +39,7 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
         assert shown.stdout and shown.stderr
         told = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/\?url=\S+)\n", shown.stdout.readline())
         assert told
-        with urllib.request.urlopen(told[1], timeout=5.0) as answer:
+        with urllib.request.urlopen(told[1], timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()
         shown.send_signal(signal.SIGINT)
         try:

@@ -9,13 +9,18 @@ from bus_schema import Refused, decode, keys
 from bus_schema.chain import Tick
 from bus_schema.messages import Forces
 from services.common.delivery import LATEST
+from tests.services.fake_sim import FakeSim
 from tests.services.harness import Rig
 
 
 class FakeModel:
-    """Answers every tick with forces that the test chooses; unless silent, late or muddled."""
+    """Answers every tick with forces that the test chooses; unless silent, late or muddled.
 
-    def __init__(self, rig: Rig) -> None:
+    In free mode the forces of a tick are there before it: a controller that had to wait for them would on a slow machine now and
+    then go without.
+    """
+
+    def __init__(self, rig: Rig, sim: FakeSim) -> None:
         n = len(rig.robot.motors)
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
@@ -23,14 +28,19 @@ class FakeModel:
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
         rig.listen(keys.TICK, self._answer)
+        sim.before_tick = self._foresee
 
     def _answer(self, sample: zenoh.Sample) -> None:
         try:
             tick = decode(Tick, sample.payload.to_bytes(), str(sample.encoding))
         except Refused:  # a test of random bytes
             return
+        if tick.mode == "lock":
+            self._foresee(tick.k)
+
+    def _foresee(self, k: int) -> None:
         if not self.silent:
-            self.put(max(tick.k - self.behind, 0))
+            self.put(max(k - self.behind, 0))
 
     def put(self, re_k: int) -> None:
         zeros = [0.0] * len(self.collision)

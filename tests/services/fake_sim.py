@@ -18,7 +18,7 @@ from bus_schema.messages import Clock, Command
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.robot import Array
 from services.common.delivery import LATEST
-from tests.services.harness import Refusal, Rig
+from tests.services.harness import Refusal, Rig, wait_for
 
 
 @dataclass
@@ -50,6 +50,7 @@ class FakeSim:
         self.commands: dict[str, list[Command]] = {part: [] for part in rig.robot.parts}
         self._lock = threading.Lock()
         self.answers_along: list[tuple[int, Answer]] = []  # lockstep: ticks that were answered with the commands
+        self.before_tick: Callable[[int], None] = lambda k: None  # what others put before anybody hears of tick k, free mode
         self._measured = self.q.copy()
         self.statuses: dict[str, PartStatus] = {}
         self._tick = rig.bus.publisher(keys.TICK, Tick, LATEST)
@@ -82,20 +83,22 @@ class FakeSim:
 
     def begin(self, mode: str = "free", dt_ns: int | None = None, whole: bool = True) -> None:
         """The tick begins; nobody hears of it before every part was sampled, unless it need not be the `whole` body."""
+        if mode == "free":
+            self.before_tick(self.rig.bus.k)
         if len(self.statuses) == len(self.gates) or not whole:
             self._tick.put(dt=dt_ns or self.dt_ns, mode=mode, rate=1.0, q=self._measured.tolist(), parts=self.statuses)
         self._clock.put(dt=dt_ns or self.dt_ns, mode=mode, rate=1.0)
 
     def play(self, until: Callable[[], Any], what: str, answered: Callable[[int], Any], ticks: int = 3000) -> Any:
-        """Tick until the condition holds; the next tick comes when the last is answered, or 50 ms later."""
+        """Tick until the condition holds; the next tick comes when the last is answered, or a quarter of a second later."""
         for _ in range(ticks):
             if found := until():
                 return found
             k = self.tick()
-            give_up = time.monotonic() + 0.05
+            give_up = time.monotonic() + 0.25
             while not answered(k) and time.monotonic() < give_up:
                 time.sleep(0.0002)
-        raise AssertionError(f"played {ticks} ticks in vain for {what}")
+        return wait_for(until, f"{what}, after {ticks} ticks")  # what is told of the last tick may still be on its way
 
     def hold(self, part: str) -> None:
         """As the gate does when something is wrong."""

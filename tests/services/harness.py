@@ -114,7 +114,7 @@ class Rig:
         """`python ...`, once the token of `who` is there."""
         before = self.instances(who)
         program = self.spawn(*arguments)
-        wait_for(lambda: not program.is_running or self.instances(who) - before, f"the token of {who}", 20.0)
+        wait_for(lambda: not program.is_running or self.instances(who) - before, f"the token of {who}", 60.0)
         assert program.is_running, program.says
         return program
 
@@ -171,7 +171,7 @@ class Rig:
 
         self._kept.append(self.session.declare_queryable(key, self._guarded(answer)))
 
-    def call(self, key: str, request: type[Request], reply: type[Any], who: str = "test", timeout: float = 2.0, **fields: Any) -> Any:
+    def call(self, key: str, request: type[Request], reply: type[Any], who: str = "test", timeout: float = 10.0, **fields: Any) -> Any:
         return rpc.call(self.session, who, key, request, reply, timeout=timeout, **fields)
 
     def stat(self, who: str) -> Stat:

@@ -42,11 +42,11 @@ class Launched:
         """What it said on standard error so far."""
         return (self.folder / "news").read_text()
 
-    def wait_for(self, said: str, timeout: float = 20.0) -> None:
+    def wait_for(self, said: str, timeout: float = 60.0) -> None:
         wait_until(lambda: said in self.news or self.process.poll() is not None, timeout)
         assert said in self.news, self.news
 
-    def end(self, timeout: float = 30.0) -> tuple[int, dict[str, Any]]:
+    def end(self, timeout: float = 60.0) -> tuple[int, dict[str, Any]]:
         """Exit code and summary."""
         out, _ = self.process.communicate(timeout=timeout)
         return self.process.returncode, json.loads(out) if out else {}
@@ -84,7 +84,7 @@ def wait_until(condition: Callable[[], bool], timeout: float) -> None:
         time.sleep(0.02)
 
 
-def mobee(*arguments: str, timeout: float = 20.0) -> subprocess.CompletedProcess[str]:
+def mobee(*arguments: str, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
     """Run the command to its end, in a terminal of 80 columns."""
     environment = {**os.environ, "COLUMNS": "80"}
     return subprocess.run(

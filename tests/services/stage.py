@@ -66,7 +66,7 @@ class Stage:
         ball = ObjectTruth(name="ball", position=position.tolist(), quaternion=[1.0, 0.0, 0.0, 0.0])
         self._truth.put(q=self.robot.home.tolist(), depth=0.0, pair="", gap=-1.0, objects=[ball])
 
-    def play(self, q: Callable[[float], Array] | Array, until: Callable[[], bool], limit: float = 10.0) -> bool:
+    def play(self, q: Callable[[float], Array] | Array, until: Callable[[], bool], limit: float = 30.0) -> bool:
         """Ticks at 100 Hz until something has happened; False if it did not within `limit` s."""
         begin = deadline = time.monotonic()
         while not until():
@@ -79,13 +79,13 @@ class Stage:
         return True
 
     def stat(self, who: str) -> Stat:
-        return rpc.call(self.session, "stage", keys.service_rpc(who, "stat"), Empty, Stat)
+        return rpc.call(self.session, "stage", keys.service_rpc(who, "stat"), Empty, Stat, timeout=10.0)
 
     def is_up(self, who: str) -> bool:
         return any(True for _ in self.session.liveliness().get(f"alive/{who}/*"))
 
     @contextmanager
-    def running(self, module: str, who: str, *flags: str, limit: float = 20.0) -> Iterator[subprocess.Popen[str]]:
+    def running(self, module: str, who: str, *flags: str, limit: float = 60.0) -> Iterator[subprocess.Popen[str]]:
         """The service as a process, from its readiness on; ended at the end."""
         command = [sys.executable, "-m", module, "--endpoint", self.endpoint, *flags]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ, **THREADS})
@@ -97,7 +97,7 @@ class Stage:
             yield process
         finally:
             process.terminate()
-            process.communicate(timeout=5.0)
+            process.communicate(timeout=20.0)
 
     def close(self) -> None:
         self.session.close()

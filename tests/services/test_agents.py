@@ -145,8 +145,9 @@ def test_a_new_controller_is_asked_anew(stage: Stage) -> None:
     stage.made(before + 3)
     assert stage.controller.takes == 2
     assert stage.controller.epoch > old
-    assert [row["n"] for row in stage.rows()] == list(range(1, len(stage.rows()) + 1))
-    assert stage.told("interrupted")
+    numbers = [row["n"] for row in stage.rows()]
+    assert numbers == list(range(1, len(numbers) + 1))
+    wait_for(lambda: stage.told("interrupted"), "the event")
 
 
 def test_a_new_run_ends_the_action_without_an_observation(stage: Stage) -> None:
@@ -159,7 +160,7 @@ def test_a_new_run_ends_the_action_without_an_observation(stage: Stage) -> None:
     stage.controller.lasts = 5
     stage.controller.new_run()
     stage.made(before + 2)
-    assert "new run" in stage.told("interrupted")[0]
+    assert "new run" in wait_for(lambda: stage.told("interrupted"), "the event")[0]
     assert stage.controller.action_id != lost
     assert stage.controller.takes == 1  # the goal is still its own
 
@@ -188,8 +189,9 @@ def test_after_each_kill_it_goes_on_where_it_was(stage: Stage, rng: np.random.Ge
     both = stage.rows()
     assert both[: len(first)] == first
     assert [row["n"] for row in both] == list(range(1, len(first) + 5))
-    assert [t.n for t in stage.transitions[count:]][-4:] == [len(first) + n for n in range(1, 5)]
-    assert any(f"goes on after {len(first)} transitions" in text for text in stage.told("resumed"))
+    last = [len(first) + n for n in range(1, 5)]
+    wait_for(lambda: [t.n for t in stage.transitions[count:]][-4:] == last, "the last four transitions")
+    wait_for(lambda: any(f"goes on after {len(first)} transitions" in text for text in stage.told("resumed")), "the event")
 
 
 def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_path: Path) -> None:

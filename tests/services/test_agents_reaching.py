@@ -128,7 +128,7 @@ def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeR
     assert agent(made, "--tries", "6").wait(60.0) == 0
     assert steps(made)[: len(before)] == before
     assert sum(row["a"] < 0 for row in steps(made)) == 6
-    assert [event.code for event in events] == ["resumed"]
+    wait_for(lambda: [event.code for event in events] == ["resumed"], "the event")
 
 
 def test_a_predictor_that_there_is_none_of_is_told_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -169,7 +170,7 @@ def whole_chain(stage: Stage) -> Callable[[], None]:
 
 
 def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: Path) -> None:
-    put = whole_chain(stage)
+    put, begin = whole_chain(stage), time.monotonic()
     with stage.running("services.monitor", "monitor", "--no-serve", "--run-dir", str(tmp_path)):
 
         def busy() -> bool:
@@ -180,7 +181,7 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
         assert stage.play(DOWN, busy)
         stat = stage.stat("monitor")
         assert stat.numbers["transitions"] > 0
-        assert stat.numbers["looks"] <= 1.5 * 20 + 20  # 20 Hz at most
+        assert stat.numbers["looks"] <= 20 * (time.monotonic() - begin)  # 20 Hz at most
     private = {**os.environ, "XDG_CONFIG_HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path)}
     command = [program(), "rrd", "stats", str(tmp_path / "recording.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=private)
@@ -197,7 +198,7 @@ def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published
     with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
         watch = stage.session.declare_subscriber("**", lambda sample: heard.add(str(sample.key_expr)))
         assert stage.play(DOWN, lambda: stage.k > 100)
-        with urllib.request.urlopen(f"http://127.0.0.1:{ports[0]}/", timeout=5.0) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{ports[0]}/", timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()
         listening = {c.laddr for c in page_of(monitor).net_connections("tcp") if c.status == psutil.CONN_LISTEN}
         assert {address.port for address in listening} == set(ports)
@@ -216,7 +217,7 @@ def test_a_frozen_page_does_not_stop_the_monitor(stage: Stage, ports: tuple[int,
         page.suspend()
         try:
             before, memory = stage.stat("monitor").numbers["looks"], psutil.Process(monitor.pid).memory_info().rss
-            assert stage.play(DOWN, lambda: stage.k > 450)
+            assert stage.play(DOWN, lambda: stage.k > 450, 30.0)
             assert stage.stat("monitor").numbers["looks"] - before > 20
             assert psutil.Process(monitor.pid).memory_info().rss - memory < 50_000_000
         finally:
@@ -227,10 +228,10 @@ def test_page_and_monitor_end_together(stage: Stage, ports: tuple[int, int]) -> 
     with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
         page = page_of(monitor)
         os.kill(monitor.pid, signal.SIGKILL)
-        page.wait(5.0)
+        page.wait(20.0)
     with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:  # the ports are free again
         page_of(monitor).kill()
-        assert monitor.wait(5.0) == 1
+        assert monitor.wait(20.0) == 1
 
 
 @pytest.mark.parametrize("taken", [0, 1])
@@ -239,7 +240,7 @@ def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, ports
         other.bind(("127.0.0.1", ports[taken]))
         other.listen()
         command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", *flags(ports)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert f"{('web_port', 'grpc_port')[taken]} {ports[taken]} is in use" in done.stderr
@@ -248,6 +249,6 @@ def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, ports
 
 def test_a_missing_run_dir_is_told(free_port: int, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", "--run-dir", str(tmp_path / "none")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert "is not a folder" in done.stderr

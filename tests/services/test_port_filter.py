@@ -74,7 +74,7 @@ class Client:
         return str(self.state.gate)
 
     def call(self, key: str, request: type[Request], reply: type, **fields: object) -> object:
-        return rpc.call(self.session, self.name, key, request, reply, timeout=2.0, **fields)
+        return rpc.call(self.session, self.name, key, request, reply, timeout=10.0, **fields)
 
     def arm(self) -> None:
         self.epoch = self.call(keys.drive("torso", "take"), Take, Taken, instance="c1").epoch
@@ -209,4 +209,4 @@ def test_the_robot_is_released_when_the_client_dies(robot: Rig, client: Callable
     mine.arm()
     wait_for(lambda: states and states[-1].gate == "armed", "the robot")
     mine.close()
-    wait_for(lambda: states[-1].gate == "idle", "the release", 2.0)
+    wait_for(lambda: states[-1].gate == "idle", "the release")

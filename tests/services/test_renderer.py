@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from bus_schema.messages import Camera, Image
 from mobee import World, box, cylinder, load_world, sphere
 from mobee.robot.load import load_robot
 from services.common.eyes import eye_frame, frame_at_capture
+from tests.services.harness import wait_for
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 pytest.importorskip("pybullet")
@@ -130,10 +131,16 @@ def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_po
             assert stage.play(lambda t: DOWN, lambda: stage.stat("renderer").numbers["pairs"] >= 5)
             seconds = (stage.k - first) * 0.01
             assert stage.stat("renderer").numbers["pairs"] <= 5.0 * seconds + 2.0  # the rate asked for
-            time.sleep(0.2)
-            got = [stream.take() for stream in (*images.values(), *cameras.values())]
-            assert len({message.k_capture for message in got}) == 1
-            assert len({message.t for message in got}) == 1
+            got: dict[int, Any] = {}
+
+            def is_whole() -> bool:
+                """Of the last pair all four have come."""
+                taken = {place: stream.take() for place, stream in enumerate((*images.values(), *cameras.values()))}
+                got.update({place: message for place, message in taken.items() if message is not None})
+                return len(got) == 4 and len({message.k_capture for message in got.values()}) == 1
+
+            wait_for(is_whole, "both pictures and both cameras of one tick")
+            assert len({message.t for message in got.values()}) == 1
             image, camera = got[0], got[2]
             pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
             origin, rotation = frame_at_capture(stage.robot, "left", np.array(camera.q_head), np.array(camera.q_torso))

@@ -71,7 +71,7 @@ def ball(publisher: Any, name: str = "ball") -> None:
 def send(bus: Rig, key: str, request: Any) -> list[tuple[bool, bytes, str]]:
     """A call by hand: (ok, payload, encoding) of every answer."""
     found = []
-    for answer in bus.session.get(key, payload=encode(request), encoding=encoding_of(type(request)), timeout=2.0):
+    for answer in bus.session.get(key, payload=encode(request), encoding=encoding_of(type(request)), timeout=10.0):
         part = answer.ok if answer.ok is not None else answer.err
         found.append((answer.ok is not None, part.payload.to_bytes(), str(part.encoding)))
     return found
@@ -179,7 +179,7 @@ def test_a_call_without_an_answer_is_repeated_under_the_same_id(bus: Rig) -> Non
                 query.reply(query.key_expr, encode(Done(v=VERSION)), encoding=encoding_of(Done))
 
     server = bus.session.declare_queryable("shy/rpc/do", answer)
-    assert rpc.call(bus.session, "test", "shy/rpc/do", Empty, Done, timeout=0.5, tries=3) == Done(v=VERSION)
+    assert rpc.call(bus.session, "test", "shy/rpc/do", Empty, Done, timeout=5.0, tries=3) == Done(v=VERSION)
     assert len(seen) == 3
     assert len(set(seen)) == 1
     server.undeclare()
@@ -226,13 +226,12 @@ def test_a_refusal_is_told_on_the_bus_at_most_once_a_second(bus: Rig, clock: Any
     for n in range(50):
         bus.session.put(keys.world("ball"), b"nonsense", encoding=encoding_of(Clock))
         wait_for(lambda n=n: rejected(bus).get("type", 0) == n + 1, "the refusal")
-    took = time.monotonic() - start
 
     def told() -> list[Event]:
         bus.session.put(keys.world("ball"), b"nonsense", encoding=encoding_of(Clock))
         return [e for e in events if e.code == "refused" and "world/ball" in e.text]
 
-    assert 1 <= len(wait_for(told, "an event")) <= 2 + took
+    assert 1 <= len(wait_for(told, "an event")) <= 2 + time.monotonic() - start
 
 
 def test_random_bytes_on_every_key_harm_nobody(bus: Rig, clock: Any, rng: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.messages import Command, Motion
+from bus_schema.messages import Command, Message, Motion
 from bus_schema.rpc import Done, Force, Goal, Started, Take, Taken
 from mobee import Gains, load_robot
 from mobee.robot.robot import Array
@@ -42,8 +42,13 @@ class Stage:
         return self.motions[part][-1]
 
     def answered(self, k: int) -> bool:
-        run = self.rig.bus.run
-        return all(m and m[-1].k == k and m[-1].run == run for m in self.motions.values())
+        """Every part's motion has come, and its command if it obeys: each comes on a thread of its own."""
+        return all(self._is_of(k, motions) for motions in self.motions.values()) and all(
+            self._is_of(k, self.sim.commands[part]) for part in PARTS if self.motion(part).status != "held"
+        )
+
+    def _is_of(self, k: int, stream: Sequence[Message]) -> bool:
+        return bool(stream) and (stream[-1].run, stream[-1].k) == (self.rig.bus.run, k)
 
     def tick(self, **how: Any) -> int:
         k = self.sim.tick(**how)
@@ -101,7 +106,8 @@ class Stage:
 
 
 def staged(made: Rig, *arguments: str) -> Stage:
-    sim, model = FakeSim(made), FakeModel(made)
+    sim = FakeSim(made)
+    model = FakeModel(made, sim)
     motions = {part: made.record(keys.motion(part), Motion, part) for part in PARTS}
     return Stage(made, sim, model, made.start("services.controller", "controller", *arguments), motions)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -33,19 +34,37 @@ class Bench:
         self.follow()
 
     def follow(self) -> None:
-        """Take up the run that goes on now."""
-        seen = len(self.clocks)
-        wait_for(lambda: len(self.clocks) > seen and all(self.states.values()), "the streams")
+        """Take up the run that has begun: what is still heard of the one before is passed over."""
+        before = self.rig.bus.run
+        wait_for(lambda: self.clocks and self.clocks[-1].run != before, "the new run")
         self.rig.bus.run = self.clocks[-1].run
+        wait_for(lambda: all(states and states[-1].run == self.rig.bus.run for states in self.states.values()), "its states")
 
     def newest(self, part: str) -> State:
         return self.states[part][-1]
 
+    def now(self) -> int:
+        """The tick in which robot_sim is: what the test has heard of may be older."""
+        found = re.search(r"tick (\d+)", self.rig.stat("robot_sim").text)
+        assert found
+        return int(found[1])
+
     def next_state(self, part: str) -> State:
         """One that was sampled after now."""
-        seen = len(self.states[part])
-        wait_for(lambda: len(self.states[part]) > seen + 1, f"a state of {part}")
-        return self.newest(part)
+        return self.state_after(part, self.now())
+
+    def state_after(self, part: str, k: int) -> State:
+        """The first sampled after tick k of this run."""
+        run, states = self.rig.bus.run, self.states[part]
+        wait_for(lambda: states[-1].run == run and states[-1].k > k, f"a state of {part} after tick {k}")
+        return next(state for state in states if state.run == run and state.k > k)
+
+    def told(self, since: int, part: str = "") -> list[Event]:
+        """Events of this run from tick `since` on, which may come late; those that begin with the part's name."""
+        return [e for e in list(self.events) if e.run == self.rig.bus.run and e.k >= since and e.text.startswith(part)]
+
+    def hears(self, code: str, since: int, says: str = "") -> Event:
+        return wait_for(lambda: next((e for e in self.told(since) if e.code == code and says in e.text), None), f"the event {code}")
 
     def drive(self, part: str, verb: str, epoch: int) -> str:
         return str(self.rig.call(keys.drive(part, verb), WithEpoch, Driven, who="controller", epoch=epoch).gate)
@@ -66,13 +85,24 @@ class Bench:
         fields.setdefault("re_k", self.clocks[-1].k)
         self.commands[part].put(epoch=epoch, mode=mode, ref=ref, ttl=ttl, **fields)
 
-    def keep(self, part: str, epoch: int, seconds: float, ref: Callable[[], list[float]], **fields: Any) -> None:
-        """Answer every tick for a time of robot_sim's clock."""
+    def keep(self, part: str, epoch: int, seconds: float, ref: Callable[[], list[float]], **fields: Any) -> State:
+        """Answer every tick for a time of robot_sim's clock; the part's first state after it."""
         end = self.clocks[-1].t + seconds * 1e9
         while self.clocks[-1].t < end:
             seen = len(self.clocks)
             self.send(part, epoch, ref(), **fields)
             wait_for(lambda seen=seen: len(self.clocks) > seen, "a tick")
+        return self.state_after(part, int(end / self.clocks[-1].dt))
+
+    def refuses(self, reason: str, send: Callable[[], None]) -> None:
+        """Send until that is counted: what the test sends may come late, and is then refused as too old."""
+        counted = self.rejected(reason)
+
+        def is_counted() -> bool:
+            send()
+            return self.rejected(reason) > counted
+
+        wait_for(is_counted, reason)
 
     def rejected(self, reason: str) -> int:
         return self.rig.stat("robot_sim").rejected.get(reason, 0)

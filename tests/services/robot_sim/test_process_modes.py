@@ -41,8 +41,7 @@ def test_torque_mode_accelerates_a_motor(bench: Bench) -> None:
         q[arm] = bench.newest("left_arm").q
         return (gravity_torque(ROBOT, q)[arm] + elbow(1.0)).tolist()
 
-    bench.keep("left_arm", epoch, 0.5, carry_and_bend, mode="torque")
-    state = bench.next_state("left_arm")
+    state = bench.keep("left_arm", epoch, 0.5, carry_and_bend, mode="torque")
     assert state.mode == "torque"
     assert state.dq[ELBOW] == pytest.approx(1.0 / 5.0, abs=0.02)  # where friction, 5 N m s/rad, balances it
     assert state.tau[ELBOW] == pytest.approx(1.0, abs=0.1)
@@ -58,7 +57,7 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
         bench.drive("left_arm", "arm", epoch)
     assert caught.value.code == "estop"
     wait_for(lambda: sum(stop.src == "robot_sim" for stop in stops) >= 3, "its repetition")
-    assert abs(bench.newest("left_arm").dq[ELBOW]) < 0.01
+    assert abs(bench.next_state("left_arm").dq[ELBOW]) < 0.01
     bench.rig.call(keys.ESTOP_RESET, Empty, Done)
     assert bench.next_state("left_arm").gate == "hold"
     assert bench.drive("left_arm", "arm", epoch) == "armed"
@@ -76,7 +75,7 @@ def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench)
     assert bench.clocks[-1].k == k
     bench.rig.call(keys.sim("resume"), Empty, Done)
     assert bench.next_state("left_arm").gate == "hold"
-    assert bench.clocks[-1].mode == "free"
+    wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
 def test_a_reset_is_a_new_run_at_home_in_which_nobody_owns_anything(bench: Bench) -> None:

@@ -21,8 +21,7 @@ def test_it_runs_at_other_rates(tmp_path: Path, rate: int, backend: str) -> None
         time.sleep(0.5)  # start-up is over
         bench.rig.call(keys.service_rpc("robot_sim", "mark"), Empty, Done)
         epoch = bench.arm("left_arm")
-        bench.keep("left_arm", epoch, 1.0, lambda: elbow(0.2))
-        assert bench.next_state("left_arm").gate == "armed"
+        assert bench.keep("left_arm", epoch, 1.0, lambda: elbow(0.2)).gate == "armed"
         clocks = bench.clocks[-100:]
         assert {clock.dt for clock in clocks} == {10**9 // rate}
         numbers = bench.numbers()
