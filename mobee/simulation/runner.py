@@ -14,7 +14,7 @@ from mobee.engine.hands import Hand, hands
 from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array, Ints
-from mobee.simulation.load import compiled
+from mobee.simulation.load import compiled_loop
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 
@@ -43,7 +43,7 @@ class Runner:
         self.q: Array = robot.home.copy()
         self._torque = np.zeros(n)
         self._forces = np.zeros((3, n))
-        self._loop = compiled().loop
+        self._loop = compiled_loop()
 
     def run(self, ticks: int, most: int, parts: Ints, tests: Array, kept: bool, solids: bool) -> tuple[Array, int, bool]:
         """Run up to that many ticks after those there have been; the record, how many were run, whether the state is lost.

@@ -81,7 +81,7 @@ def running(folder: Path, scenario: str, *settings: str, headless: bool = True) 
     """A system that is ready, and one who watches it; stopped as by Ctrl-C afterwards."""
     system = launch(folder, scenario, *settings, headless=headless)
     try:
-        until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 60.0, "the system is ready")
+        until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 120.0, "the system is ready")
         assert system.process.poll() is None, system.errors.read_text()[-3000:]
         with Watcher(system.endpoint) as watcher:
             until(lambda: watcher.clock, 20.0, "the watcher hears the clock")
@@ -151,8 +151,18 @@ class Watcher:
     def run(self) -> str:
         return "" if self.clock is None else self.clock.run
 
+    def wait_until_it_keeps_up(self) -> None:
+        """Ticks come at their pace: after a stall of this process they come in a burst, and the newest heard is seconds old."""
+
+        def keeps_up() -> bool:
+            before = self.k
+            time.sleep(0.1)
+            return 5 <= self.k - before <= 20
+
+        until(keeps_up, 20.0, "the watcher hears ticks as they are made")
+
     def stat(self, who: str) -> Stat:
-        return rpc.call(self.session, "watcher", keys.service_rpc(who, "stat"), Empty, Stat, timeout=2.0)
+        return rpc.call(self.session, "watcher", keys.service_rpc(who, "stat"), Empty, Stat, timeout=5.0)
 
     def pid(self, who: str) -> int:
         """Of its process; asked more than once, as a stall of this machine may cut anybody off for a moment."""

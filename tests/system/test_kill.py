@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,17 +28,10 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Wat
 def kill(watcher: Watcher, who: str) -> tuple[int, int]:
     """kill -9; the tick at which it happened, and the pid that is no more."""
     pid = watcher.pid(who)
-    until(lambda: keeps_up(watcher), 20.0, "the watcher hears ticks as they are made")
+    watcher.wait_until_it_keeps_up()
     k = watcher.k
     os.kill(pid, signal.SIGKILL)
     return k, pid
-
-
-def keeps_up(watcher: Watcher) -> bool:
-    """Whether ticks come at their pace: after a stall of this process they come in a burst, and the newest heard is seconds old."""
-    before = watcher.k
-    time.sleep(0.1)
-    return 5 <= watcher.k - before <= 20
 
 
 def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
@@ -139,23 +130,3 @@ def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: st
         if not held[-1]:
             return
     raise AssertionError(f"states in hold after each kill of {who}: {held}")
-
-
-def test_without_launcher_and_router_the_robot_holds_and_everything_ends(tmp_path: Path) -> None:
-    with running(tmp_path, "kinematic") as (system, watcher):
-        until(lambda: any(watcher.speed(part) > 0.15 for part in AGENTS), 40.0, "a part moves")
-        pids = [watcher.pid(who) for who in ("robot_sim", "model", "controller", "agent_torso")]
-        before = transitions(system.run_dir)
-        os.kill(system.process.pid, signal.SIGKILL)
-        until(lambda: all(f"hold: {part}" in system.log("robot_sim") for part in PARTS), 5.0, "every part holds")
-        until(lambda: not any(_runs(pid) for pid in pids), 30.0, "no orphan is left")
-    after = transitions(system.run_dir)
-    assert all(after[agent][: len(before[agent])] == before[agent] for agent in AGENTS)
-
-
-def _runs(pid: int) -> bool:
-    try:
-        with open(f"/proc/{pid}/stat") as status:
-            return status.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
