@@ -72,6 +72,7 @@ class Controller:
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
         self._compiled = law()
+        reach_law()  # the first reach is not to wait for it
         self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
         self._reaches = PackedReaches(self.robot)
         self.clear()

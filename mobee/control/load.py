@@ -8,21 +8,15 @@ from types import ModuleType
 
 @cache
 def law() -> ModuleType:
-    """The module `mobee.control.law`, after the whole engine: a process compiles all of it at once, with progress, or nothing."""
-    from mobee.engine.load import load
+    """The module `mobee.control.law`; where it is not compiled yet, all of the engine is, with progress."""
+    from mobee.engine.load import load_only
 
-    load()
-    from mobee.control import law as compiled
-
-    return compiled
+    return load_only("mobee.control.law")
 
 
 @cache
 def reach_law() -> ModuleType:
     """The module `mobee.control.reach_law`, in the same way."""
-    from mobee.engine.load import load
+    from mobee.engine.load import load_only
 
-    load()
-    from mobee.control import reach_law as compiled
-
-    return compiled
+    return load_only("mobee.control.reach_law")

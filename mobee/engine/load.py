@@ -1,4 +1,4 @@
-"""Loads the engine's machine code; where it has to be compiled first, says so and lets one process do it for all."""
+"""Loads machine code; where it has to be compiled first, says so and lets one process compile all of it for all."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ MODULES = (
     "mobee.engine.descent",
     "mobee.engine.evaluate",
 )
+ENGINE = ("mobee.engine.scene", "mobee.engine.neighbours", "mobee.engine.evaluate")  # what a model needs
 PATIENCE = 300.0  # s that a process waits for another that compiles
 
 
 def load() -> None:
-    """Import what is compiled; after an install or an edit this takes about a minute, with progress on standard error."""
-    if MODULES[-1] in sys.modules:
+    """Import the model's engine; after an install or an edit all is compiled first: a minute, with progress on standard error."""
+    if ENGINE[-1] in sys.modules:
         return
     from mobee.engine.compiled import FOLDER
 
     if is_ready(FOLDER):
-        _import(FOLDER)
+        _import(FOLDER, ENGINE)
         mark_used(FOLDER)
         return
     with _turn(FOLDER) as writable:
         if is_ready(FOLDER):
-            _import(FOLDER)
+            _import(FOLDER, ENGINE)
         else:
             _compile(FOLDER, writable)
 
@@ -59,11 +60,11 @@ def load_only(module: str) -> ModuleType:
     return importlib.import_module(module)
 
 
-def _import(folder: Path) -> None:
+def _import(folder: Path, modules: tuple[str, ...]) -> None:
     from mobee.engine.progress import Progress
 
     with Progress(folder):
-        for module in MODULES:
+        for module in modules:
             importlib.import_module(module)
 
 
@@ -71,7 +72,7 @@ def _compile(folder: Path, writable: bool) -> None:
     from mobee.engine.progress import say
     from mobee.engine.shelf import Shelf
 
-    _import(folder)
+    _import(folder, MODULES)
     if writable and Shelf.unwritten is not None:
         say(f"could not keep the engine's machine code: {Shelf.unwritten}. The next start compiles again.")
     elif writable and cache_folder() == folder:  # else a source was edited meanwhile, and nobody knows which version was read

@@ -29,10 +29,7 @@ def compiled() -> Compiled:
 
 @cache
 def compiled_loop() -> ModuleType:
-    """The module of the loop, after the whole engine: a process compiles all of it at once, with progress, or nothing."""
-    from mobee.engine.load import load
+    """The module of the loop, in the same way."""
+    from mobee.engine.load import load_only
 
-    load()
-    from mobee.simulation import loop
-
-    return loop
+    return load_only("mobee.simulation.loop")

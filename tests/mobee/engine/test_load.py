@@ -34,7 +34,7 @@ import sys
 sys.path.insert(0, {folder!r})
 import mobee.engine.load
 from numba.core import event
-mobee.engine.load.MODULES = ("stand_in",)
+mobee.engine.load.MODULES = mobee.engine.load.ENGINE = ("stand_in",)
 with event.install_recorder("numba:compile") as recorder:
     mobee.engine.load.load()
 import stand_in

@@ -19,14 +19,12 @@ def main() -> None:
         raise RuntimeError("no hardware at all")
     marks = []
     with Service(config.name, config) as service:
-        service.describe = lambda: (f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7})
+        service.describe = lambda: told(service, config, marks)
         service.mark = lambda: marks.append(1)
         if config.behaviour == "talk":
             say(service)
         if config.behaviour == "deaf":
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        if config.behaviour == "freeze":
-            service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))
         if config.behaviour == "crash_once_ready":
             service.inbox.at(time.monotonic() + config.delay, crash)
         if config.behaviour == "finish":
@@ -36,6 +34,13 @@ def main() -> None:
             service.run()
         finally:
             print(f"over at {time.monotonic()}")
+
+
+def told(service: Service, config: Config, marks: list[int]) -> tuple[str, dict[str, float]]:
+    """What it is; one that freezes does so some time after it was first asked, as before that it is not ready to anybody."""
+    if config.behaviour == "freeze":
+        service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))
+    return f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7}
 
 
 def say(service: Service) -> None:
