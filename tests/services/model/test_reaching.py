@@ -61,7 +61,7 @@ def reacher(run: Stage) -> Iterator[Reacher]:
     made = Reacher(run, at, run.rig.record(keys.MODEL_TARGETS, Targets))
     run.rig.token("agent_left_arm", made.instance)
     yield made
-    if ("agent_left_arm", made.instance) in run.rig.alive:
+    if run.rig.holds("agent_left_arm", made.instance):
         run.rig.drop_token("agent_left_arm", made.instance)
     wait_for(lambda: TARGET not in run.world(), "the target to be taken away")
 

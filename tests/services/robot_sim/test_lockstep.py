@@ -100,7 +100,7 @@ def bench(started: Bench) -> Iterator[Bench]:
     started.states[:] = [state for state in started.states if state.run == run]
     started.events.clear()
     yield started
-    if "c1" in started.rig.instances("controller"):
+    if started.rig.holds("controller", "c1"):
         started.rig.drop_token("controller", "c1")
 
 
