@@ -43,3 +43,8 @@ class CmaStrategy:
     def tell(self, costs: Array) -> None:
         """Follow the costs (population,) of the samples that `ask` gave."""
         self._strategy.tell(self._asked, costs.tolist())
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it says of itself that it has come to an end."""
+        return bool(self._strategy.stop())

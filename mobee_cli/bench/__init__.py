@@ -15,6 +15,7 @@ BENCHES = {
     "plant": "the offline plant beside MuJoCo's stepper",
     "vi": "planning: value iteration beside SciPy and quantecon",
     "nes": "evolution strategies beside CMA-ES",
+    "ik": "inverse kinematics beside CMA-ES, annealing and a particle filter",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""
