@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.layout import ACTIVE, FEEDFORWARD, I_ACTIVE, OWN_ACCELERATION, OWN_VELOCITY
+from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
 from mobee.control.load import law, reach_law
 from mobee.control.modality import Command, Modality
 from mobee.control.pack import Law, pack
@@ -18,8 +18,7 @@ from mobee.control.packed_reaches import Arrays, PackedReaches
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
-from mobee.kinematics.tables import tables
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
@@ -74,7 +73,7 @@ class Controller:
         self._compiled = law()
         reach_law()  # the first reach is not to wait for it
         self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
-        self._reaches = PackedReaches(self.robot)
+        self._reaches = PackedReaches(self.robot, self._packed.integers)
         self.clear()
         self.reset(self.robot.home)
 
@@ -159,7 +158,7 @@ class Controller:
         Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
         """
         if self._reaches.marker(part) != marker:
-            self._reaches.begin(part, marker, self._drawn)
+            self._reaches.begin(part, marker)
         self._reaches.aim(part, target)
 
     def end_reach(self, part: str) -> None:
@@ -220,17 +219,6 @@ class Controller:
         commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
         self.last_forces = forces
         return Command(*commands)
-
-    def _drawn(self, part: str, marker: str) -> Ints:
-        """The motors of a part that may be moved and that move a marker."""
-        link, where, integers = self.robot.marker(marker).link, self.robot.part(part).slice, self._packed.integers
-        moving = np.zeros(len(self.robot.motors), dtype=bool)
-        moving[integers[integers[I_ACTIVE] :][: integers[ACTIVE]]] = True
-        moving &= (self.robot.coupling[0][tables(self.robot).ancestry[link]] != 0.0).any(axis=0)
-        motors: Ints = where.start + np.flatnonzero(moving[where])
-        if not len(motors):
-            raise InvalidValue(f"{part} cannot reach with {marker} on {self.robot.links[link]}: none of the motors that it may move does")
-        return motors
 
     def _at_rest(self, q: Array) -> Array:
         state: Array = self._compiled.at_rest(self._packed.integers, self._packed.floats, q)

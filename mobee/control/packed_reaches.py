@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee.control import reach_layout as at
+from mobee.control.layout import ACTIVE, I_ACTIVE
+from mobee.errors import InvalidValue
 from mobee.kinematics.tables import tables
 from mobee.robot.robot import Array, Ints, Marker, Robot
 
@@ -22,10 +23,11 @@ Arrays = tuple[Integers, Integers, Integers, Array, Array, Array]
 class PackedReaches:
     """One for each part that reaches; the law keeps its memory in their arrays."""
 
-    __slots__ = ("_known", "_markers", "_robot", "arrays")
+    __slots__ = ("_known", "_law", "_markers", "_robot", "arrays")
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, law: Ints) -> None:
+        """`law`: its integers, see `layout`."""
+        self._robot, self._law = robot, law
         self._known: dict[tuple[str, str], Arrays] = {}  # by part and marker
         self._markers: dict[str, str] = {}  # of each part that reaches, in the order of the arrays' rows
         self.arrays: Arrays = self._stacked([])
@@ -33,11 +35,14 @@ class PackedReaches:
     def __bool__(self) -> bool:
         return bool(self._markers)
 
-    def begin(self, part: str, marker: str, drawn: Callable[[str, str], Ints]) -> None:
-        """Let a part draw a marker, to nowhere yet; the part's reach before is forgotten.  `drawn`: by which motors."""
+    def begin(self, part: str, marker: str) -> None:
+        """Let a part draw a marker, to nowhere yet; the part's reach before is forgotten.
+
+        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        """
         known = self._known.get((part, marker))
         if known is None:
-            known = _packed(self._robot, part, self._robot.marker(marker), drawn(part, marker))
+            known = _packed(self._robot, part, self._robot.marker(marker), self._drawn(part, marker))
             self._known[part, marker] = known
         self.end(part)
         self._markers[part] = marker
@@ -61,6 +66,18 @@ class PackedReaches:
     def marker(self, part: str) -> str | None:
         """The marker that a part draws."""
         return self._markers.get(part)
+
+    def _drawn(self, part: str, marker: str) -> Ints:
+        """The motors of a part that may be moved and that move a marker."""
+        robot, law = self._robot, self._law
+        link, where = robot.marker(marker).link, robot.part(part).slice
+        moving = np.zeros(len(robot.motors), dtype=bool)
+        moving[law[law[I_ACTIVE] :][: law[ACTIVE]]] = True
+        moving &= (robot.coupling[0][tables(robot).ancestry[link]] != 0.0).any(axis=0)
+        motors: Ints = where.start + np.flatnonzero(moving[where])
+        if not len(motors):
+            raise InvalidValue(f"{part} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does")
+        return motors
 
     def _rows(self) -> list[Arrays]:
         a, b, c, d, e, f = self.arrays
