@@ -44,7 +44,10 @@ from mobee.robot.robot import Array, Ints
 
 
 class PackedReach(NamedTuple):
-    """One reach: see `reach_layout`; `pulled` (moved,): the motors, `driven` and `chain`: the joints, `motors` (ROWS, n)."""
+    """One reach: see `reach_layout`; `pulled` (moved,): the motors, `driven` and `chain`: the joints, `motors` (ROWS, n).
+
+    Of all reaches under way every array has one more axis, the first; `reach_law.reach_of` takes one out.
+    """
 
     whole: Ints
     pulled: Ints

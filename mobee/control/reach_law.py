@@ -7,7 +7,6 @@ Default: see `reacher`; the spring gives way while the reach lasts.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from mobee.control.client import share
 from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, MAX_CLIENT, MOTOR, PUBLISHED
@@ -82,32 +81,21 @@ def add_reach(integers: Ints, floats: Array, reach: PackedReach, q: Array, attra
     add_release(floats, reach, nudged, q, attractor, total)
 
 
-class Reaches(NamedTuple):
-    """All reaches under way, see `reach_layout`."""
-
-    whole: Ints
-    pulled: Ints
-    driven: Ints
-    real: Array
-    chain: Array
-    motors: Array
-
-
 @inner_exact
-def reach_of(reaches: Reaches, r: int) -> PackedReach:
+def reach_of(reaches: PackedReach, r: int) -> PackedReach:
     """One of them.  Only for functions that do not count references: its views are not counted."""
     return PackedReach(reaches.whole[r], reaches.pulled[r], reaches.driven[r], reaches.real[r], reaches.chain[r], reaches.motors[r])
 
 
 @inner_exact
-def add_all(integers: Ints, floats: Array, reaches: Reaches, q: Array, attractor: Array, dt: float, total: Array) -> None:
+def add_all(integers: Ints, floats: Array, reaches: PackedReach, q: Array, attractor: Array, dt: float, total: Array) -> None:
     """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2."""
     for r in range(len(reaches.whole)):
         add_reach(integers, floats, reach_of(reaches, r), q, attractor, dt, total)
 
 
 @inner_exact
-def goes_on(integers: Ints, reaches: Reaches, first: int) -> bool:
+def goes_on(integers: Ints, reaches: PackedReach, first: int) -> bool:
     """Whether the part that begins with that motor reaches, and goes on although it has settled; never under the published law."""
     for r in range(len(reaches.whole)):
         if reaches.whole[r, FIRST] == first:
@@ -134,10 +122,10 @@ def add_reaches(
     motors: Array,
 ) -> None:
     """`add_all`, for Python."""
-    add_all(integers, floats, Reaches(whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
+    add_all(integers, floats, PackedReach(whole, pulled, driven, real, chain, motors), q, attractor, dt, total)
 
 
 @entry_exact("boolean(int64[::1], int64, int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1])")
 def still_nears(integers: Ints, first: int, whole: Ints, pulled: Ints, driven: Ints, real: Array, chain: Array, motors: Array) -> bool:
     """`goes_on`, for Python."""
-    return goes_on(integers, Reaches(whole, pulled, driven, real, chain, motors), first)
+    return goes_on(integers, PackedReach(whole, pulled, driven, real, chain, motors), first)

@@ -22,7 +22,7 @@ from mobee.simulation.described import described
 from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
-from mobee.simulation.reaches import Reaches
+from mobee.simulation.reaches import ReachesUnderWay
 from mobee.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class OfflinePlant:
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
-        self._reaches = Reaches(model, self._controller)
+        self._reaches = ReachesUnderWay(model, self._controller)
         self._period = 0  # ticks
         self._callback: Callable[[float], None] | None = None
 

@@ -28,7 +28,7 @@ class Reach:
     missing: float = 0.0  # m
 
 
-class Reaches:
+class ReachesUnderWay:
     """Which parts reach, for what is presented."""
 
     def __init__(self, model: Model, controller: Controller) -> None:

@@ -17,7 +17,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array, Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
-from services.controller.reaches import Reaches
+from services.controller.reaches import ReachesUnderWay
 
 DONE = Done(v=VERSION)
 
@@ -38,7 +38,7 @@ class GoalDesk:
         robot: Robot,
         law: Controller,
         actions: dict[str, Action],
-        reaches: Reaches,
+        reaches: ReachesUnderWay,
         rest: Callable[[str], None],
         hurry: Callable[[str], None],
     ) -> None:

@@ -28,7 +28,7 @@ from services.controller.config import Config
 from services.controller.counters import Counters
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
-from services.controller.reaches import Reaches
+from services.controller.reaches import ReachesUnderWay
 from services.controller.telling import Telling
 from services.controller.warm import warm
 
@@ -59,7 +59,7 @@ class ControllerNode:
         service.mark, service.describe = self._mark, self._describe
         self._check_posture()
         warm(self._law, robot)
-        self._reaches = Reaches(service.bus, robot, self._law, self._actions, lambda: self._q)
+        self._reaches = ReachesUnderWay(service.bus, robot, self._law, self._actions, lambda: self._q)
         self._goals = GoalDesk(service, robot, self._law, self._actions, self._reaches, self._stay, self._amend)
         service.on_run(self._new_run)
         service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)

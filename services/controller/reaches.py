@@ -41,7 +41,7 @@ class Reach:
     touched: tuple[str, ...] = ()
 
 
-class Reaches:
+class ReachesUnderWay:
     """Begins, follows and ends the reaches of all parts."""
 
     def __init__(self, bus: Bus, robot: Robot, law: Controller, actions: Mapping[str, Action], measured: Callable[[], Array]) -> None:
