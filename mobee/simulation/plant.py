@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mobee.collision.touch import touched_by
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
-from mobee.control.layout import SETTLED
 from mobee.control.modality import Modality
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.robot.robot import Array
+from mobee.simulation.actions import Actions
 from mobee.simulation.active import living
 from mobee.simulation.described import described
-from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
 from mobee.simulation.reaches import ReachesUnderWay
@@ -89,9 +87,7 @@ class OfflinePlant:
         self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
         self._alive = alive
         self._ticks = 0
-        self._parts = np.array([[p.start, p.start + len(p), 0, 0] for p in self.robot.parts.values()], dtype=np.int64).reshape(-1, PART)
-        self._tests = np.zeros((len(self._parts), 2))
-        self._names = tuple(self.robot.parts)
+        self._actions = Actions(self.robot)
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
@@ -191,13 +187,12 @@ class OfflinePlant:
 
         Of a reach: how the part came to rest again (`reached` tells the rest).
         """
-        acting = self._parts[:, ACTING].astype(bool)
-        if not acting.any():
+        acting = self._actions.under_way
+        if not acting:
             raise InvalidValue("no part is acting: call begin first")
-        while (self._parts[acting, ACTING] == 1).all():
+        while not (done := [part for part in acting if part not in self._actions.under_way]):
             self._run(CHUNK)
-        done = [(self._names[p], int(p)) for p in np.flatnonzero(acting & (self._parts[:, ACTING] == 0))]
-        return [(name, self._reaches.after(name) or self._outcome(index, self.model.evaluate(self._q))) for name, index in done]
+        return [(part, self._reaches.after(part) or self._outcome(part, self.model.evaluate(self._q))) for part in done]
 
     def tick(self) -> None:
         """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
@@ -219,7 +214,7 @@ class OfflinePlant:
         kept = traced or self._digest is not None
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
-        rows, done, lost = self._runner.run(self._ticks, most, self._parts, self._tests, kept, traced)
+        rows, done, lost = self._runner.run(self._ticks, most, self._actions.parts, self._actions.tests, kept, traced)
         if done:
             self._pose = None
             self._ticks += done
@@ -228,7 +223,7 @@ class OfflinePlant:
             if self._digest is not None:
                 self._digest.update(np.ascontiguousarray(rows[:, :n]).astype("<f8").tobytes())
         if lost:
-            self._parts[:, ACTING] = 0
+            self._actions.end_all()
             for part in self._reaches.running:
                 self._reaches.drop(part)
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
@@ -241,24 +236,18 @@ class OfflinePlant:
     def _let_go(self) -> None:
         """Let the parts whose reach has settled or timed out be drawn back by their attractors."""
         for part in self._reaches.running:
-            index = self._names.index(part)
-            if self._parts[index, ACTING] == 0:
+            if part not in self._actions.under_way:
                 pose = self.model.evaluate(self._q)
-                if self._reaches.ended(part, self._outcome(index, pose), pose):
+                if self._reaches.ended(part, self._outcome(part, pose), pose):
                     self._test(part)
 
     def _test(self, part: str) -> None:
         """Start the part's settle test: in the tick just over, as live, so that the next one is the first to see it."""
-        index, asked = self._names.index(part), self.time - self.dt
-        self._tests[index] = asked, asked + self.controller.gains.settle.first_look
-        self._parts[index, ACTING] = 1
+        self._actions.begin(part, self.time - self.dt, self.controller.gains.settle.first_look)
 
     def _require_alone(self, part: str, doing: str) -> None:
-        if others := [self._names[p] for p in np.flatnonzero(self._parts[:, ACTING]) if self._names[p] != part]:
+        if others := [other for other in self._actions.under_way if other != part]:
             raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
 
-    def _outcome(self, index: int, pose: Pose) -> Outcome:
-        name = self._names[index]
-        first, stop, verdict = self._parts[index, [FIRST, STOP, VERDICT]]
-        duration = self.time - self.dt - float(self._tests[index, 0])
-        return Outcome(self._q[first:stop].copy(), bool(verdict == SETTLED), duration, touched_by(pose, name))
+    def _outcome(self, part: str, pose: Pose) -> Outcome:
+        return self._actions.outcome(part, self._q, self.time - self.dt, pose)
