@@ -12,7 +12,7 @@ from mobee.roadmap.term import Aim
 from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Robot
 
-RESTARTS, AT_ONCE = 40, 8
+RESTARTS, AT_ONCE = 40, 4
 STEPS = 60  # of one start at most
 NEAR = 0.15  # of the motors' ranges: standard deviation of every second restart about the start; the others are anywhere
 _EXACT = 1e-6  # m or rad, for a term that is without tolerance
