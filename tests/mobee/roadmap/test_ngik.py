@@ -80,16 +80,16 @@ def test_plain_functions_are_terms(free: mobee.Model) -> None:
 
 
 def test_what_least_squares_misses_evolution_finds(free: mobee.Model) -> None:
-    """A residual without a derivative that hardly any solution of the rest meets."""
+    """A residual without a derivative that hardly any solution of the rest meets: three motors, each within 5 mrad."""
     robot = free.robot
     goal = robot.limits.mean(axis=1)
-    elbow = robot.motor_index("r_elbow")
+    bends = [robot.motor_index(name) for name in ("r_elbow", "r_wrist_prosup", "torso_yaw")]
     palm = costs.position("right_palm", free.evaluate(goal).position("right_palm"))
 
     def bent(pose: mobee.Pose, contacts: object) -> np.ndarray:
-        return np.abs(pose.q[..., elbow] - goal[elbow])
+        return np.abs(pose.q[..., bends] - goal[bends]).max(axis=-1)
 
-    both = [palm, costs.term(bent, tolerance=1e-3)]
+    both = [palm, costs.term(bent, tolerance=5e-3)]
     assert not mobee.solve_ik(free, both, motors=ARM, method="least_squares").reached
     assert mobee.solve_ik(free, both, motors=ARM).reached
 
