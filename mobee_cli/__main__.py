@@ -31,6 +31,8 @@ VERBS = {
     "view": "a robot's file as a picture that moves",
 }
 
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: threads only wait for each other
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
@@ -58,6 +60,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _run(verb: str, arguments: list[str]) -> int:
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     try:
         module = importlib.import_module(f"mobee_cli.{verb}")
         parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)

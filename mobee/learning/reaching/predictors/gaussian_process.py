@@ -51,28 +51,35 @@ class GaussianProcess:
         """Learn how a reach went."""
         if self._reached.pair(state, target) is not None:
             self._repeats += 1
-        self._posterior.append(state, target, reward - self._arm.rewards(np.array([state]), target).item())
+        self._waiting.append((state, target, reward - self._arm.rewards(np.array([state]), target).item()))
         self._reached.add(state, target, reward)
         if self._reached.tries in self._refits:
             self._fit()
-        elif self._repeats >= REPEATS or len(self._posterior) >= self._room:
+        elif self._repeats >= REPEATS or len(self._posterior) + len(self._waiting) >= self._room:
             self._rebuild()
 
     def mean(self, target: Array) -> Array:
         """Expected reward of reaching from each state, shape (S,)."""
-        return self._before(target) + self._posterior.about(target)[0]
+        return self._before(target) + self._about(target)[0]
 
     def deviation(self, target: Array) -> Array:
         """Standard deviation of the mean rewards, shape (S,)."""
-        deviation: Array = np.sqrt(np.maximum(self._posterior.about(target)[1].diagonal(), 0.0))
+        deviation: Array = np.sqrt(np.maximum(self._about(target)[1].diagonal(), 0.0))
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
         """One draw of the mean rewards of all states together, shape (S,)."""
-        mean, covariance = self._posterior.about(target)
+        mean, covariance = self._about(target)
         spare = JITTER * self._covariance.prior * np.eye(len(mean))
         drawn: Array = self._before(target) + mean + np.linalg.cholesky(covariance + spare) @ rng.standard_normal(len(mean))
         return drawn
+
+    def _about(self, target: Array) -> tuple[Array, Array]:
+        """The posterior of a target, given all reaches: those that wait are taken in now, as few of a long record ever need to be."""
+        for state, place, residual in self._waiting:
+            self._posterior.append(state, place, residual)
+        self._waiting.clear()
+        return self._posterior.about(target)
 
     def _before(self, target: Array) -> Array:
         """What is expected of each state before anything was seen, shape (S,)."""
@@ -90,6 +97,7 @@ class GaussianProcess:
         state, target, mean, count = thinned(self._reached, MOST)
         residual = mean - self._arm.rewards(state, target)
         self._posterior = Posterior(self._arm, self._covariance, state, target, residual, count)
+        self._waiting: list[tuple[int, Array, float]] = []  # reaches since then that nobody has asked after yet
         self._repeats, self._room = 0, max(len(state), MOST) + REPEATS
 
 

@@ -44,12 +44,26 @@ def test_merging_repeats_changes_nothing(monkeypatch):
 
 def test_targets_forgotten_in_memory_are_worked_out_again(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 100)
+    other = taught(GaussianProcess(made, refits=()), seen)
+    expected = [other.mean(target) for target in places()]
     monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", 80e3)
-    process, other = taught(GaussianProcess(made, refits=()), seen), GaussianProcess(made, refits=())
-    monkeypatch.undo()
-    taught(other, seen)
+    process = taught(GaussianProcess(made, refits=()), seen)
+    for _ in range(2):
+        for target, mean in zip(places(), expected, strict=True):
+            np.testing.assert_array_equal(process.mean(target), mean)
+    assert len(process._posterior._asked) < len(places())
+
+
+def test_a_record_taken_in_at_once_is_one_learned_reach_by_reach():
+    made, seen = reaches(), drawn(reaches(), 100)
+    at_once, one_by_one = (GaussianProcess(made, refits=(30, 60)) for _ in range(2))
+    taught(at_once, seen)
+    for state, target, reward in seen:
+        one_by_one.mean(target)
+        one_by_one.add(state, target, reward, 0.0)
     for target in places():
-        np.testing.assert_array_equal(process.mean(target), other.mean(target))
+        np.testing.assert_array_equal(at_once.mean(target), one_by_one.mean(target))
+        np.testing.assert_array_equal(at_once.deviation(target), one_by_one.deviation(target))
 
 
 @pytest.mark.parametrize(("targets", "kept"), [(3.5, 3), (0.5, 1)])
