@@ -2,7 +2,7 @@
 
 Claim: trained offline and refined live, it brings the palm to within 2 cm of the surface of at least 95 % of the thesis' 27 targets that
 can be reached, and of 90 % of fresh random ones, from random poses, without a solid contact deeper than 2 mm.
-Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: half an hour a start on 2 cores.
+Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes a start on 2 cores.
 
 The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet, with gravity.  A start: a
 learner (gp, ucb, alike) of 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified motors, then

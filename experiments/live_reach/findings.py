@@ -24,7 +24,7 @@ CLAIMS = (
         "at least 0.95",
     ),
     Claim("aim of this reproduction", "live: palm within 2 cm of the surface of fresh random targets, from random poses", "at least 0.90"),
-    Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while it reaches", "0"),
+    Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while it reaches for what rests", "0"),
     Claim("aim of this reproduction", "a reach moves within 5 ms of the request, on robot_sim's clock", "at most 5 ms"),
     Claim("aim of this reproduction", "live, the learned reacher is no worse than inverse kinematics and RRT-Connect", "-"),
 )

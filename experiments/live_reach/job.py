@@ -38,7 +38,7 @@ class Tried(Struct, frozen=True):
     off: float  # rad, from the posture to begin in
     actions: int
     believed: float  # m, that were missing by the encoders, in the end
-    thinking: float  # s of the clock on the wall
+    thinking: float  # s of processor time spent on plans
     why: str = ""  # it ended without a reach
     asked: int = 0  # tick of the last request
     there: list[float] | None = None  # m, where a target that moves was at the last of the ends

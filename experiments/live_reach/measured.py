@@ -32,7 +32,7 @@ class Judged(Struct, frozen=True):
     seconds: float  # robot time from the presentation to that moment
     actions: int
     reaches: int
-    thinking: float  # s of this machine's time
+    thinking: float  # s of processor time spent on plans
     deep: list[Touch]  # solid contacts deeper than 2 mm from when the arm set out from home to its rest
     begun_off: float  # rad, from the posture to begin in
     why: str  # it came to no end

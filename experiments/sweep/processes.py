@@ -15,7 +15,7 @@ from multiprocessing.context import SpawnProcess
 from experiments.sweep.cell import Cell, Work
 from experiments.sweep.done import Done, do
 
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # for who is not started by mobee_cli, which sets them too
 _PATIENCE = 2.0  # s, for a process to end
 
 

@@ -12,6 +12,7 @@ from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
 from services.agents.learned import LearnedStream
+from services.agents.told import tell
 from services.agents.work import Work
 from services.common.bus_plant import BusPlant
 from services.common.delivery import EVENTS
@@ -75,19 +76,7 @@ class AgentNode:
         self._made += 1
         self._timeouts += not made.settled
         self._seconds += made.duration
-        self._stream.put(
-            agent=self._config.part,
-            n=made.n,
-            s=made.s,
-            a=made.a,
-            goal=int(self._agent.space.goal(made.s, made.a)),
-            s_next=made.s_next,
-            reward=made.reward,
-            value=value,
-            settled=made.settled,
-            duration=made.duration,
-            touched=list(made.touched),
-        )
+        tell(self._stream, self._agent.space, made.n, made, value)
         agent = self._agent
         self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 

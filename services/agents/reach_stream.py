@@ -12,6 +12,7 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Step
 from mobee.robot.robot import Array
 from services.agents.learned import LearnedStream
+from services.agents.told import tell
 from services.common.bus import Bus
 from services.common.delivery import EVENTS
 
@@ -31,19 +32,7 @@ class ReachStream:
         values, action_values = plan
         self._note(step)
         if step.a != REACH:
-            self._transitions.put(
-                agent=self._agent.part,
-                n=self._count,
-                s=step.s,
-                a=step.a,
-                goal=int(self._agent.space.goal(step.s, step.a)),
-                s_next=step.s_next,
-                reward=step.reward,
-                value=float(values[step.s]),
-                settled=step.settled,
-                duration=step.duration,
-                touched=list(step.touched),
-            )
+            tell(self._transitions, self._agent.space, self._count, step, float(values[step.s]))
 
         def numbers() -> tuple[Array, Array]:
             value = action_values[:, :-1]

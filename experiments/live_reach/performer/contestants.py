@@ -26,8 +26,8 @@ class Ended:
     """How an attempt ended.
 
     `ends`: ticks at which the palm was to be there.  `actions`: how many, reaches included.  `believed`: m that were missing in the end, by
-    the encoders.  `thinking`: s of the clock on the wall.  `first`: ticks from the request of the last reach to the first command that
-    moves, -1 where nobody looked.
+    the encoders.  `thinking`: s of processor time spent on plans.  `first`: ticks from the request of the last reach to the first command
+    that moves, -1 where nobody looked.
     """
 
     ends: list[int]

@@ -29,7 +29,7 @@ def ends(apart: float) -> list[int]:
     """The states from which it would reach, where those near state 0 are worth most."""
     plant, worth = Obedient(), np.full(81, 0.05)
     worth[[0, 1, 3, 9, 27]] = [0.9, 0.5, 0.4, 0.3, 0.2]
-    agent = ReachAgent(space(), plant, marker="right_palm")  # type: ignore[arg-type]
+    agent = ReachAgent(space(), plant, marker="right_palm")  # type: ignore[arg-type]  # a course never reaches, so the plant need not
     course = Course(plant, agent, lambda target: worth.copy(), lambda: np.zeros(3), np.random.default_rng(0), apart)
     found = []
     for _ in range(2):

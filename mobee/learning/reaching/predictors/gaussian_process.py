@@ -51,7 +51,7 @@ class GaussianProcess:
         """Learn how a reach went."""
         if self._reached.pair(state, target) is not None:
             self._repeats += 1
-        self._waiting.append((state, target, reward - self._arm.rewards(np.array([state]), target).item()))
+        self._waiting.append((state, target.copy(), reward - self._arm.rewards(np.array([state]), target).item()))
         self._reached.add(state, target, reward)
         if self._reached.tries in self._refits:
             self._fit()
