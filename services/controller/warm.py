@@ -9,6 +9,7 @@ from bus_schema.rpc import ReachFor
 from mobee import Controller
 from mobee.collision.touch import links_moved
 from mobee.control import Forces
+from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Robot
 
@@ -27,7 +28,10 @@ def warm(law: Controller, robot: Robot) -> None:
     for part in robot.parts:
         for name, marker in robot.markers.items():
             if marker.link in moved[part]:
-                law.reach_toward(part, name, ReachTarget(here.position(name)))
+                try:
+                    law.reach_toward(part, name, ReachTarget(here.position(name)))
+                except InvalidValue:  # only motors of weight 0 move it: a request for such a reach is refused
+                    continue
                 law.step(robot.home, min(TICK, 0.5 * law.max_dt), Forces(nothing, nothing, nothing))
                 law.still_nears(part)
                 law.end_reach(part)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,3 +20,8 @@ def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
     for _ in range(3):
         assert np.array_equal(warmed.step(q, 0.01).velocity, new.step(q, 0.01).velocity)
     assert not len(warmed.reaches[0])
+
+
+def test_what_the_gains_never_move_keeps_no_controller_from_starting() -> None:
+    gains = replace(Gains.default(), weights=(("l_*", 0.0), ("r_*", 0.0)))
+    warm(Controller(Model(ROBOT), gains, "velocity"), ROBOT)
