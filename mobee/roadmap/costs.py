@@ -16,7 +16,8 @@ from mobee.errors import InvalidValue
 from mobee.pose import Pose
 from mobee.roadmap.centre_of_mass import centre_of_mass
 from mobee.roadmap.function import Function
-from mobee.roadmap.term import Aim, Residual, Term, angle_between
+from mobee.roadmap.term import Aim, Residual, Term
+from mobee.roadmap.vectors import angle_between, lengths, unit_vector, units, vector
 from mobee.robot.robot import Array, Robot
 
 PER_METRE, PER_RAD, PER_DEPTH = 20.0, 2.0, 20.0
@@ -26,10 +27,10 @@ _NONE, _UPRIGHT = np.zeros(3), np.eye(3)
 
 def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
     """Put a marker on a place (3,) m (table 3.1)."""
-    goal = _vector("place", place)
+    goal = vector("place", place)
 
     def residual(pose: Pose) -> Array:
-        return _length(pose.position(marker) - goal)
+        return lengths(pose.position(marker) - goal)
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
@@ -46,7 +47,7 @@ def orientation(marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight
     wanted = np.array(goal, dtype=np.float64)
     if wanted.shape == (3, 3):
         return _rotation(marker, wanted, tolerance, weight)
-    direction = _unit("goal", wanted)
+    direction = unit_vector("goal", wanted)
 
     def residual(pose: Pose) -> Array:
         return angle_between(pose.normal(marker), direction)
@@ -62,7 +63,7 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
     """Hold two markers at a distance [m] from each other (table 3.1)."""
 
     def residual(pose: Pose) -> Array:
-        found: Array = np.abs(_length(pose.position(first) - pose.position(second)) - distance)
+        found: Array = np.abs(lengths(pose.position(first) - pose.position(second)) - distance)
         return found
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
@@ -76,7 +77,7 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
     """Turn two markers' normals to each other: each points along the line to the other marker; the residual is the larger angle."""
 
     def residual(pose: Pose) -> Array:
-        way = _units(pose.position(second) - pose.position(first))
+        way = units(pose.position(second) - pose.position(first))
         found: Array = np.maximum(angle_between(pose.normal(first), way), angle_between(pose.normal(second), -way))
         return found
 
@@ -92,11 +93,11 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
 
 def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
     """Let a marker's normal point to a place (3,) m, or to another marker."""
-    at = goal if isinstance(goal, str) else _vector("goal", goal)
+    at = goal if isinstance(goal, str) else vector("goal", goal)
 
     def residual(pose: Pose) -> Array:
         there = pose.position(at) if isinstance(at, str) else at
-        return angle_between(pose.normal(marker), _units(there - pose.position(marker)))
+        return angle_between(pose.normal(marker), units(there - pose.position(marker)))
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
@@ -128,7 +129,7 @@ def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
 
     def residual(pose: Pose) -> Array:
         limits = pose.robot.limits
-        return _length((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
+        return lengths((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
 
     return _term("home", residual, weight, None)
 
@@ -152,7 +153,7 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
 
     def residual(pose: Pose) -> Array:
         weighed = centre_of_mass(pose.robot)
-        return _length(weighed.of(pose.transforms)[..., :2] - (weighed.at_home[:2] if above is None else above))
+        return lengths(weighed.of(pose.transforms)[..., :2] - (weighed.at_home[:2] if above is None else above))
 
     return _term("balance", residual, weight, tolerance)
 
@@ -209,30 +210,6 @@ def _term(
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
         raise InvalidValue(f"tolerance of {name!r} is {tolerance!r}; it must be finite and at least 0, or None.")
     return Term(name, residual, weight, tolerance, aims)
-
-
-def _vector(name: str, given: ArrayLike) -> Array:
-    vector = np.array(given, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
-    return vector
-
-
-def _unit(name: str, given: Array) -> Array:
-    vector = _vector(name, given)
-    if not np.linalg.norm(vector) > 0.0:
-        raise InvalidValue(f"{name} is {given!r}; it must be a direction (3,), or a rotation (3, 3).")
-    return _units(vector)
-
-
-def _length(vectors: Array) -> Array:
-    length: Array = np.sqrt((vectors**2).sum(axis=-1))
-    return length
-
-
-def _units(vectors: Array) -> Array:
-    units: Array = vectors / np.maximum(_length(vectors)[..., None], 1e-12)
-    return units
 
 
 def _frame(direction: Array) -> Array:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from mobee.pose import Pose
 from mobee.robot.robot import Array, Robot
 
@@ -40,9 +38,3 @@ class Term:
     weight: float
     tolerance: float | None
     aims: Callable[[Robot], tuple[Aim, ...]] | None = None
-
-
-def angle_between(one: Array, other: Array) -> Array:
-    """The angle between unit vectors (..., 3), (...,) rad; exact near 0 and near pi too."""
-    angle: Array = 2.0 * np.arctan2(np.sqrt(((one - other) ** 2).sum(axis=-1)), np.sqrt(((one + other) ** 2).sum(axis=-1)))
-    return angle

@@ -6,19 +6,12 @@ import pytest
 import mobee
 from mobee.errors import InvalidValue, UnknownName
 from mobee.roadmap import costs
-from mobee.roadmap.term import angle_between
 
 
 def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     x, y, z = axis / np.linalg.norm(axis)
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.5, np.pi / 2, 3.0, np.pi - 1e-6, np.pi])
-def test_angles_are_exact_near_their_ends(angle: float) -> None:
-    one, other = np.array([1.0, 0.0, 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
-    assert angle_between(one, other) == pytest.approx(angle, abs=1e-12)
 
 
 def test_position_is_the_distance(free: mobee.Model, postures: np.ndarray) -> None:
