@@ -12,13 +12,15 @@ from mobee.collision.touch import links_moved
 from mobee.collision.world import World
 from mobee.errors import InvalidValue
 from mobee.model import Model
+from mobee.roadmap import costs
+from mobee.roadmap.least_squares import Descent
+from mobee.roadmap.problem import Problem
 from mobee.robot.robot import Array, Ints
 
 POINT = 1e-3  # m, radius of what stands for a place
 SHELL, FAR = 0.02, 0.5  # m
-STEPS, STARTS = 60, 24
-DAMPING = 0.02  # m, below which errors are no longer damped away
-STEP = 0.3  # rad, a motor's longest in one step
+MET = 1e-4  # m from the place: on it
+STARTS = 23  # random ones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,30 +35,17 @@ class Nearest:
 def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
     """The posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
 
-    Damped least squares within the motors' limits, from q and from random postures: nothing keeps it from touching, and what it
-    finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker.
+    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.least_squares`: nothing keeps it from
+    touching, and what it finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker, or
+    for what is no place or no q.
     """
-    robot, where = model.robot, np.asarray(position, dtype=np.float64)
-    motors = _movers(model, part, marker)
-    low, high = robot.limits[motors].T
-    rng = np.random.default_rng(seed)
-    at = np.repeat(np.clip(q, *robot.limits.T)[None, :], STARTS, axis=0)
-    at[1:, motors] = rng.uniform(low, high, (STARTS - 1, len(motors)))
-    for _ in range(STEPS):
-        error = where - model.evaluate(at).position(marker)
-        rows = model.jacobian(at, marker)[:, :3, motors]
-        push = np.einsum("bij,bi->bj", rows, error)
-        kept = ((at[:, motors] <= low) & (push < 0.0)) | ((at[:, motors] >= high) & (push > 0.0))
-        rows = np.where(kept[:, None, :], 0.0, rows)
-        damping = np.minimum((error**2).sum(axis=1), DAMPING**2) + 1e-9
-        inner = np.einsum("bij,bkj->bik", rows, rows) + damping[:, None, None] * np.eye(3)
-        step = np.einsum("bij,bi->bj", rows, np.linalg.solve(inner, error[..., None])[..., 0])
-        step *= np.minimum(1.0, STEP / np.maximum(np.abs(step).max(axis=1, keepdims=True), STEP))
-        at[:, motors] = np.clip(at[:, motors] + step, low, high)
-    there = model.evaluate(at).position(marker)
-    distance = np.linalg.norm(where - there, axis=1)
-    best = int(distance.argmin())
-    return Nearest(at[best], there[best], float(distance[best]))
+    motors = [model.robot.motors[motor] for motor in _movers(model, part, marker)]
+    problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)
+    low, high = problem.limits.T
+    drawn = np.random.default_rng(seed).uniform(low, high, (STARTS, len(low)))
+    ends, missing = Descent(problem).ends(np.concatenate([problem.start[None], problem.whole(drawn)]))
+    best = int(missing[:, 0].argmin())
+    return Nearest(ends[best], model.evaluate(ends[best]).position(marker), float(missing[best, 0]))
 
 
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:

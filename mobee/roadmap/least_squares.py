@@ -34,13 +34,18 @@ class Descent:
 
     def run(self, q: Array) -> Array:
         """Where poses q (B, n), within the limits, lead to that meet every aim, (K, n)."""
+        ends, residuals = self.ends(q)
+        met: Array = ends[(residuals <= self._enough).all(axis=1)]
+        return met
+
+    def ends(self, q: Array) -> tuple[Array, Array]:
+        """Where poses q (B, n), within the limits, lead to, (B, n), and what every aim misses there, (B, aims) m or rad."""
         ends = q.copy()
         evaluations, residuals = _compiled().descend(
             self._packed.integers, self._packed.floats, self._numbers, self._reals, self._problem.free, self._low, self._high, STEPS, ends
         )
         self._problem.evaluations += evaluations
-        met: Array = ends[(residuals <= self._enough).all(axis=1)]
-        return met
+        return ends, residuals
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:

@@ -63,3 +63,5 @@ def test_what_does_not_fit_together_is_told_with_what_does() -> None:
         nearest_posture(MODEL, "right_arm", "left_palm", np.zeros(3), ROBOT.home)
     with pytest.raises(UnknownName, match="right_palm"):
         nearest_posture(MODEL, "right_arm", "right_plam", np.zeros(3), ROBOT.home)
+    with pytest.raises(InvalidValue, match="place.*3"):
+        nearest_posture(MODEL, "right_arm", "right_palm", np.zeros(2), ROBOT.home)
