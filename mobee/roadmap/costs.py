@@ -15,14 +15,33 @@ from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
 from mobee.errors import InvalidValue
 from mobee.pose import Pose
 from mobee.roadmap.centre_of_mass import centre_of_mass
+from mobee.roadmap.costs_between import aligned, at_most, plane, relative_orientation, relative_position
 from mobee.roadmap.function import Function
-from mobee.roadmap.term import Aim, Residual, Term
-from mobee.roadmap.vectors import angle_between, lengths, unit_vector, units, vector
+from mobee.roadmap.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
+from mobee.roadmap.vectors import angle_between, lengths, rotation, turn_between, unit_vector, units, vector
 from mobee.robot.robot import Array, Robot
 
-PER_METRE, PER_RAD, PER_DEPTH = 20.0, 2.0, 20.0
-METRES, RADIANS = 0.005, float(np.deg2rad(5.0))
-_NONE, _UPRIGHT = np.zeros(3), np.eye(3)
+__all__ = [
+    "aligned",
+    "at_most",
+    "balance",
+    "collision",
+    "comfort",
+    "constraints",
+    "gaze",
+    "hold",
+    "home",
+    "orientation",
+    "palm_to_palm",
+    "plane",
+    "position",
+    "relative_orientation",
+    "relative_position",
+    "term",
+]
+
+PER_DEPTH = 20.0
+_NONE = np.zeros(3)
 
 
 def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
@@ -34,29 +53,34 @@ def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: f
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
-        return (Aim(PLACE, m.link, m.position, _UPRIGHT, 0, goal, _UPRIGHT),)
+        return (Aim(PLACE, m.link, m.position, UPRIGHT, 0, goal, UPRIGHT),)
 
-    return _term(f"position {marker}", residual, weight, tolerance, aims)
+    return checked_term(f"position {marker}", residual, weight, tolerance, aims)
 
 
-def orientation(marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Let a marker's normal point along a direction (3,), or turn the whole marker to a rotation (3, 3) (table 3.1).
+def orientation(
+    marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD, direction: ArrayLike | None = None
+) -> Term:
+    """Let a marker's normal point along a goal (3,), or turn the whole marker to a rotation (3, 3) (table 3.1).
 
+    `direction` (3,) in the marker's frame points there instead of the normal.
     The residual is the angle between them: u.u* + 1, as printed, is that of opposite directions, and flat at both its ends.
     """
     wanted = np.array(goal, dtype=np.float64)
     if wanted.shape == (3, 3):
         return _rotation(marker, wanted, tolerance, weight)
-    direction = unit_vector("goal", wanted)
+    there = unit_vector("goal", wanted)
+    own = None if direction is None else unit_vector("direction", direction)
 
     def residual(pose: Pose) -> Array:
-        return angle_between(pose.normal(marker), direction)
+        return angle_between(pose.normal(marker) if own is None else pose.rotation(marker) @ own, there)
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
-        return (Aim(ALONG, m.link, m.position, _frame(m.normal), 0, _NONE, _frame(direction)),)
+        here = m.normal if own is None else m.rotation @ own
+        return (Aim(ALONG, m.link, m.position, direction_frame(here), 0, _NONE, direction_frame(there)),)
 
-    return _term(f"orientation {marker}", residual, weight, tolerance, aims)
+    return checked_term(f"orientation {marker}", residual, weight, tolerance, aims)
 
 
 def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
@@ -68,9 +92,9 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         a, b = robot.marker(first), robot.marker(second)
-        return (Aim(HOLD, a.link, a.position, _UPRIGHT, b.link, b.position, _UPRIGHT, distance),)
+        return (Aim(HOLD, a.link, a.position, UPRIGHT, b.link, b.position, UPRIGHT, distance),)
 
-    return _term(f"hold {first} {second}", residual, weight, tolerance, aims)
+    return checked_term(f"hold {first} {second}", residual, weight, tolerance, aims)
 
 
 def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
@@ -84,11 +108,11 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
     def aims(robot: Robot) -> tuple[Aim, ...]:
         a, b = robot.marker(first), robot.marker(second)
         return (
-            Aim(FACING, a.link, a.position, _frame(a.normal), b.link, b.position, _UPRIGHT),
-            Aim(FACING, b.link, b.position, _frame(b.normal), a.link, a.position, _UPRIGHT),
+            Aim(FACING, a.link, a.position, direction_frame(a.normal), b.link, b.position, UPRIGHT),
+            Aim(FACING, b.link, b.position, direction_frame(b.normal), a.link, a.position, UPRIGHT),
         )
 
-    return _term(f"palm_to_palm {first} {second}", residual, weight, tolerance, aims)
+    return checked_term(f"palm_to_palm {first} {second}", residual, weight, tolerance, aims)
 
 
 def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
@@ -102,9 +126,9 @@ def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
         link, point = (robot.marker(at).link, robot.marker(at).position) if isinstance(at, str) else (0, at)
-        return (Aim(FACING, m.link, m.position, _frame(m.normal), link, point, _UPRIGHT),)
+        return (Aim(FACING, m.link, m.position, direction_frame(m.normal), link, point, UPRIGHT),)
 
-    return _term(f"gaze {marker}", residual, weight, tolerance, aims)
+    return checked_term(f"gaze {marker}", residual, weight, tolerance, aims)
 
 
 def collision(by: str = "depth", weight: float | None = None) -> Term:
@@ -120,7 +144,7 @@ def collision(by: str = "depth", weight: float | None = None) -> Term:
         return found
 
     heavy = (PER_DEPTH if by == "depth" else 1.0) if weight is None else weight
-    return _term("collision", residual, heavy, 0.0)
+    return checked_term("collision", residual, heavy, 0.0)
 
 
 def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
@@ -131,7 +155,7 @@ def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
         limits = pose.robot.limits
         return lengths((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
 
-    return _term("home", residual, weight, None)
+    return checked_term("home", residual, weight, None)
 
 
 def comfort(weight: float = 0.5) -> Term:
@@ -142,7 +166,7 @@ def comfort(weight: float = 0.5) -> Term:
         found: Array = (((2.0 * pose.q - low - high) / (high - low)) ** 4).mean(axis=-1)
         return found
 
-    return _term("comfort", residual, weight, None)
+    return checked_term("comfort", residual, weight, None)
 
 
 def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
@@ -155,7 +179,7 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
         weighed = centre_of_mass(pose.robot)
         return lengths(weighed.of(pose.transforms)[..., :2] - (weighed.at_home[:2] if above is None else above))
 
-    return _term("balance", residual, weight, tolerance)
+    return checked_term("balance", residual, weight, tolerance)
 
 
 def constraints(weight: float = PER_RAD) -> Term:
@@ -167,7 +191,7 @@ def constraints(weight: float = PER_RAD) -> Term:
             missing = missing + np.maximum(0.0, -(pose.q @ clause.a.T + clause.b).max(axis=-1))
         return missing
 
-    return _term("constraints", residual, weight, 0.0)
+    return checked_term("constraints", residual, weight, 0.0)
 
 
 def term(
@@ -183,35 +207,17 @@ def term(
         raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
     if weight is None:
         weight = 0.1 / tolerance if tolerance else 1.0
-    return _term(name or getattr(function, "__name__", "term"), Function(function), weight, tolerance)
+    return checked_term(name or getattr(function, "__name__", "term"), Function(function), weight, tolerance)
 
 
 def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Term:
-    if not np.allclose(wanted @ wanted.T, np.eye(3), atol=1e-6) or np.linalg.det(wanted) < 0.0:
-        raise InvalidValue(f"goal of {marker!r} is no rotation: its rows must be a right-handed set of unit vectors.")
+    rotation(f"goal of {marker!r}", wanted)
 
     def residual(pose: Pose) -> Array:
-        apart = np.sqrt(((pose.rotation(marker) - wanted) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
-        angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
-        return angle
+        return turn_between(pose.rotation(marker), wanted)
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
         return (Aim(TURNED, m.link, m.position, m.rotation, 0, _NONE, wanted),)
 
-    return _term(f"orientation {marker}", residual, weight, tolerance, aims)
-
-
-def _term(
-    name: str, residual: Residual, weight: float, tolerance: float | None, aims: Callable[[Robot], tuple[Aim, ...]] | None = None
-) -> Term:
-    if not (np.isfinite(weight) and weight > 0.0):
-        raise InvalidValue(f"weight of {name!r} is {weight!r}; it must be finite and above 0.")
-    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
-        raise InvalidValue(f"tolerance of {name!r} is {tolerance!r}; it must be finite and at least 0, or None.")
-    return Term(name, residual, weight, tolerance, aims)
-
-
-def _frame(direction: Array) -> Array:
-    """What an aim takes for a direction: the first three numbers count."""
-    return np.concatenate([direction, np.zeros(6)])
+    return checked_term(f"orientation {marker}", residual, weight, tolerance, aims)

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
+from mobee.errors import InvalidValue
 from mobee.pose import Pose
 from mobee.robot.robot import Array, Robot
 
 Residual = Callable[[Pose], Array]
+
+PER_METRE, PER_RAD = 20.0, 2.0  # weights
+METRES, RADIANS = 0.005, float(np.deg2rad(5.0))  # tolerances
+UPRIGHT = np.eye(3)  # the frame of an aim that needs none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,3 +45,19 @@ class Term:
     weight: float
     tolerance: float | None
     aims: Callable[[Robot], tuple[Aim, ...]] | None = None
+
+
+def checked_term(
+    name: str, residual: Residual, weight: float, tolerance: float | None, aims: Callable[[Robot], tuple[Aim, ...]] | None = None
+) -> Term:
+    """A term whose weight and tolerance make sense; raises InvalidValue."""
+    if not (np.isfinite(weight) and weight > 0.0):
+        raise InvalidValue(f"weight of {name!r} is {weight!r}; it must be finite and above 0.")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
+        raise InvalidValue(f"tolerance of {name!r} is {tolerance!r}; it must be finite and at least 0, or None.")
+    return Term(name, residual, weight, tolerance, aims)
+
+
+def direction_frame(direction: Array) -> Array:
+    """What an aim takes for a direction: the first three numbers count."""
+    return np.concatenate([direction, np.zeros(6)])

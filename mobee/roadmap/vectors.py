@@ -41,3 +41,18 @@ def angle_between(one: Array, other: Array) -> Array:
     """The angle between unit vectors (..., 3), (...,) rad; exact near 0 and near pi too."""
     angle: Array = 2.0 * np.arctan2(lengths(one - other), lengths(one + other))
     return angle
+
+
+def rotation(name: str, given: ArrayLike) -> Array:
+    """A copy of what was given, (3, 3); raises InvalidValue if it is no rotation."""
+    found = np.array(given, dtype=np.float64)
+    if found.shape != (3, 3) or not np.allclose(found @ found.T, np.eye(3), atol=1e-6) or np.linalg.det(found) < 0.0:
+        raise InvalidValue(f"{name} is no rotation: its rows must be a right-handed set of three unit vectors.")
+    return found
+
+
+def turn_between(one: Array, other: Array) -> Array:
+    """The angle of the turn from rotations (..., 3, 3) to others, (...,) rad."""
+    apart = np.sqrt(((one - other) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
+    angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
+    return angle

@@ -11,6 +11,7 @@ from mobee.roadmap.least_squares import Descent, least_squares
 from mobee.roadmap.problem import Problem
 
 PALMS = "left_palm", "right_palm"
+CLOSED = "position", "normal", "rotation", "hold", "gaze", "fingers", "relative position", "relative orientation", "aligned"
 
 
 def tight(term):
@@ -28,10 +29,14 @@ def terms_at(model: mobee.Model, q: np.ndarray) -> dict[str, object]:
         "rotation": costs.orientation(PALMS[0], pose.rotation(PALMS[0])),
         "hold": costs.hold(*PALMS, float(np.linalg.norm(left - right))),
         "gaze": costs.gaze(eyes + 0.3 * ahead),
+        "fingers": costs.orientation(PALMS[1], pose.rotation(PALMS[1])[:, 0], direction=(1.0, 0.0, 0.0)),
+        "relative position": costs.relative_position(PALMS[1], PALMS[0], pose.rotation(PALMS[0]).T @ (right - left)),
+        "relative orientation": costs.relative_orientation(*PALMS, pose.rotation(PALMS[1]).T @ pose.rotation(PALMS[0])),
+        "aligned": costs.aligned(*PALMS, (1.0, 2.0, 0.5), pose.rotation(PALMS[1]).T @ pose.rotation(PALMS[0]) @ (1.0, 2.0, 0.5)),
     }
 
 
-@pytest.mark.parametrize("name", ["position", "normal", "rotation", "hold", "gaze"])
+@pytest.mark.parametrize("name", [*CLOSED])
 def test_near_a_solution_it_converges_at_once(free: mobee.Model, icub: mobee.Robot, name: str) -> None:
     """The slopes are right: with a wrong one the last digits take many steps."""
     rng = np.random.default_rng(3)
