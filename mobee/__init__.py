@@ -19,6 +19,7 @@ from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 from mobee.roadmap import costs
 from mobee.roadmap.nes import NES
 from mobee.roadmap.ngik import IK, solve_ik
+from mobee.roadmap.roadmap import Roadmap, load_roadmap
 from mobee.roadmap.search import Restart, minimize
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
@@ -54,6 +55,7 @@ __all__ = [
     "ReachTarget",
     "Reacher",
     "Restart",
+    "Roadmap",
     "Robot",
     "RobotFileError",
     "Space",
@@ -68,6 +70,7 @@ __all__ = [
     "costs",
     "cylinder",
     "join_robots",
+    "load_roadmap",
     "load_robot",
     "load_world",
     "minimize",

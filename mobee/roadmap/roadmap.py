@@ -1,0 +1,195 @@
+"""A roadmap: poses that a task is made of, and the motions between them (thesis ch. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue, MobeeError
+from mobee.model import Model
+from mobee.roadmap.archive import read, write
+from mobee.roadmap.fingerprint import robot_digest, world_digest
+from mobee.roadmap.graph import Graph, graph
+from mobee.roadmap.problem import chosen
+from mobee.roadmap.told_world import told_world, world_told
+from mobee.robot.load import load_robot, shipped_robots
+from mobee.robot.robot import Array, Ints
+
+NEAR = 1.5  # spacings: a goal further from all vertices is not of the map
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roadmap:
+    """A graph of poses.
+
+    `q`: (V, n) rad, all motors.  `y`: (V, m), the task coordinates, in their units.  `edges`: (E, 2) vertices, the first the lower
+    one, sorted.  `spacing`: (m,).  `settings`: how it was made, plain JSON; with "motors", the names of those that moved, and "names",
+    those of the task coordinates, where they are known.
+    """
+
+    model: Model  # robot and world it belongs to
+    q: Array
+    y: Array
+    edges: Ints
+    spacing: Array
+    settings: dict[str, Any]
+    graph: Graph = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check that the arrays belong together; raises InvalidValue."""
+        n, m = len(self.model.robot.motors), len(self.spacing)
+        if self.q.shape != (len(self.q), n) or self.y.shape != (len(self.q), m) or self.edges.shape != (len(self.edges), 2):
+            shapes = f"q {self.q.shape}, y {self.y.shape}, edges {self.edges.shape}"
+            raise InvalidValue(f"a roadmap of {shapes}; it must be q (V, {n}), y (V, {m}) and edges (E, 2).")
+        if len(self.edges) and not (0 <= self.edges.min() and self.edges.max() < len(self.q)):
+            raise InvalidValue(f"edges name the vertices {self.edges.min()} to {self.edges.max()}; valid are 0 to {len(self.q) - 1}.")
+        if not (self.edges[:, 0] < self.edges[:, 1]).all():
+            raise InvalidValue("of an edge the lower vertex must come first; each is there once, for both ways.")
+        object.__setattr__(self, "graph", graph(self.q, self.edges))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the task coordinates."""
+        return tuple(self.settings.get("names") or (f"y{k + 1}" for k in range(len(self.spacing))))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """Those that moved when it was made; the others are at the same place in every pose."""
+        known = self.settings.get("motors")
+        return self.model.robot.motors if known is None else tuple(known)
+
+    def entry(self, q_from: ArrayLike) -> int:
+        """The vertex nearest to a posture (n,) rad, in fractions of the ranges of the motors that moved."""
+        start = self._posture(q_from)
+        free = chosen(self.model.robot, self.motors)
+        low, high = self.model.robot.limits[free].T
+        return int(np.linalg.norm((self.q[:, free] - start[free]) / (high - low), axis=1).argmin())
+
+    def exit(self, y_goal: ArrayLike) -> int:
+        """The vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than NEAR of them."""
+        goal = self._goal(y_goal)
+        apart = np.linalg.norm((self.y - goal) / self.spacing, axis=1)
+        nearest = int(apart.argmin())
+        if apart[nearest] > NEAR:
+            raise InvalidValue(
+                f"nothing of the map is at {self.told(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
+                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {NEAR:g} spacings of one."
+            )
+        return nearest
+
+    def way(self, q_from: ArrayLike, y_goal: ArrayLike) -> list[int]:
+        """The vertices from `entry` to `exit` by the shortest way in joint space; raises MobeeError where there is none."""
+        self._require_vertices()
+        start, goal = self.entry(q_from), self.exit(y_goal)
+        way = self.graph.shortest(start, goal)
+        if way is None:
+            raise MobeeError(self._apart(start, goal))
+        return way
+
+    def path(self, q_from: ArrayLike, y_goal: ArrayLike) -> Array:
+        """Poses (K, n) rad from the posture q_from (n,) over the map to the vertex nearest to y_goal (m,), by the shortest way.
+
+        Straight lines lead from each to the next; the first, from q_from to its nearest vertex, is none of the map's own.
+
+        Raises:
+            InvalidValue: the map is empty, or has nothing near the goal; says what is.
+            MobeeError: the two are in parts of the map that no edge connects.
+        """
+        start = self._posture(q_from)
+        poses = self.q[self.way(start, y_goal)]
+        return poses if np.array_equal(start, poses[0]) else np.concatenate([start[None], poses])
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a .npz file, whole or not at all; raises MobeeError."""
+        model = self.model
+        write(
+            path,
+            {"q": self.q, "y": self.y, "edges": self.edges, "spacing": self.spacing},
+            {"settings": self.settings | digests(model), "world": world_told(model.world), "reaching": model.reaching},
+        )
+
+    def told(self, y: Array) -> str:
+        """Task coordinates (m,) in words."""
+        return ", ".join(f"{name} {value:.3g}" for name, value in zip(self.names, y, strict=True))
+
+    def _posture(self, given: ArrayLike) -> Array:
+        q, n = np.array(given, dtype=np.float64), len(self.model.robot.motors)
+        if q.shape != (n,) or not np.isfinite(q).all():
+            raise InvalidValue(f"q_from has shape {q.shape}; it must be ({n},) rad, finite, a position for every motor.")
+        self._require_vertices()
+        return q
+
+    def _goal(self, given: ArrayLike) -> Array:
+        y, m = np.atleast_1d(np.array(given, dtype=np.float64)), len(self.spacing)
+        if y.shape != (m,) or not np.isfinite(y).all():
+            raise InvalidValue(f"y_goal has shape {y.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
+        self._require_vertices()
+        return y
+
+    def _require_vertices(self) -> None:
+        if not len(self.q):
+            raise InvalidValue("the map is empty: no pose met its costs. Build it with a wider box, or with looser tolerances.")
+
+    def _apart(self, start: int, goal: int) -> str:
+        label = self.graph.components
+        mine, other = (int((label == label[one]).sum()) for one in (start, goal))
+        return (
+            f"no edges lead from vertex {start} ({self.told(self.y[start])}) to vertex {goal} ({self.told(self.y[goal])}): the map is in "
+            f"{label.max() + 1} parts, and they are in those of {mine} and {other} vertices. Start elsewhere, or build it with more "
+            f"neighbours or a larger `longest`."
+        )
+
+
+def load_roadmap(path: str | Path, model: Model | None = None) -> Roadmap:
+    """The map of a file, for the robot and the world that it was made for.
+
+    `model` None: the robot that comes with mobee under the name that the map was made with, in the world as it was then.
+
+    Raises:
+        MobeeError: no map, not a whole one, or one of another robot or world, with the digests of both.
+    """
+    arrays, notes = read(path)
+    try:
+        settings, made_in = dict(notes["settings"]), notes["world"]
+        q, y, spacing = (arrays[name].astype(np.float64, casting="same_kind") for name in ("q", "y", "spacing"))
+        edges = arrays["edges"].astype(np.intp, casting="same_kind")
+        here = _rebuilt(path, settings, made_in, notes["reaching"]) if model is None else model
+        _require_same(path, settings, here)
+        return Roadmap(here, q, y, edges, spacing, settings)
+    except (KeyError, TypeError) as error:
+        raise MobeeError(f"{path}: no roadmap, or only a part of one ({error}). Build it anew.") from error
+    except InvalidValue as error:
+        raise MobeeError(f"{path}: damaged: {error}") from error
+
+
+def digests(model: Model) -> dict[str, str]:
+    """What the settings of a map say of the robot and the world it was made for."""
+    return {
+        "robot": model.robot.name,
+        "robot_digest": robot_digest(model.robot),
+        "world_digest": world_digest(model.world),
+    }
+
+
+def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any) -> Model:
+    name = settings["robot"]
+    if name not in shipped_robots():
+        raise MobeeError(f"{path}: made for the robot {name!r}, which does not come with mobee: its file must be named too.")
+    model = Model(load_robot(name), told_world(made_in))
+    model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
+    return model
+
+
+def _require_same(path: str | Path, settings: dict[str, Any], model: Model) -> None:
+    here = digests(model)
+    for what in ("robot", "world"):
+        made, now = settings[f"{what}_digest"], here[f"{what}_digest"]
+        if made != now:
+            raise MobeeError(
+                f"{path}: made for {what} {made}, and this {what} is {now}: not every pose and edge of it need be free here. "
+                f"Build it anew, or load it with the {what} it was made for."
+            )

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.roadmap.fingerprint import robot_digest, world_digest
+
+
+def test_a_robot_read_again_under_another_name_is_the_same(icub: mobee.Robot) -> None:
+    assert robot_digest(
+        replace(mobee.load_robot("icub"), name="other", links=tuple(f"l{k}" for k in range(len(icub.links))))
+    ) == robot_digest(icub)
+
+
+@pytest.mark.parametrize("what", ["limits", "marker", "shape", "pairs"])
+def test_a_robot_with_another_body_is_another(icub: mobee.Robot, what: str) -> None:
+    first, palm = icub.motor_table[0], icub.markers["left_palm"]
+    other = {
+        "limits": {"motor_table": (replace(first, limits=first.limits * 0.999), *icub.motor_table[1:])},
+        "marker": {"markers": icub.markers | {"left_palm": replace(palm, position=palm.position + 1e-6)}},
+        "shape": {"shapes": (replace(icub.shapes[0], size=tuple(1.001 * x for x in icub.shapes[0].size)), *icub.shapes[1:])},
+        "pairs": {"solid_pairs": icub.solid_pairs[1:]},
+    }[what]
+    assert robot_digest(replace(icub, **other)) != robot_digest(icub)
+
+
+def test_a_world_is_known_by_what_can_be_touched() -> None:
+    def world(ball: float = 0.1, role: str = "target", names: tuple[str, str] = ("ball", "block"), ghost: bool = False) -> str:
+        made = mobee.World()
+        things = [(names[0], mobee.sphere(0.03), ball, role), (names[1], mobee.box(1, 1, 1), 1.0, "obstacle")]
+        for name, shape, z, how in things if names[0] < names[1] else things[::-1]:
+            made.add(name, shape, position=(0.0, 0.0, z), role=how)
+        if ghost:
+            made.add("ghost", mobee.sphere(0.5), role="ghost")
+        return world_digest(made)
+
+    assert world() == world(names=("z", "a")) == world(ghost=True) == world(ball=0.1 + 1e-13)
+    assert len({world(), world(ball=0.2), world(role="obstacle"), world_digest(mobee.World())}) == 4
+    assert len(world()) == 16
+
+
+def test_what_a_link_carries_is_another_world() -> None:
+    free, carried = mobee.World(), mobee.World()
+    for world in (free, carried):
+        world.add("cup", mobee.sphere(0.03))
+    carried.attach("cup", "l_hand", (np.zeros(3), np.eye(3)))
+    assert world_digest(free) != world_digest(carried)
