@@ -16,7 +16,7 @@ from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
-from mobee.roadmap import costs
+from mobee.roadmap import costs, tasks
 from mobee.roadmap.nes import NES
 from mobee.roadmap.ngik import IK, solve_ik
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
@@ -80,5 +80,6 @@ __all__ = [
     "run_batch",
     "solve_ik",
     "sphere",
+    "tasks",
     "value_iteration",
 ]

@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
+from mobee.engine.aim_kinds import ALONG, AT_MOST, COORDINATE, FACING, HOLD, MOTOR, PLACE, TURNED
 from mobee.engine.compiled import inner
 from mobee.engine.pack import DRIVES, F_AXIS, F_POINT, F_SCALE, I_KIND, I_MOTOR, I_PARENT, JOINTS, UInts
 from mobee.robot.robot import Array, Ints
 
-KIND, A_LINK, B_LINK = range(3)
-NUMBERS = 3
+KIND, A_LINK, B_LINK, OF_MOTOR = range(4)
+NUMBERS = 4
 A_POINT, A_FRAME, B_POINT, B_FRAME, LENGTH, TOLERANCE = 0, 3, 12, 15, 24, 25
 REALS = 26
 
@@ -83,10 +83,16 @@ def _turn_of_frames(frames: Array, numbers: Ints, reals: Array, k: int, errors: 
 
 
 @inner
-def see(numbers: Ints, reals: Array, k: int, frames: Array, seen: Array, errors: Array) -> float:
-    """What is missing of aim k: fills its three errors [m or rad], what `slopes` needs of it, and returns the residual."""
+def see(numbers: Ints, reals: Array, k: int, q: Array, first: int, frames: Array, seen: Array, errors: Array) -> float:
+    """What is missing of aim k: fills its three errors [m or rad], what `slopes` needs of it, and returns the residual.
+
+    q[first], q[first + 1], ...: where the motors are.
+    """
     kind, a, b = numbers[NUMBERS * k + KIND], numbers[NUMBERS * k + A_LINK], numbers[NUMBERS * k + B_LINK]
     at, s, e = REALS * k, 12 * k, 3 * k
+    if kind == MOTOR:
+        errors[e], errors[e + 1], errors[e + 2] = reals[at + LENGTH] - q[first + numbers[NUMBERS * k + OF_MOTOR]], 0.0, 0.0
+        return abs(errors[e])
     _carried(frames, a, reals, at + A_POINT, 1.0, seen, s + _A)
     _carried(frames, b, reals, at + B_POINT, 1.0, seen, s + _B)
     if kind == TURNED:
@@ -100,6 +106,14 @@ def see(numbers: Ints, reals: Array, k: int, frames: Array, seen: Array, errors:
         longer = far - reals[at + LENGTH]
         errors[e], errors[e + 1], errors[e + 2] = longer, 0.0, 0.0
         return abs(longer)
+    if kind == COORDINATE or kind == AT_MOST:
+        missing = reals[at + LENGTH] + reals[at + B_FRAME] * x + reals[at + B_FRAME + 1] * y + reals[at + B_FRAME + 2] * z
+        counts = 1.0 if kind == COORDINATE or missing < 0.0 else 0.0
+        missing *= counts
+        for row in range(3):
+            seen[s + _N + row] = counts * reals[at + B_FRAME + row]
+        errors[e], errors[e + 1], errors[e + 2] = missing, 0.0, 0.0
+        return abs(missing)
     _carried(frames, a, reals, at + A_FRAME, 0.0, seen, s + _N)
     if kind == ALONG:
         _carried(frames, b, reals, at + B_FRAME, 0.0, seen, s + _M)
@@ -123,6 +137,9 @@ def _add_column(
     if kind == HOLD:
         x, y, z = (seen[s + _B] - seen[s + _A], seen[s + _B + 1] - seen[s + _A + 1], seen[s + _B + 2] - seen[s + _A + 2])
         jacobian[at] += sign * (x * vx + y * vy + z * vz) / max(math.sqrt(x * x + y * y + z * z), 1e-9)
+        return
+    if kind == COORDINATE or kind == AT_MOST:
+        jacobian[at] += sign * (seen[s + _N] * vx + seen[s + _N + 1] * vy + seen[s + _N + 2] * vz)
         return
     wx, wy, wz = (0.0, 0.0, 0.0) if slides else (ux, uy, uz)
     if kind == FACING:
@@ -148,7 +165,6 @@ def slopes(
     integers: UInts,
     floats: Array,
     numbers: Ints,
-    reals: Array,
     frames: Array,
     seen: Array,
     column: Ints,
@@ -162,6 +178,11 @@ def slopes(
         jacobian[k] = 0.0
     for k in range(len(numbers) // NUMBERS):
         kind = numbers[NUMBERS * k + KIND]
+        if kind == MOTOR:
+            moves = column[numbers[NUMBERS * k + OF_MOTOR]]
+            if moves >= 0:
+                jacobian[3 * k * d + moves] = turn
+            continue
         for side in range(2):
             here = numbers[NUMBERS * k + A_LINK + side]
             p, sign = 12 * k + 3 * side, 1.0 - 2.0 * side

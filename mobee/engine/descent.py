@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from mobee.engine.aim_kinds import HOLD, PLACE
+from mobee.engine.aim_kinds import AT_MOST, COORDINATE, HOLD, PLACE
 from mobee.engine.aims import A_LINK, B_LINK, KIND, NUMBERS, REALS, TOLERANCE, see, slopes
 from mobee.engine.compiled import entry, inner
 from mobee.engine.kinematics import joint_angles, place_links, sines_cosines
@@ -34,9 +34,9 @@ def _look(
     place_links(integers, floats, angles, sines, cosines, moved, frames)
     total = 0.0
     for k in range(len(numbers) // NUMBERS):
-        residuals[at + k] = see(numbers, reals, k, frames, seen, errors)
+        residuals[at + k] = see(numbers, reals, k, q, first, frames, seen, errors)
         kind = numbers[NUMBERS * k + KIND]
-        weight = 1.0 if kind == PLACE or kind == HOLD else TURN
+        weight = 1.0 if kind == PLACE or kind == HOLD or kind == COORDINATE or kind == AT_MOST else TURN
         for row in range(3 * k, 3 * k + 3):
             errors[row] *= weight
             total += 0.5 * errors[row] * errors[row]
@@ -112,14 +112,15 @@ def _arrived(numbers: Ints, reals: Array, residuals: Array, at: int) -> bool:
 
 @entry(
     "Tuple((int64, float64[:,::1]))("
-    "uint64[::1], float64[::1], int64[::1], float64[::1], int64[::1], float64[::1], float64[::1], int64, float64[:,::1])"
+    "uint64[::1], float64[::1], int64[::1], float64[:,::1], int64[::1], float64[::1], float64[::1], int64, float64[:,::1])"
 )
 def descend(
     integers: UInts, floats: Array, numbers: Ints, reals: Array, free: Ints, low: Array, high: Array, most: int, starts: Array
 ) -> tuple[int, Array]:
     """Move the free motors (d,) of every start (B, n), in place, to meet the aims; returns evaluations and residuals (B, K).
 
-    `numbers`, `reals`: of K aims, see `aims`; low, high: (d,) rad; `most`: steps of one start.
+    `numbers`, `reals`: of K aims, see `aims`; of the reals one row for all starts, or one for each; low, high: (d,) rad; `most`: steps of
+    one start.
     """
     joints, links, motors = np.int64(integers[JOINTS]), np.int64(integers[LINKS]), np.int64(integers[MOTORS])
     aims, d = len(numbers) // NUMBERS, len(free)
@@ -139,19 +140,20 @@ def descend(
     found, flat = residuals.ravel(), starts.ravel()
     evaluations = 0
     for b in range(len(starts)):
+        goals = reals[b if len(reals) > 1 else 0]
         first, at, damping, stale = b * motors, b * aims, 1e-3, True
-        cost = _look(integers, floats, numbers, reals, flat, first, angles, sines, cosines, moved, frames, seen, errors, found, at)
+        cost = _look(integers, floats, numbers, goals, flat, first, angles, sines, cosines, moved, frames, seen, errors, found, at)
         evaluations += 1
         for _ in range(most):
-            if _arrived(numbers, reals, found, at) or damping > _MOST:
+            if _arrived(numbers, goals, found, at) or damping > _MOST:
                 break
             if stale:
-                slopes(integers, floats, numbers, reals, frames, seen, column, TURN, jacobian, d)
+                slopes(integers, floats, numbers, frames, seen, column, TURN, jacobian, d)
             _step(jacobian, errors, damping, low, high, flat, first, free, held, matrix, right, step)
             trial[:] = starts[b]
             for c in range(d):
                 trial[free[c]] = min(max(trial[free[c]] + step[c], low[c]), high[c])
-            new = _look(integers, floats, numbers, reals, trial, 0, angles, sines, cosines, moved, frames, seen, fresh, tried, 0)
+            new = _look(integers, floats, numbers, goals, trial, 0, angles, sines, cosines, moved, frames, seen, fresh, tried, 0)
             evaluations += 1
             stale = new < cost
             if not stale:

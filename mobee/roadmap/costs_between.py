@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from mobee.engine.aim_kinds import ALONG, PLACE, TURNED
 from mobee.pose import Pose
+from mobee.roadmap.aims import below, level
 from mobee.roadmap.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
 from mobee.roadmap.vectors import angle_between, lengths, rotation, turn_between, unit_vector, vector
 from mobee.robot.robot import Array, Robot
@@ -66,7 +67,10 @@ def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METR
         found: Array = np.abs(pose.position(marker) @ across - offset)
         return found
 
-    return checked_term(f"plane {marker}", residual, weight, tolerance)
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        return (level(robot.marker(marker), across, offset),)
+
+    return checked_term(f"plane {marker}", residual, weight, tolerance, aims)
 
 
 def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
@@ -77,4 +81,7 @@ def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = M
         found: Array = np.maximum(pose.position(marker) @ along - most, 0.0)
         return found
 
-    return checked_term(f"at_most {marker}", residual, weight, tolerance)
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        return (below(robot.marker(marker), along, most),)
+
+    return checked_term(f"at_most {marker}", residual, weight, tolerance, aims)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
 
-from mobee.engine.pack import Packed, pack
+from mobee.engine.pack import Flags, Packed, pack
 from mobee.roadmap.problem import Problem
 from mobee.roadmap.term import Aim
 from mobee.robot.per_robot import per_robot
@@ -19,30 +20,43 @@ _EXACT = 1e-6  # m or rad, for a term that is without tolerance
 
 
 class Descent:
-    """Least squares of a problem's aims from any starts."""
+    """Least squares of a problem's aims, and of others besides, from any starts; the others' goals may differ from start to start."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, besides: Sequence[tuple[Aim, float]] = ()) -> None:
         robot = problem.model.robot
         pairs = [(aim, one.tolerance) for one in problem.terms if one.aims is not None for aim in one.aims(robot)]
+        self._own = aim_reals(pairs)
+        pairs += besides
         self.count = len(pairs)
-        self._numbers = np.array([number for aim, _ in pairs for number in (aim.kind, aim.first_link, aim.second_link)], dtype=np.int64)
-        self._reals = np.concatenate([_reals(aim, tolerance) for aim, tolerance in pairs]) if pairs else np.empty(0)
+        self._numbers = np.array(
+            [number for aim, _ in pairs for number in (aim.kind, aim.first_link, aim.second_link, aim.motor)], dtype=np.int64
+        )
+        self._reals = aim_reals(pairs)[None]
         self._enough = np.array([np.inf if tolerance is None else tolerance for _, tolerance in pairs])
         self._packed = _packed(robot)
         self._problem = problem
         self._low, self._high = (np.ascontiguousarray(side) for side in problem.limits.T)
 
-    def run(self, q: Array) -> Array:
-        """Where poses q (B, n), within the limits, lead to that meet every aim, (K, n)."""
-        ends, residuals = self.ends(q)
-        met: Array = ends[(residuals <= self._enough).all(axis=1)]
-        return met
+    def run(self, q: Array, goals: Array | None = None) -> Array:
+        """Where poses q (B, n), within the limits, lead to that meet every aim, (K, n); goals: as of `ends`."""
+        ends, met = self.met(q, goals)
+        return ends[met]
 
-    def ends(self, q: Array) -> tuple[Array, Array]:
-        """Where poses q (B, n), within the limits, lead to, (B, n), and what every aim misses there, (B, aims) m or rad."""
+    def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
+        """Where poses q (B, n), within the limits, lead to, (B, n), and which of them meet every aim, (B,); goals: as of `ends`."""
+        ends, residuals = self.ends(q, goals)
+        met: Flags = (residuals > self._enough).sum(axis=1) == 0
+        return ends, met
+
+    def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
+        """Where poses q (B, n), within the limits, lead to, (B, n), and what every aim misses there, (B, aims) m or rad.
+
+        `goals`: what the aims besides the problem's own are to be at each start, (B, reals of those), see `aim_reals`; None: as given.
+        """
         ends = q.copy()
+        reals = self._reals if goals is None else np.concatenate([np.repeat(self._own[None], len(goals), axis=0), goals], axis=1)
         evaluations, residuals = _compiled().descend(
-            self._packed.integers, self._packed.floats, self._numbers, self._reals, self._problem.free, self._low, self._high, STEPS, ends
+            self._packed.integers, self._packed.floats, self._numbers, reals, self._problem.free, self._low, self._high, STEPS, ends
         )
         self._problem.evaluations += evaluations
         return ends, residuals
@@ -74,6 +88,11 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int) -> Array:
     about = problem.start[problem.free] + NEAR * (high - low) * rng.standard_normal((count, len(low)))
     drawn[::2] = np.clip(about[::2], low, high)
     return drawn
+
+
+def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
+    """All that compiled code wants to know of aims in real numbers, one after the other; with how much each may miss."""
+    return np.concatenate([_reals(aim, tolerance) for aim, tolerance in aims]) if aims else np.empty(0)
 
 
 def _reals(aim: Aim, tolerance: float | None) -> Array:

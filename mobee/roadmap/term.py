@@ -20,7 +20,10 @@ UPRIGHT = np.eye(3)  # the frame of an aim that needs none
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aim:
-    """What least squares takes a term for, see `aims`: a kind, two links (0: the root frame), a point and a frame on each, a length [m]."""
+    """What least squares takes a term for: a kind, two links (0: the root frame), a point and a frame on each, a length [m], a motor.
+
+    See `mobee.engine.aim_kinds`.
+    """
 
     kind: int
     first_link: int
@@ -30,6 +33,7 @@ class Aim:
     second_point: Array
     second_frame: Array
     length: float = 0.0
+    motor: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

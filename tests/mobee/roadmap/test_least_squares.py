@@ -7,11 +7,12 @@ import pytest
 
 import mobee
 from mobee.roadmap import costs
-from mobee.roadmap.least_squares import Descent, least_squares
+from mobee.roadmap.aims import level
+from mobee.roadmap.least_squares import Descent, aim_reals, least_squares
 from mobee.roadmap.problem import Problem
 
 PALMS = "left_palm", "right_palm"
-CLOSED = "position", "normal", "rotation", "hold", "gaze", "fingers", "relative position", "relative orientation", "aligned"
+CLOSED = "position", "normal", "rotation", "hold", "gaze", "fingers", "relative position", "relative orientation", "aligned", "plane"
 
 
 def tight(term):
@@ -32,6 +33,7 @@ def terms_at(model: mobee.Model, q: np.ndarray) -> dict[str, object]:
         "fingers": costs.orientation(PALMS[1], pose.rotation(PALMS[1])[:, 0], direction=(1.0, 0.0, 0.0)),
         "relative position": costs.relative_position(PALMS[1], PALMS[0], pose.rotation(PALMS[0]).T @ (right - left)),
         "relative orientation": costs.relative_orientation(*PALMS, pose.rotation(PALMS[1]).T @ pose.rotation(PALMS[0])),
+        "plane": costs.plane(PALMS[1], [0.0, 0.6, 0.8], float(right @ [0.0, 0.6, 0.8])),
         "aligned": costs.aligned(*PALMS, (1.0, 2.0, 0.5), pose.rotation(PALMS[1]).T @ pose.rotation(PALMS[0]) @ (1.0, 2.0, 0.5)),
     }
 
@@ -88,6 +90,24 @@ def test_a_half_turn_is_no_trap(free: mobee.Model, icub: mobee.Robot) -> None:
     normal = free.evaluate(icub.home).normal("right_palm")
     problem = Problem(free, [costs.orientation("right_palm", -normal)], None, None)
     assert least_squares(problem, np.random.default_rng(0)) is not None
+
+
+def test_at_most_draws_from_beyond_alone(free: mobee.Model, icub: mobee.Robot) -> None:
+    height = float(free.evaluate(icub.home).position("right_elbow")[2])
+    for most, looked in ((height - 0.05, 10), (height + 0.05, 1)):
+        term = costs.at_most("right_elbow", [0, 0, 1], most, tolerance=1e-9)
+        problem = Problem(free, [term], None, None)
+        met = Descent(problem).run(problem.start[None])
+        assert len(met) == 1 and problem.evaluations <= looked
+        assert term.residual(free.evaluate(met))[0] <= 1e-9
+
+
+def test_other_aims_may_differ_from_start_to_start(free: mobee.Model, icub: mobee.Robot) -> None:
+    problem = Problem(free, [costs.orientation("right_palm", [0, 0, -1])], None, ["torso", "right_arm"])
+    goals, x = [-0.3, -0.25], np.array([1.0, 0.0, 0.0])
+    besides = [[(level(icub.marker("right_palm"), x, goal), 1e-4)] for goal in goals]
+    met = Descent(problem, besides[0]).run(np.repeat(problem.start[None], 2, axis=0), np.stack([aim_reals(one) for one in besides]))
+    np.testing.assert_allclose(free.evaluate(met).position("right_palm")[:, 0], goals, rtol=0.0, atol=1e-4)
 
 
 def test_without_aims_there_is_nothing_to_do(free: mobee.Model) -> None:
