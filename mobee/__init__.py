@@ -17,10 +17,13 @@ from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 from mobee.roadmap import costs, tasks
+from mobee.roadmap.adaptive import AdaptiveRoadmap
+from mobee.roadmap.explorer import MapExplorer
 from mobee.roadmap.nes import NES
 from mobee.roadmap.ngik import IK, solve_ik
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
 from mobee.roadmap.search import Restart, minimize
+from mobee.roadmap.walker import Walker
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot
@@ -28,6 +31,7 @@ from mobee.simulation import MotorParameters, OfflinePlant, run_batch
 
 __all__ = [
     "ActionInterrupted",
+    "AdaptiveRoadmap",
     "Command",
     "Contact",
     "Controller",
@@ -38,6 +42,7 @@ __all__ = [
     "IK",
     "InvalidValue",
     "Lattice",
+    "MapExplorer",
     "MobeeError",
     "Model",
     "MotorParameters",
@@ -62,6 +67,7 @@ __all__ = [
     "TransitionModel",
     "UnknownName",
     "Voronoi",
+    "Walker",
     "World",
     "WorldObject",
     "box",

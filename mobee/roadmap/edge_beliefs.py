@@ -1,0 +1,85 @@
+"""What is known of a map's edges: that each ends at its goal, or where it began (thesis 4.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.learning.neighbours import NO_ACTION
+from mobee.robot.robot import Array, Ints
+
+Mode = Literal["remove", "reweigh"]
+MODES = ("remove", "reweigh")
+PRIOR = (0.2, 0.01)  # successes and failures that every edge is imagined to have had: optimistic, and soon outweighed
+
+
+class EdgeBeliefs:
+    """An `OutcomeModel` of two outcomes: with p the goal of an edge, else the vertex where it began.
+
+    "remove": an edge that failed is out until it is seen to work (thesis).  "reweigh": p is the mean of a Beta
+    distribution over weighted counts; with every observation of any edge all counts lose weight, so that what
+    was not seen for long is trusted again.
+
+    Args:
+        goals: (S, A) vertices, NO_ACTION where there is no edge.
+        mode: "remove" or "reweigh".
+        forgetting: factor of all counts for each observation, in (0, 1]; of no effect with "remove".
+    """
+
+    def __init__(self, goals: Ints, mode: Mode = "remove", forgetting: float = 1.0) -> None:
+        if mode not in MODES:
+            raise UnknownName("mode", mode, MODES)
+        if not 0.0 < forgetting <= 1.0:
+            raise InvalidValue(f"forgetting={forgetting!r}: valid is a factor above 0 and at most 1.")
+        self.mode: Mode = mode
+        self.forgetting = forgetting
+        self.goals = goals
+        self.worked: Array = np.zeros(goals.shape)
+        """Weighted successes, shape (S, A)."""
+        self.failed: Array = np.zeros(goals.shape)
+        """Weighted failures, shape (S, A)."""
+        self.tried: Ints = np.zeros(goals.shape, dtype=np.intp)
+        """How often each was observed, shape (S, A)."""
+        self.last: NDArray[np.bool_] = goals != NO_ACTION
+        """Whether each ended at its goal when it was last observed; True before, shape (S, A)."""
+
+    @property
+    def success(self) -> Array:
+        """The probability that an edge ends at its goal, shape (S, A), 0 where there is no edge."""
+        if self.mode == "remove":
+            return np.where(self.last, 1.0, 0.0)
+        worked, failed = PRIOR
+        p: Array = (worked + self.worked) / (worked + failed + self.worked + self.failed)
+        return np.where(self.goals == NO_ACTION, 0.0, p)
+
+    @property
+    def outcomes(self) -> Ints:
+        """The goal of an edge and where it began, shape (S, A, 2)."""
+        began = np.broadcast_to(np.arange(len(self.goals))[:, None], self.goals.shape)
+        return np.stack([np.where(self.goals == NO_ACTION, began, self.goals), began], axis=-1)
+
+    @property
+    def probabilities(self) -> Array:
+        """Their probabilities, shape (S, A, 2), all 0 where there is no edge."""
+        p = self.success
+        return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
+
+    def observe(self, state: int, action: int, arrived: bool) -> None:
+        """Take what became of an edge."""
+        if self.forgetting < 1.0:
+            self.worked *= self.forgetting
+            self.failed *= self.forgetting
+        counts = self.worked if arrived else self.failed
+        counts[state, action] += 1.0
+        self.tried[state, action] += 1
+        self.last[state, action] = arrived
+
+    def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
+        """The same knowledge in another table of goals: entry (states, actions) there was entry `before` here."""
+        found = EdgeBeliefs(goals, self.mode, self.forgetting)
+        for name in ("worked", "failed", "tried", "last"):
+            getattr(found, name)[states, actions] = getattr(self, name)[before]
+        return found
