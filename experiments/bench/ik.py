@@ -1,33 +1,26 @@
-"""How often and how soon a pose is found for a palm among boxes: ours beside the thesis' rivals, on the same cost and targets."""
+"""How often and how soon a pose is found for a palm among boxes: ours beside mink and the thesis' rivals, on the same targets."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-import mobee
+from experiments.bench import ik_solvers
 from experiments.bench.cma_peer import load_cma
-from experiments.bench.ik_rivals import annealing, cma, particles
+from experiments.bench.ik_solvers import RIVALS, Solve
 from experiments.bench.ik_workload import MOTORS, Target, scene, targets
+from experiments.bench.mink_peer import load_mink
 from experiments.bench.rounds import one_core
 from experiments.progress import Progress
-from mobee.roadmap.problem import Problem
-from mobee.robot.robot import Array
 
-MOST = 20_000  # evaluations of a rival
 NES, HYBRID, WHOLE = "NES", "least squares, then NES", "NES, all 41 motors"
-CMA, CMA_BATCHED = "CMA-ES, pose by pose", "CMA-ES, a generation at once"
-ANNEALING, PARTICLES = "simulated annealing", "particle filter"
-RIVALS: dict[str, Callable[[Problem, int, int], Array | None]] = {
-    CMA: lambda problem, seed, most: cma(problem, seed, most, batched=False),
-    CMA_BATCHED: lambda problem, seed, most: cma(problem, seed, most, batched=True),
-    ANNEALING: annealing,
-    PARTICLES: particles,
-}
+FINE_NES, FINE_HYBRID = "NES, 1 mm and 1 degree", "least squares first, 1 mm"
+MINK = "mink, restarts"
+FINE = {"metres": 0.001, "radians": float(np.deg2rad(1.0))}
 
 # Name, row, key of the row, at least or at most, bound.
 REQUIREMENTS = (
@@ -56,41 +49,34 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """All numbers, for people and scripts; raises CmaMissing."""
+    """All numbers, for people and scripts; raises CmaMissing, MinkMissing and MujocoMissing."""
     load_cma()
+    load_mink()
     model = scene()
     aims = targets(model, max(settings.targets, settings.whole, settings.rivals))
-    runs: list[tuple[str, int, Callable[[Target, int], tuple[bool, int]]]] = [
-        (HYBRID, settings.targets, lambda aim, seed: _solved(model, aim, seed, MOTORS, "hybrid")),
-        (NES, settings.targets, lambda aim, seed: _solved(model, aim, seed, MOTORS, "nes")),
-        (WHOLE, settings.whole, lambda aim, seed: _solved(model, aim, seed, None, "nes")),
+    fine = [replace(aim, **FINE) for aim in aims]
+    hybrid, nes = (ik_solvers.library(model, method, MOTORS) for method in ("hybrid", "nes"))
+    runs: list[tuple[str, Solve, list[Target]]] = [
+        (HYBRID, hybrid, aims[: settings.targets]),
+        (NES, nes, aims[: settings.targets]),
+        (WHOLE, ik_solvers.library(model, "nes", None), aims[: settings.whole]),
+        (FINE_HYBRID, hybrid, fine[: settings.targets]),
+        (FINE_NES, nes, fine[: settings.targets]),
+        (MINK, ik_solvers.mink(model), aims[: settings.targets]),
+        *((name, ik_solvers.rival(model, name, MOTORS), aims[: settings.rivals]) for name in RIVALS),
     ]
-    runs += [(name, settings.rivals, _rival(model, name)) for name in RIVALS]
     rows: dict[str, dict[str, float]] = {}
     with one_core() as core, Progress() as progress:
-        for number, (name, count, solve) in enumerate(runs):
+        for number, (name, solve, wanted) in enumerate(runs):
             progress.show(number / len(runs), name)
-            rows[name] = _row(solve, aims[:count])
+            rows[name] = _row(solve, wanted)
     for row in rows.values():
-        row["times_cma"] = rows[CMA]["ms"] / row["ms"]
+        row["times_cma"] = rows[ik_solvers.CMA]["ms"] / row["ms"]
     required = [_required(rows, *one) for one in REQUIREMENTS]
     return {"core": core, "rows": rows, "requirements": required, "passed": all(one["passed"] for one in required)}
 
 
-def _solved(model: mobee.Model, aim: Target, seed: int, motors: Sequence[str] | None, method: Any) -> tuple[bool, int]:
-    ik = mobee.solve_ik(model, aim.costs(), seed=seed, motors=motors, method=method)
-    return ik.reached, ik.evaluations
-
-
-def _rival(model: mobee.Model, name: str) -> Callable[[Target, int], tuple[bool, int]]:
-    def solve(aim: Target, seed: int) -> tuple[bool, int]:
-        problem = Problem(model, aim.costs(), None, MOTORS)
-        return RIVALS[name](problem, seed, MOST) is not None, problem.evaluations
-
-    return solve
-
-
-def _row(solve: Callable[[Target, int], tuple[bool, int]], aims: Sequence[Target]) -> dict[str, float]:
+def _row(solve: Solve, aims: Sequence[Target]) -> dict[str, float]:
     """The share of targets reached, and evaluations and processor time of a target, median and 95 %; failures count as they are."""
     solve(aims[0], 0)  # caches and lazy set-up
     reached, evaluations, ms = [], [], []
@@ -115,14 +101,21 @@ def report(result: dict[str, Any]) -> str:
     """The measurements as text."""
     lines = [
         "Right palm among 100 boxes: 5 mm, 5 degrees, no contact; torso and arm (10 motors).",
-        "Median / 95 % of a target; processor time of one core:",
-        f"  {'':<29}{'targets':>7}{'reached':>9}{'evaluations':>15}{'ms':>17}",
+        "Median / 95 % of a target; processor time of one core; times faster than CMA-ES:",
+        f"  {'':<29}{'targets':>7}{'reached':>9}{'evaluations':>14}{'ms':>14}{'times':>7}",
     ]
     for name, row in result["rows"].items():
         evaluations = f"{row['evaluations']:.0f} / {row['evaluations_95']:.0f}"
-        ms = f"{row['ms']:.3g} / {row['ms_95']:.3g}"
-        lines.append(f"  {name:<29}{row['targets']:>7}{100.0 * row['reached']:>7.1f} %{evaluations:>15}{ms:>17}")
+        ms = f"{_three(row['ms'])} / {_three(row['ms_95'])}"
+        lines.append(
+            f"  {name:<29}{row['targets']:>7}{100.0 * row['reached']:>7.1f} %{evaluations:>14}{ms:>14}{_three(row['times_cma']):>7}"
+        )
     for one in result["requirements"]:
         bound = f">= {one['at_least']:g}" if "at_least" in one else f"<= {one['at_most']:g}"
         lines.append(f"  {one['name']:<53}{one['found']:9.3g} {bound:>8} {'pass' if one['passed'] else 'SHORT'}")
     return "\n".join(lines)
+
+
+def _three(value: float) -> str:
+    """Three digits that count, and no fewer than those before the point."""
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"

@@ -1,4 +1,4 @@
-"""The thesis' rivals (3.1.1) on the same cost: CMA-ES, simulated annealing, a particle filter.  Each ends at the first good pose."""
+"""Rivals on the same cost: the thesis' (3.1.1) CMA-ES, simulated annealing, particle filter, and xNES.  Each ends at a good pose."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from experiments.bench.cma_peer import CmaStrategy
 from mobee.roadmap.ngik import STD
 from mobee.roadmap.problem import Problem
+from mobee.roadmap.search import Restart, Search
 from mobee.robot.robot import Array
 
 COOLING = 4000  # poses of one annealing
@@ -14,6 +15,22 @@ HOT, COLD = 1.0, 0.003  # its temperatures, in units of the cost
 WIDE, NARROW = 0.2, 0.01  # of the ranges: its steps, and the particles' noise
 PARTICLES, SELECTIVE = 200, 4.0  # the share of a particle falls e-fold with 1/4 of the costs' deviation
 SHRINKING = 0.93  # of the noise, each time
+PATIENCE = 400  # generations of xNES without gain, ten times those of ours: it is slower
+
+
+def xnes(problem: Problem, seed: int, most: int) -> Array | None:
+    """NES as published (Glasmachers 2010), with its default population, in our box and with our restarts."""
+    low, high = problem.limits.T
+    start, restart = problem.start[problem.free], Restart(patience=PATIENCE)
+    search = Search(start, STD * (high - low), problem.limits, restart, method="xnes", seed=seed)
+    while problem.evaluations < most:
+        q = problem.whole(search.ask())
+        costs, good = problem.look(q)
+        if good.any():
+            found: Array = q[int(good.argmax())]
+            return found
+        search.tell(costs)
+    return None
 
 
 def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:

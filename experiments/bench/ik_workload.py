@@ -20,15 +20,22 @@ AT_ONCE = 500
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A pose of the palm: a place (3,) m and a rotation (3, 3)."""
+    """A pose of the palm: a place (3,) m and a rotation (3, 3), and how near it is to be come."""
 
     place: Array
     rotation: Array
+    metres: float = 0.005
+    radians: float = float(np.deg2rad(5.0))
 
     def costs(self) -> list[Term]:
-        """To be there within 5 mm and 5 degrees, without a contact, near home."""
+        """To be there within the tolerances, without a contact, near home."""
         costs = mobee.costs
-        return [costs.position(MARKER, self.place), costs.orientation(MARKER, self.rotation), costs.collision(), costs.home()]
+        return [
+            costs.position(MARKER, self.place, self.metres),
+            costs.orientation(MARKER, self.rotation, self.radians),
+            costs.collision(),
+            costs.home(),
+        ]
 
 
 def scene() -> mobee.Model:

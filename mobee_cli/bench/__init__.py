@@ -15,7 +15,7 @@ BENCHES = {
     "plant": "the offline plant beside MuJoCo's stepper",
     "vi": "planning: value iteration beside SciPy and quantecon",
     "nes": "evolution strategies beside CMA-ES",
-    "ik": "inverse kinematics beside CMA-ES, annealing and a particle filter",
+    "ik": "inverse kinematics beside mink, CMA-ES and others",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""
@@ -34,12 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     from experiments.bench.cma_peer import CmaMissing
+    from experiments.bench.mink_peer import MinkMissing
     from experiments.bench.mujoco_peer import MujocoMissing
     from experiments.bench.vi_peers import QuanteconMissing
     from experiments.launched import LaunchFailed
 
     try:
         code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
-    except (CmaMissing, MujocoMissing, QuanteconMissing, LaunchFailed) as error:
+    except (CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     return code

@@ -1,4 +1,4 @@
-"""Inverse kinematics of a palm among boxes beside CMA-ES, simulated annealing and a particle filter: how often and how soon."""
+"""Inverse kinematics of a palm among boxes beside mink, CMA-ES, simulated annealing, a particle filter: how often, how soon."""
 
 from __future__ import annotations
 

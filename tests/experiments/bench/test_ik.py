@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import mobee
-from experiments.bench.ik import REQUIREMENTS, RIVALS, Settings, measure, report
+from experiments.bench.ik import FINE, REQUIREMENTS, Settings, measure, report
+from experiments.bench.ik_solvers import RIVALS
 from experiments.bench.ik_workload import BOXES, MOTORS, scene, targets
+from experiments.bench.mink_peer import MinkMissing, MinkPeer
 from mobee.roadmap.problem import Problem
 
 
@@ -44,10 +49,47 @@ def test_rivals_give_up(model: mobee.Model, name: str) -> None:
     assert RIVALS[name](problem, 0, 250) is None
 
 
+def test_mink_finds_poses_that_are_good_by_our_own_model(model: mobee.Model) -> None:
+    pytest.importorskip("mink")
+    peer = MinkPeer(model.robot)
+    for seed, aim in enumerate(targets(model, 5)):
+        problem = Problem(model, aim.costs(), None, MOTORS)
+        found = peer.solve(problem, aim, seed, 2000)
+        assert found is not None
+        pose = model.evaluate(found[None])
+        assert np.linalg.norm(pose.position("right_palm")[0] - aim.place) <= 0.005
+        assert pose.count[0] == 0 and (found >= model.robot.limits[:, 0]).all() and (found <= model.robot.limits[:, 1]).all()
+        still = np.setdiff1d(np.arange(len(found)), problem.free)
+        np.testing.assert_array_equal(found[still], model.robot.home[still])
+
+
+def test_mink_gives_up_on_what_is_out_of_reach(model: mobee.Model) -> None:
+    pytest.importorskip("mink")
+    aim = replace(targets(model, 1)[0], place=np.array([3.0, 0.0, 0.0]))
+    problem = Problem(model, aim.costs(), None, MOTORS)
+    assert MinkPeer(model.robot).solve(problem, aim, 0, 100) is None
+    assert 100 <= problem.evaluations < 200
+
+
+def test_a_finer_target_is_met_more_finely(model: mobee.Model) -> None:
+    fine = replace(targets(model, 1)[0], **FINE)
+    ik = mobee.solve_ik(model, fine.costs(), motors=MOTORS)
+    assert ik.reached and ik.residuals["position right_palm"] <= 0.001
+    assert ik.residuals["orientation right_palm"] <= np.deg2rad(1.0)
+
+
+def test_without_mink_it_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cma")
+    monkeypatch.setitem(sys.modules, "mink", None)
+    with pytest.raises(MinkMissing, match=r"\[bench\]"):
+        measure(Settings())
+
+
 def test_a_short_run_tells_all_rows_and_requirements() -> None:
     pytest.importorskip("cma")
+    pytest.importorskip("mink")
     result = measure(Settings(targets=1, whole=1, rivals=1))
-    assert len(result["rows"]) == 7 and len(result["requirements"]) == len(REQUIREMENTS)
+    assert len(result["rows"]) == 11 and len(result["requirements"]) == len(REQUIREMENTS)
     assert result["passed"] == all(one["passed"] for one in result["requirements"])
     lines = report(result).splitlines()
     assert max(map(len, lines)) <= 84
