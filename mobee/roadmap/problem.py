@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +12,11 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.pose import Pose
 from mobee.roadmap.costs import term
-from mobee.roadmap.solids import solid_robot
+from mobee.roadmap.solids import solid_model
 from mobee.roadmap.term import Term
 from mobee.robot.robot import Array, Ints, Robot
 
 Cost = Term | Callable[[Pose, Any], ArrayLike]
-
-_SOLID: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 class Problem:
@@ -27,7 +24,7 @@ class Problem:
 
     def __init__(self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None) -> None:
         robot = model.robot
-        self.model = _solid_model(model)
+        self.model = solid_model(model)
         self.by_name = named([cost if isinstance(cost, Term) else term(cost) for cost in costs])
         self.terms = tuple(self.by_name.values())
         if not self.terms:
@@ -88,15 +85,6 @@ def named(terms: Sequence[Term]) -> dict[str, Term]:
             name = f"{one.name} {number}"
         found[name] = one
     return found
-
-
-def _solid_model(model: Model) -> Model:
-    """The model without fields, in the same world."""
-    known = _SOLID.get(model)
-    if known is None:
-        known = _SOLID[model] = Model(solid_robot(model.robot), model.world)
-    known.reaching = model.reaching
-    return known
 
 
 def _start(model: Model, start: ArrayLike | None) -> Array:

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from mobee.model import Model
 from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Robot
+
+_KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
+
+
+def solid_model(model: Model) -> Model:
+    """The model without fields, in the same world; the same as before for the same model."""
+    known = _KNOWN.get(model)
+    if known is None:
+        known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
+    known.reaching = model.reaching
+    return known
 
 
 @per_robot
