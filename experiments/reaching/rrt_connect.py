@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.reaching.peer_belief import Care, PeerBelief
+from mobee.roadmap.ompl_base import EXTENSIONS, connected
 from mobee.robot.robot import Array
 
-EXTENSIONS = 3000  # of the trees, after which the search is given up
-RANGE = 0.25  # of the motors' ranges, the longest extension
 SHORTCUTS = 60  # tried
+
+
+class _Believed:
+    """A Judge by what a peer believes, within the limits that exert no force."""
+
+    def __init__(self, belief: PeerBelief, care: Care) -> None:
+        self.low, self.span, self.box = belief.range[:, 0], belief.span, belief.limits
+        self._belief, self._care = belief, care
+
+    def sound(self, q: Array) -> NDArray[np.bool_]:
+        """See Judge."""
+        return self._belief.sound(q, self._care)
+
+    def sound_motion(self, start: Array, end: Array) -> bool:
+        """See Judge."""
+        return self._belief.sound_motion(start, end, self._care)
 
 
 def rrt_connect(
@@ -22,53 +35,7 @@ def rrt_connect(
 
     Raises OmplMissing.
     """
-    base, geometric, util = require_ompl()
-    util.setLogLevel(util.LOG_NONE)  # that the seed is set once more; what is made from here on follows it
-    util.RNG.setSeed(seed % (2**31 - 1) + 1)
-    low = belief.range[:, 0]
-    within = np.concatenate([belief.limits.T, start[None], ends])  # where no limit pushes, unless it begins or ends there
-    space = base.RealVectorStateSpace(len(low))
-    bounds = base.RealVectorBounds(len(low))
-    for joint in range(len(low)):
-        bounds.setLow(joint, float(((within[:, joint] - low[joint]) / belief.span[joint]).min()))
-        bounds.setHigh(joint, float(((within[:, joint] - low[joint]) / belief.span[joint]).max()))
-    space.setBounds(bounds)
-
-    def pose(state: Any) -> Array:
-        found: Array = low + belief.span * np.array([state[i] for i in range(len(low))])
-        return found
-
-    class Motions(base.MotionValidator):  # a whole motion is one batch
-        def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802
-            return belief.sound_motion(pose(first), pose(second), care)
-
-    information = base.SpaceInformation(space)
-    information.setStateValidityChecker(lambda state: bool(belief.sound(pose(state)[None], care)[0]))
-    motions = Motions(information)
-    information.setMotionValidator(motions)
-    information.setup()
-    problem = base.ProblemDefinition(information)
-    problem.addStartState(_state(space, (start - low) / belief.span))
-    wanted = base.GoalStates(information)
-    for end in ends:
-        wanted.addState(_state(space, (end - low) / belief.span))
-    problem.setGoal(wanted)
-    planner = geometric.RRTConnect(information)
-    planner.setRange(RANGE)
-    planner.setProblemDefinition(problem)
-    planner.setup()
-    asked = 0
-
-    def enough() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked > extensions
-
-    planner.solve(base.PlannerTerminationCondition(enough))
-    if not problem.hasExactSolution():
-        return None
-    path = problem.getSolutionPath()
-    return np.array([pose(path.getState(i)) for i in range(path.getStateCount())])
+    return connected(_Believed(belief, care), start, ends, seed, extensions)
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
@@ -92,10 +59,3 @@ def _straightened(belief: PeerBelief, path: list[Array], care: Care) -> list[Arr
         at = next(k for k in range(len(path) - 1, at, -1) if k == at + 1 or belief.sound_motion(path[at], path[k], care))
         corners.append(path[at])
     return corners
-
-
-def _state(space: Any, values: Array) -> Any:
-    state = space.allocState()
-    for i, value in enumerate(values):
-        state[i] = float(value)
-    return state
