@@ -23,6 +23,7 @@ from mobee.roadmap.nes import NES
 from mobee.roadmap.ngik import IK, solve_ik
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
 from mobee.roadmap.search import Restart, minimize
+from mobee.roadmap.state_space import roadmap_space
 from mobee.roadmap.walker import Walker
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
@@ -82,6 +83,7 @@ __all__ = [
     "minimize",
     "policy_iteration",
     "reach_path",
+    "roadmap_space",
     "run",
     "run_batch",
     "solve_ik",

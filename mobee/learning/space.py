@@ -30,17 +30,21 @@ class Space:
         joints: motor names, all of one part.
         samples: (S, d) rad, one pose of the joints a state.
         goals: (S, A) the state that each action aims at; -1, after the last action of a row, where a state has fewer.
-        rest: fraction of its range at which every other motor of the part is kept.
+        rest: fraction of its range at which every other motor of the part is kept; or one for each motor of the part.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
     """
 
-    def __init__(self, robot: Robot, joints: Sequence[str], samples: ArrayLike, goals: ArrayLike, rest: float = 0.5) -> None:
+    def __init__(
+        self, robot: Robot, joints: Sequence[str], samples: ArrayLike, goals: ArrayLike, rest: float | Sequence[float] = 0.5
+    ) -> None:
         part, indices = checked_joints(robot, joints)
-        if not 0.0 <= rest <= 1.0:
+        rests = np.asarray(rest, dtype=np.float64)
+        if rests.shape not in ((), (len(part),)) or not ((rests >= 0.0) & (rests <= 1.0)).all():
             raise InvalidValue(f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay.")
-        self.robot, self.part, self.joints, self.rest = robot, part.name, tuple(joints), rest
+        self.robot, self.part, self.joints = robot, part.name, tuple(joints)
+        self.rest: float | list[float] = rests.tolist()
         self.columns: Ints = indices - part.start
         """Where the joints stand among the motors of the part, shape (d,)."""
         self.samples: Array = _checked_samples(samples, len(joints))
@@ -50,7 +54,7 @@ class Space:
         self._counts: list[int] = (self.goals != NO_ACTION).sum(axis=1).tolist()
         self._low, self._spans = robot.limits[indices, 0], np.ptp(robot.limits[indices], axis=1)
         low, high = robot.limits[part.slice].T
-        self._targets = np.tile(low + rest * (high - low), (len(self.samples), 1))
+        self._targets = np.tile(low + rests * (high - low), (len(self.samples), 1))
         self._targets[:, self.columns] = self.samples
         for array in (self.samples, self.goals, self.columns):
             array.flags.writeable = False

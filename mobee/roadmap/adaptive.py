@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.edge_table import Edges, edges_of, joined, table_of
 from mobee.learning.exploit import target_states
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
 from mobee.roadmap.edge_beliefs import EdgeBeliefs, Mode
-from mobee.roadmap.edge_table import Edges, edges_of, joined, table_of
 from mobee.robot.robot import Array, Ints
 
 NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)

@@ -144,14 +144,14 @@ def grown(kind: str, judge: Judge, milestones: int, neighbours: int | None, seed
     corner, high = (judge.box[:, 0] - low) / span, np.ptp(judge.box, axis=1) / span
     space = _space(base, corner, corner + high)
 
-    class Sampler(base.ValidStateSampler):  # OMPL's own draws what no seed decides but the first of a process
-        def sample(self, state: Any) -> bool:
-            for joint, drawn in enumerate(corner + rng.uniform(size=len(low)) * high):
-                state[joint] = float(drawn)
-            return bool(judge.sound(_pose(judge, state)[None])[0])
+    def sample(self: Any, state: Any) -> bool:
+        for joint, drawn in enumerate(corner + rng.uniform(size=len(low)) * high):
+            state[joint] = float(drawn)
+        return bool(judge.sound(_pose(judge, state)[None])[0])
 
     information = _information(base, space, judge)
-    information.setValidStateSamplerAllocator(Sampler)
+    # OMPL's own sampler draws what no seed decides but the first of a process.
+    information.setValidStateSamplerAllocator(type("Sampler", (base.ValidStateSampler,), {"sample": sample}))
     motions = _motions(base, information, judge)
     if resolution is None:
         information.setMotionValidator(motions)
@@ -190,11 +190,10 @@ def _information(base: Any, space: Any, judge: Judge) -> Any:
 def _motions(base: Any, information: Any, judge: Judge) -> Any:
     """Has a whole motion looked at as one batch; whoever sets it must keep it."""
 
-    class Motions(base.MotionValidator):
-        def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802
-            return judge.sound_motion(_pose(judge, first), _pose(judge, second))
+    def check(self: Any, first: Any, second: Any) -> bool:
+        return judge.sound_motion(_pose(judge, first), _pose(judge, second))
 
-    return Motions(information)
+    return type("Motions", (base.MotionValidator,), {"checkMotion": check})(information)
 
 
 def _pose(judge: Judge, state: Any) -> Array:

@@ -61,7 +61,7 @@ def test_roadmaps_hold_only_poses_and_motions_without_contacts(planner):
 
 
 def test_a_query_is_over_the_joints_alone():
-    way = query(model(), ["m0", "m2"], HOME)(np.zeros(2), np.array([[1.6, 0.0]]))
+    way = query(model(), ["m0", "m1"], HOME)(np.zeros(2), np.array([[1.6, 0.0]]))
     assert way.shape[1] == 2 and np.allclose(way[-1], [1.6, 0.0])
 
 
