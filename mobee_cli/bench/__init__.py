@@ -16,6 +16,7 @@ BENCHES = {
     "vi": "planning: value iteration beside SciPy and quantecon",
     "nes": "evolution strategies beside CMA-ES",
     "ik": "inverse kinematics beside mink, CMA-ES and others",
+    "edges": "checking the edges of a map of 5000 poses",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""

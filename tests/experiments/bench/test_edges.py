@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import pytest
+
+from experiments.bench.edges import Settings, measure, report
+from experiments.bench.edges_workload import palm_map, scene
+
+
+@pytest.fixture(scope="module")
+def result() -> dict:
+    return measure(Settings(spacing=0.06, rounds=1))
+
+
+def test_all_ways_of_checking_agree_and_look_at_fewer_poses(result: dict) -> None:
+    assert result["agree"]
+    assert 0 < result["change_edges"] < result["edges"] and 0 < result["blocked"] <= result["change_edges"]
+    assert result["once_poses"] < result["plain_poses"] and result["once_poses"] < result["both_poses"]
+
+
+def test_the_report_fits_80_columns(result: dict) -> None:
+    lines = report(result).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert [line.split()[-1] for line in lines[-2:]] == ["pass" if one["passed"] else "SHORT" for one in result["requirements"]]
+
+
+def test_the_map_is_of_free_poses_above_the_table() -> None:
+    model = scene()
+    trm = palm_map(model, 0.08)
+    pose = model.evaluate(trm.q)
+    assert (pose.count == 0).all()
+    assert abs(pose.position("right_palm")[:, :2] - trm.y).max() < 0.002
+    assert (pose.normal("right_palm")[:, 2] < -0.99).all()
