@@ -27,6 +27,8 @@ EXPERIMENTS = {
     "lattice": "experiments.lattice",
     "live-reach": "experiments.live_reach",
     "live-table": "experiments.live_table",
+    "nes": "experiments.nes",
+    "ngik": "experiments.ngik",
     "planner": "experiments.planner",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -78,16 +77,9 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 def _row(solve: Solve, aims: Sequence[Target]) -> dict[str, float]:
     """The share of targets reached, and evaluations and processor time of a target, median and 95 %; failures count as they are."""
-    solve(aims[0], 0)  # caches and lazy set-up
-    reached, evaluations, ms = [], [], []
-    for seed, aim in enumerate(aims):
-        start = time.process_time()
-        done, looked = solve(aim, seed)
-        ms.append(1e3 * (time.process_time() - start))
-        reached.append(done)
-        evaluations.append(looked)
-    row: dict[str, float] = {"targets": len(aims), "reached": float(np.mean(reached))}
-    for key, values in (("evaluations", evaluations), ("ms", ms)):
+    tries = ik_solvers.tried(solve, aims)
+    row: dict[str, float] = {"targets": len(aims), "reached": float(tries.reached.mean())}
+    for key, values in (("evaluations", tries.evaluations), ("ms", tries.ms)):
         row |= {key: float(np.median(values)), f"{key}_95": float(np.quantile(values, 0.95))}
     return row
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 import mobee
 from experiments.bench.ik_rivals import annealing, cma, particles, xnes
 from experiments.bench.ik_workload import MOTORS, Target
 from experiments.bench.mink_peer import MinkPeer
 from mobee.roadmap.problem import Problem
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Ints
 
 MOST = 20_000  # evaluations of a rival
 CMA, CMA_BATCHED = "CMA-ES, pose by pose", "CMA-ES, a generation at once"
@@ -55,3 +59,25 @@ def mink(model: mobee.Model) -> Solve:
         return peer.solve(problem, aim, seed, MOST) is not None, problem.evaluations
 
     return solve
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tries:
+    """What came of targets: whether each was reached, its evaluations and its processor time [ms], (T,); failures as they are."""
+
+    reached: Array
+    evaluations: Ints
+    ms: Array
+
+
+def tried(solve: Solve, aims: Sequence[Target], seed: int = 0) -> Tries:
+    """Every target once, each with a seed of its own."""
+    solve(aims[0], seed)  # caches and lazy set-up
+    reached, evaluations, ms = [], [], []
+    for number, aim in enumerate(aims, seed):
+        start = time.process_time()
+        done, looked = solve(aim, number)
+        ms.append(1e3 * (time.process_time() - start))
+        reached.append(done)
+        evaluations.append(looked)
+    return Tries(np.array(reached), np.array(evaluations), np.array(ms))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.bench.cma_peer import CmaMissing, CmaStrategy
-from experiments.bench.nes import FUNCTIONS, Settings, measure, report
+from experiments.bench.nes import Settings, measure, report
+from experiments.bench.nes_workload import FUNCTIONS
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

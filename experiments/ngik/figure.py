@@ -1,0 +1,34 @@
+"""The share of targets reached against evaluations, a panel a number of motors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from experiments.matplotlib_figure import new_figure
+from experiments.ngik.findings import FEW, NES, OURS, RIVALS, WHOLE
+from experiments.sweep import CellResult
+from mobee.errors import InvalidValue
+
+
+def draw(found: Mapping[str, CellResult], path: Path) -> Path:
+    """All targets of all seeds."""
+    if not found:
+        raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
+    drawing = new_figure(9.0, 3.6)
+    for axes, motors in zip(drawing.subplots(1, 2, sharey=True), (WHOLE, FEW), strict=True):
+        for number, (name, label) in enumerate({NES: OURS[NES], **RIVALS}.items()):
+            settings = {"solver": name, "motors": motors}
+            mine = [result.values for result in found.values() if settings.items() <= result.cell.settings.items()]
+            if mine:
+                reached = np.concatenate([values["reached"] for values in mine])
+                needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
+                axes.step(needed, np.arange(1, len(needed) + 1) / len(reached), where="post", color=f"C{number}", label=label)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", ylim=(0.0, 1.02))
+        axes.grid(alpha=0.2)
+    drawing.axes[0].set_ylabel("targets reached")
+    drawing.axes[1].legend(fontsize=7, loc="lower right")
+    drawing.savefig(path, dpi=150)
+    return path
