@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.bench.ik_solvers import MOST
 from experiments.matplotlib_figure import new_figure
 from experiments.ngik.findings import FEW, NES, OURS, RIVALS, WHOLE
 from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
+
+LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MOST)  # evaluations
 
 
 def draw(found: Mapping[str, CellResult], path: Path) -> Path:
@@ -25,10 +28,13 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
             if mine:
                 reached = np.concatenate([values["reached"] for values in mine])
                 needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
-                axes.step(needed, np.arange(1, len(needed) + 1) / len(reached), where="post", color=f"C{number}", label=label)
-        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", ylim=(0.0, 1.02))
+                shares = np.arange(len(needed) + 1) / len(reached)
+                axes.stairs(shares, [LEAST, *needed, MOST], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(LEAST, MOST), ylim=(0.0, 1.02))
+        axes.set_xticks(TICKS, [f"{tick}" for tick in TICKS])
+        axes.minorticks_off()
         axes.grid(alpha=0.2)
     drawing.axes[0].set_ylabel("targets reached")
-    drawing.axes[1].legend(fontsize=7, loc="lower right")
+    drawing.axes[1].legend(fontsize=7, loc="upper left")
     drawing.savefig(path, dpi=150)
     return path
