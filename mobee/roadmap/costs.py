@@ -15,13 +15,14 @@ from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
 from mobee.errors import InvalidValue
 from mobee.pose import Pose
 from mobee.roadmap.centre_of_mass import centre_of_mass
-from mobee.roadmap.costs_between import aligned, at_most, plane, relative_orientation, relative_position
+from mobee.roadmap.costs_between import across, aligned, at_most, plane, relative_orientation, relative_position
 from mobee.roadmap.function import Function
 from mobee.roadmap.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
 from mobee.roadmap.vectors import angle_between, lengths, rotation, turn_between, unit_vector, units, vector
 from mobee.robot.robot import Array, Robot
 
 __all__ = [
+    "across",
     "aligned",
     "at_most",
     "balance",
@@ -44,16 +45,18 @@ PER_DEPTH = 20.0
 _NONE = np.zeros(3)
 
 
-def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Put a marker on a place (3,) m (table 3.1)."""
+def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE, offset: ArrayLike | None = None) -> Term:
+    """Put a marker, or a point that is `offset` (3,) m from it in its frame, on a place (3,) m (table 3.1)."""
     goal = vector("place", place)
+    aside = None if offset is None else vector("offset", offset)
 
     def residual(pose: Pose) -> Array:
-        return lengths(pose.position(marker) - goal)
+        return lengths(pose.position(marker) - goal if aside is None else pose.position(marker) + pose.rotation(marker) @ aside - goal)
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
         m = robot.marker(marker)
-        return (Aim(PLACE, m.link, m.position, UPRIGHT, 0, goal, UPRIGHT),)
+        point = m.position if aside is None else m.position + m.rotation @ aside
+        return (Aim(PLACE, m.link, point, UPRIGHT, 0, goal, UPRIGHT),)
 
     return checked_term(f"position {marker}", residual, weight, tolerance, aims)
 

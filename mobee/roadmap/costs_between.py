@@ -59,6 +59,21 @@ def aligned(
     return checked_term(f"aligned {first} {second}", residual, weight, tolerance, aims)
 
 
+def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Keep a marker's normal, or a direction (3,) in its frame, across an axis (3,): the residual is the angle to the plane across it.
+
+    It has no derivative of its own; beside an angle about the same axis as task coordinate least squares needs none.
+    """
+    along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
+
+    def residual(pose: Pose) -> Array:
+        way = pose.normal(marker) if own is None else pose.rotation(marker) @ own
+        found: Array = np.arcsin(np.minimum(np.abs(way @ along), 1.0))
+        return found
+
+    return checked_term(f"across {marker}", residual, weight, tolerance)
+
+
 def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
     """Keep a marker in the plane of all x with normal . x = offset [m]; with (0, 0, 1) it is a height."""
     across = unit_vector("normal", normal)

@@ -37,6 +37,21 @@ def test_orientation_of_a_direction_of_the_markers_own(free: mobee.Model, postur
     np.testing.assert_allclose(missing, np.arccos(-pose.rotation("right_palm")[:, 2, 0]), atol=1e-7)
 
 
+def test_a_point_of_the_markers_frame_can_be_put_on_a_place(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    points = pose.position("left_palm") + (pose.rotation("left_palm") @ np.array([[0.1], [0.0], [-0.2]]))[..., 0]
+    missing = costs.position("left_palm", points[1], offset=(0.1, 0.0, -0.2)).residual(pose)
+    np.testing.assert_allclose(missing, np.linalg.norm(points - points[1], axis=1), atol=1e-14)
+
+
+def test_across_is_the_angle_to_the_plane_across_an_axis(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    tilted = np.abs(np.pi / 2 - np.arccos(pose.normal("right_palm")[:, 2]))
+    np.testing.assert_allclose(costs.across("right_palm", (0, 0, 3)).residual(pose), tilted, atol=1e-7)
+    fingers = np.abs(np.pi / 2 - np.arccos(pose.rotation("right_palm")[:, 2, 0]))
+    np.testing.assert_allclose(costs.across("right_palm", (0, 0, 3), (1, 0, 0)).residual(pose), fingers, atol=1e-7)
+
+
 def test_plane_is_the_distance_to_it_on_either_side_and_at_most_that_beyond_it(free: mobee.Model, postures: np.ndarray) -> None:
     pose = free.evaluate(postures)
     heights = pose.position("left_elbow")[:, 2]

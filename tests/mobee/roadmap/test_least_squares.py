@@ -12,7 +12,19 @@ from mobee.roadmap.least_squares import Descent, aim_reals, least_squares
 from mobee.roadmap.problem import Problem
 
 PALMS = "left_palm", "right_palm"
-CLOSED = "position", "normal", "rotation", "hold", "gaze", "fingers", "relative position", "relative orientation", "aligned", "plane"
+CLOSED = (
+    "position",
+    "point",
+    "normal",
+    "rotation",
+    "hold",
+    "gaze",
+    "fingers",
+    "relative position",
+    "relative orientation",
+    "aligned",
+    "plane",
+)
 
 
 def tight(term):
@@ -26,6 +38,7 @@ def terms_at(model: mobee.Model, q: np.ndarray) -> dict[str, object]:
     left, right = (pose.position(name) for name in PALMS)
     return {
         "position": costs.position(PALMS[1], right),
+        "point": costs.position(PALMS[1], right + pose.rotation(PALMS[1]) @ (0.1, 0.0, -0.2), offset=(0.1, 0.0, -0.2)),
         "normal": costs.orientation(PALMS[1], pose.normal(PALMS[1])),
         "rotation": costs.orientation(PALMS[0], pose.rotation(PALMS[0])),
         "hold": costs.hold(*PALMS, float(np.linalg.norm(left - right))),
