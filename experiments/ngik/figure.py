@@ -20,7 +20,7 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
     """All targets of all seeds."""
     if not found:
         raise InvalidValue(f"{path.parent} has no finished cells: it was stopped before the first.")
-    drawing = new_figure(9.0, 3.6)
+    drawing = new_figure(10.5, 3.6)
     for axes, motors in zip(drawing.subplots(1, 2, sharey=True), (WHOLE, FEW), strict=True):
         for number, (name, label) in enumerate({NES: OURS[NES], **RIVALS}.items()):
             settings = {"solver": name, "motors": motors}
@@ -35,6 +35,6 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
         axes.minorticks_off()
         axes.grid(alpha=0.2)
     drawing.axes[0].set_ylabel("targets reached")
-    drawing.axes[1].legend(fontsize=7, loc="upper left")
+    drawing.legend(*drawing.axes[1].get_legend_handles_labels(), loc="outside right upper", fontsize=7)
     drawing.savefig(path, dpi=150)
     return path

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mobee.errors import InvalidValue
 from mobee.kinematics.forward import link_transforms
+from mobee.kinematics.masses import masses
 from mobee.kinematics.tables import tables
 from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Robot
@@ -17,11 +18,9 @@ EARTH = (0.0, 0.0, -9.81)  # m/s^2, root frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Masses:
-    """Links with a mass, and the joints that carry any."""
+class _Carriers:
+    """The joints that carry a mass."""
 
-    links: Ints  # (B,)
-    moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
     joints: Ints  # (C,)
     carried: Array  # (C, B) 1 where the joint carries the link's mass
     loads: Array  # (C,) kg
@@ -39,11 +38,9 @@ def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
     q = _checked(robot, q)
     if not robot.bodies:
         return np.zeros(q.shape)
-    m = _masses(robot)
-    moved = link_transforms(robot, q)[..., :3, :]
-    moments = (moved[..., m.links, :, :] @ m.moments)[..., 0]  # kg m, about the root frame's origin
-    carried = m.carried @ moments
-    frames = moved[..., m.joints + 1, :, :] @ m.frames  # a joint leaves its own axis where it is
+    m, transforms = _carriers(robot), link_transforms(robot, q)
+    carried = m.carried @ masses(robot).moved(transforms)
+    frames = transforms[..., m.joints + 1, :3, :] @ m.frames  # a joint leaves its own axis where it is
     axes, points = frames[..., 0], frames[..., 1]
     pull = np.asarray(gravity, dtype=float)
     # g . (axis x lever) = (g x axis) . lever: no cross product with the lever
@@ -58,9 +55,7 @@ def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Arra
     q = _checked(robot, q)
     if not robot.bodies:
         return np.zeros(q.shape[:-1])
-    m = _masses(robot)
-    moments = (link_transforms(robot, q)[..., m.links, :3, :] @ m.moments)[..., 0]
-    energy: Array = -moments.sum(axis=-2) @ np.asarray(gravity, dtype=float)
+    energy: Array = -masses(robot).moved(link_transforms(robot, q)).sum(axis=-2) @ np.asarray(gravity, dtype=float)
     return energy
 
 
@@ -77,22 +72,18 @@ def _crossed(v: Array) -> Array:
 
 
 @per_robot
-def _masses(robot: Robot) -> _Masses:
+def _carriers(robot: Robot) -> _Carriers:
     t = tables(robot)
     carried = np.zeros((len(robot.joints), len(robot.bodies)))
     for column, body in enumerate(robot.bodies):
         carried[t.ancestry[body.link], column] = 1.0
     joints = np.flatnonzero(carried.any(axis=1))
-    weights = np.array([body.mass for body in robot.bodies])
-    centres = np.array([[*body.centre, 1.0] for body in robot.bodies])
     frames = np.zeros((len(joints), 4, 2))
     frames[:, :3, 0], frames[:, :3, 1], frames[:, 3, 1] = t.axes[joints], t.points[joints], 1.0
-    return _Masses(
-        links=np.array([body.link for body in robot.bodies], dtype=np.intp),
-        moments=(weights[:, None] * centres)[..., None],
+    return _Carriers(
         joints=joints,
         carried=carried[joints],
-        loads=carried[joints] @ weights,
+        loads=carried[joints] @ masses(robot).weights,
         frames=frames,
         slides=t.revolute[joints] == 0.0,
         drives=np.ascontiguousarray(t.coupling[:, joints].T),

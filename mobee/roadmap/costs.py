@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from mobee.collision.contact import ContactTable
 from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
 from mobee.errors import InvalidValue
+from mobee.kinematics.masses import centre_of_mass, centre_of_mass_at_home
 from mobee.pose import Pose
-from mobee.roadmap.centre_of_mass import centre_of_mass
 from mobee.roadmap.costs_between import across, aligned, at_most, plane, relative_orientation, relative_position
 from mobee.roadmap.function import Function
 from mobee.roadmap.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
@@ -179,8 +179,8 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
         raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")
 
     def residual(pose: Pose) -> Array:
-        weighed = centre_of_mass(pose.robot)
-        return lengths(weighed.of(pose.transforms)[..., :2] - (weighed.at_home[:2] if above is None else above))
+        wanted = centre_of_mass_at_home(pose.robot)[:2] if above is None else above
+        return lengths(centre_of_mass(pose.robot, pose.transforms)[..., :2] - wanted)
 
     return checked_term("balance", residual, weight, tolerance)
 
