@@ -13,6 +13,7 @@ from experiments.trm import (
     inspect_hand,
     palm_down,
     palm_side,
+    pregrasp,
     push_forward,
     push_over,
     raise_glass,
@@ -35,4 +36,5 @@ EXAMPLES: dict[str, Callable[[], Example]] = {
     "bimanual-rotate": bimanual_rotate.example,
     "bimanual-twist": bimanual_twist.example,
     "unscrew": unscrew.example,
+    "pregrasp": pregrasp.example,
 }
