@@ -98,7 +98,8 @@ class _Flood:
 
     def scout(self, most: int | None = None) -> bool:
         """Try points of the box that no vertex is near, from anywhere; says whether one was reached."""
-        drawn = self._lattice.nearest(self._rng.uniform(*self._task.box.T, (SCOUTS, len(self._task.box))))
+        low, high = self._task.box.T
+        drawn = self._lattice.nearest(self._rng.uniform(low, high, (SCOUTS, len(low))))
         points = [point for point in map(tuple, drawn.tolist()) if point not in self._vertex and point not in self._missed]
         return self._solve(points, self._anywhere(len(points)), most, remember=False)
 
@@ -150,7 +151,8 @@ class _Flood:
 
     def _anywhere(self, count: int) -> Array:
         """Random starts (count, n)."""
-        return self._problem.whole(self._rng.uniform(*self._problem.limits.T, (count, len(self._problem.free))))
+        low, high = self._problem.limits.T
+        return self._problem.whole(self._rng.uniform(low, high, (count, len(low))))
 
 
 class _Missed:

@@ -63,10 +63,10 @@ class LatticePoints:
 
     def _moved(self, points: Ints, ways: Ints, even: bool) -> list[list[Point]]:
         beside = points[:, None] + ways
-        good = (np.abs(beside @ self._edges) <= self._width).all(axis=2)
+        bad = (np.abs(beside @ self._edges) > self._width).sum(axis=2)
         if even:
-            good &= (beside % 2 == 0).all(axis=2)
-        return [[tuple(one) for one in near[kept].tolist()] for near, kept in zip(beside, good, strict=True)]
+            bad += (beside % 2).sum(axis=2)
+        return [[tuple(one) for one in near[wrong == 0].tolist()] for near, wrong in zip(beside, bad, strict=True)]
 
 
 def _edges(dimensions: int) -> Array:
@@ -77,7 +77,7 @@ def _edges(dimensions: int) -> Array:
     if dimensions == 2:
         return np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     if dimensions == 3:
-        return np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]) / np.sqrt(2.0)
+        return np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]) * np.sqrt(0.5)
     return np.eye(dimensions)
 
 
