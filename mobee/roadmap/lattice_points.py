@@ -77,7 +77,8 @@ def _edges(dimensions: int) -> Array:
     if dimensions == 2:
         return np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     if dimensions == 3:
-        return np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]) * np.sqrt(0.5)
+        side = np.sqrt(0.5)
+        return np.array([[side, side, 0.0], [side, 0.0, side], [0.0, side, side]])
     return np.eye(dimensions)
 
 
