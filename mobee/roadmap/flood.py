@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mobee.roadmap.alike import made_alike
 from mobee.roadmap.goals import Goals
 from mobee.roadmap.lattice_points import LatticePoints, Point
 from mobee.roadmap.problem import Problem
@@ -39,7 +40,7 @@ def flooded(
                 if tick is not None:
                     tick(len(flood.q))
             going = flood.climb() or flood.look_between() or flood.scout()
-    return np.array(flood.q).reshape(-1, len(problem.start)), np.array(flood.y).reshape(-1, len(spacing))
+    return flood.result()
 
 
 class _Flood:
@@ -102,6 +103,14 @@ class _Flood:
         drawn = self._lattice.nearest(self._rng.uniform(low, high, (SCOUTS, len(low))))
         points = [point for point in map(tuple, drawn.tolist()) if point not in self._vertex and point not in self._missed]
         return self._solve(points, self._anywhere(len(points)), most, remember=False)
+
+    def result(self) -> tuple[Array, Array]:
+        """Poses (V, n) and task points (V, m), neighbours' postures made alike."""
+        q, y = np.array(self.q).reshape(-1, len(self._problem.start)), np.array(self.y).reshape(-1, len(self._task.box))
+        points = np.array(list(self._vertex), dtype=np.intp).reshape(-1, len(self._task.box))
+        pairs = [(k, self._vertex[one]) for k, beside in enumerate(self._lattice.around(points)) for one in beside if one in self._vertex]
+        between = np.array([pair for pair in pairs if pair[0] < pair[1]], dtype=np.intp).reshape(-1, 2)
+        return made_alike(self._goals, self._lattice.y(points), q, y, between, self._rng)
 
     def _solve(self, points: Sequence[Point], starts: Array, most: int | None = None, remember: bool = True) -> bool:
         """Add the points that are reached from the starts, `most` of them; says whether any was."""
