@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,15 +15,33 @@ from mobee.roadmap.task import Task
 from mobee.robot.robot import Array
 
 OFF = 0.02  # spacings that a vertex may be off its point in any coordinate
-STARTS, TRIES = 8, 12  # of a point that its neighbours' postures did not lead to, at once, and how often
-HOPELESS, BETWEEN = 3, 1  # tries of a point to which no posture leads at all, and of a point off the lattice
-NOISES = np.array([0.02, 0.05, 0.1, 0.2])  # of the motors' ranges: standard deviations of those starts
-ANYWHERE = 2  # of those starts
-SCOUTS, ROUNDS = 256, 8  # points tried at once where no pose is known nearby, and how often until the first is found
+NOISES = np.array([0.02, 0.05, 0.1, 0.2])  # of the motors' ranges: standard deviations of starts about a posture
+ANYWHERE = 0.25  # share of a missed point's starts that are random
+ROUNDS = 8  # of scouts, until the first pose is found
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long a point is tried to which its neighbours' postures did not lead.
+
+    `starts`: at once.  `tries`: how often; `hopeless`: where no posture leads there at all, contacts or not; `between`: of a point
+    off the lattice.  `scouts`: points tried at once of those that no vertex is near.
+    """
+
+    starts: int = 8
+    tries: int = 12
+    hopeless: int = 3
+    between: int = 1
+    scouts: int = 256
 
 
 def flooded(
-    problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, tick: Callable[[int], None] | None = None
+    problem: Problem,
+    task: Task,
+    spacing: Array,
+    rng: np.random.Generator,
+    tick: Callable[[int], None] | None = None,
+    patience: Patience = Patience(),
 ) -> tuple[Array, Array]:
     """Poses q (V, n) and their task coordinates y (V, m): one at every point that is reached of a lattice of that spacing (m,).
 
@@ -32,7 +51,7 @@ def flooded(
     Raises:
         InvalidValue: a coordinate has no derivative.
     """
-    flood = _Flood(problem, task, spacing, rng)
+    flood = _Flood(problem, task, spacing, rng, patience)
     if flood.begin():
         going = True
         while going:
@@ -44,8 +63,8 @@ def flooded(
 
 
 class _Flood:
-    def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator) -> None:
-        self._problem, self._task, self._rng = problem, task, rng
+    def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, patience: Patience) -> None:
+        self._problem, self._task, self._rng, self._patience = problem, task, rng, patience
         self._goals = Goals(problem, task, OFF * spacing)
         self._lattice = LatticePoints(task.box, spacing)
         self._vertex: dict[Point, int] = {}
@@ -59,8 +78,8 @@ class _Flood:
         """Find a first pose, near the start if there is one; says whether there is one."""
         start = self._problem.start[None]
         here = self._lattice.nearest(self._task.of(self._problem.model.evaluate(start)))[0]
-        starts = np.concatenate([start, self._anywhere(STARTS - 1)])
-        return self._solve([tuple(here.tolist())] * STARTS, starts, most=1) or any(self.scout(most=1) for _ in range(ROUNDS))
+        starts = np.concatenate([start, self._anywhere(self._patience.starts)])
+        return self._solve([tuple(here.tolist())] * len(starts), starts, most=1) or any(self.scout(most=1) for _ in range(ROUNDS))
 
     def wave(self) -> bool:
         """Try every point beside a vertex from the posture of one; says whether there was any."""
@@ -79,10 +98,11 @@ class _Flood:
             return False
         for point in points:
             self._missed[point].left -= 1
-        best = np.repeat([self._missed[point].q for point in points], STARTS, axis=0)
-        starts = self._about(best)
-        starts.reshape(len(points), STARTS, -1)[:, :ANYWHERE] = self._anywhere(ANYWHERE * len(points)).reshape(len(points), ANYWHERE, -1)
-        self._solve([point for point in points for _ in range(STARTS)], starts)
+        each = self._patience.starts
+        starts = self._about(np.repeat([self._missed[point].q for point in points], each, axis=0))
+        random = np.tile(np.arange(each) < ANYWHERE * each, len(points))
+        starts[random] = self._anywhere(int(random.sum()))
+        self._solve([point for point in points for _ in range(each)], starts)
         return True
 
     def look_between(self) -> bool:
@@ -93,14 +113,14 @@ class _Flood:
             for half in halves:
                 if half not in self._between and self._is_free(half):
                     self._between.add(half)
-                    self._missed[half] = _Missed(self._missed[point].q, np.inf, BETWEEN)
+                    self._missed[half] = _Missed(self._missed[point].q, np.inf, self._patience.between)
                     found = True
         return found
 
     def scout(self, most: int | None = None) -> bool:
         """Try points of the box that no vertex is near, from anywhere; says whether one was reached."""
         low, high = self._task.box.T
-        drawn = self._lattice.nearest(self._rng.uniform(low, high, (SCOUTS, len(low))))
+        drawn = self._lattice.nearest(self._rng.uniform(low, high, (self._patience.scouts, len(low))))
         points = [point for point in map(tuple, drawn.tolist()) if point not in self._vertex and point not in self._missed]
         return self._solve(points, self._anywhere(len(points)), most, remember=False)
 
@@ -128,10 +148,10 @@ class _Flood:
                 self.y.append(y[k])
                 added.append(point)
             elif remember:
-                known = self._missed.setdefault(point, _Missed(q[k], np.inf, HOPELESS))
+                known = self._missed.setdefault(point, _Missed(q[k], np.inf, self._patience.hopeless))
                 if wrong[k] < known.wrong:
                     if np.isinf(known.wrong) and point not in self._between:
-                        known.left += TRIES - HOPELESS
+                        known.left += self._patience.tries - self._patience.hopeless
                     known.q, known.wrong = q[k], float(wrong[k])
         if added:
             self._spread(added)

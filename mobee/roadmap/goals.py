@@ -33,10 +33,12 @@ class Goals:
     def solve(self, y: Array, starts: Array) -> tuple[Array, Array, Array, Array]:
         """What the starts (N, n) lead to for task points y (N, m): poses (N, n), their task points, what is wrong and their costs (N,).
 
+        Of the starts the motors that may move count, within their limits.
         What is wrong: 0 of a pose within all tolerances and the task's box, infinite where least squares fails, else the weighed sum of
         the terms that miss too much.
         """
-        q, met = self._descent.met(starts, self._reals(y))
+        free = self._problem.free
+        q, met = self._descent.met(self._problem.whole(np.clip(starts[:, free], *self._problem.limits.T)), self._reals(y))
         there, wrong, costs = np.full(y.shape, np.inf), np.full(len(y), np.inf), np.full(len(y), np.inf)
         pose = self._problem.model.evaluate(q[met])
         there[met] = self._task.of(pose)

@@ -1,0 +1,103 @@
+"""How much of what can be reached a map covers, told by other means than those that built it, and whether its poses are valid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import mobee
+from mobee.engine.pack import Flags
+from mobee.roadmap.flood import Patience, flooded
+from mobee.roadmap.goals import Goals
+from mobee.roadmap.problem import Cost, Problem
+from mobee.roadmap.solids import solid_robot
+from mobee.roadmap.task import Task
+from mobee.robot.robot import Array
+
+FINER = 2  # points of the flood along a spacing
+GENEROUS = Patience(starts=16, tries=24, hopeless=8, scouts=2048)
+BLIND, STARTS = 2000, 20  # random task points, and random starts of each
+OFF = 0.05  # spacings that a pose may be off such a point
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """What of the reachable task space is near a vertex.
+
+    `reachable`: task points (R, m) that were reached.  `far`: (R,), how far the nearest vertex is from each, in spacings.
+    """
+
+    reachable: Array
+    far: Array
+
+    @property
+    def share(self) -> float:
+        """Of the reachable task points, that within a spacing of a vertex."""
+        return float((self.far <= 1.0).mean())
+
+    @property
+    def largest_hole(self) -> float:
+        """How far the reachable task point is that is furthest from all vertices, in spacings."""
+        return float(self.far.max())
+
+
+def coverage(
+    model: mobee.Model,
+    costs: Sequence[Cost],
+    task: Task,
+    y: Array,
+    spacing: Array,
+    motors: Sequence[str] | None = None,
+    start: Array | None = None,
+    seed: int = 1,
+) -> Coverage:
+    """How much of what is reachable vertices y (V, m) cover, at a spacing (m,).
+
+    Reachable is: what a flood of half the spacing reaches, with far more starts a point than a map gets; what random starts reach at
+    random points, which knows of no neighbours; and the vertices.
+    """
+    rng = np.random.default_rng(seed)
+    problem = Problem(model, costs, start, motors)
+    _, flood = flooded(problem, task, spacing / FINER, rng, patience=GENEROUS)
+    points = np.concatenate([flood, _blind(problem, task, spacing, rng), y])
+    far, _ = cKDTree(y / spacing).query(points / spacing)
+    return Coverage(points, np.asarray(far))
+
+
+def valid(
+    model: mobee.Model,
+    costs: Sequence[Cost],
+    task: Task,
+    q: Array,
+    y: Array,
+    motors: Sequence[str] | None = None,
+    start: Array | None = None,
+) -> Flags:
+    """Which poses q (V, n) are, by the reference engine, within all tolerances, their limits and the box, and where y (V, m) says, (V,)."""
+    reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
+    pose = reference.evaluate(q)
+    low, high = model.robot.limits.T
+    good = ((q >= low) & (q <= high)).all(axis=1)
+    there = task.of(pose)
+    good &= (np.abs(there - y) <= 1e-9).all(axis=1) & ((there >= task.box[:, 0]) & (there <= task.box[:, 1])).all(axis=1)
+    problem = Problem(model, costs, start, motors)
+    good &= (np.delete(q - problem.start, problem.free, axis=1) == 0.0).all(axis=1)  # no motor moved that may not
+    for one in problem.terms:
+        if one.tolerance is not None:
+            good &= one.residual(pose) <= one.tolerance
+    return good
+
+
+def _blind(problem: Problem, task: Task, spacing: Array, rng: np.random.Generator) -> Array:
+    """Those of some random points of the box that random starts reach, (B, m)."""
+    low, high = task.box.T
+    points = np.repeat(rng.uniform(low, high, (BLIND, len(low))), STARTS, axis=0)
+    starts = problem.whole(rng.uniform(*problem.limits.T, (len(points), len(problem.free))))
+    _, there, wrong, _ = Goals(problem, task, OFF * spacing).solve(points, starts)
+    met = np.flatnonzero(wrong == 0.0)
+    _, once = np.unique(met // STARTS, return_index=True)
+    found: Array = there[met[once]]
+    return found
