@@ -53,11 +53,22 @@ def rates(contestants: Mapping[str, Contestant], rounds: int) -> dict[str, Array
     measured: dict[str, list[float]] = {name: [] for name in names}
     for one in contestants.values():
         one.run()  # caches and lazy set-up
-    for number in range(rounds):
-        turn = number % len(names)
-        for name in names[turn:] + names[:turn]:
-            measured[name].append(_rate(contestants[name]))
+    with _old_kept():
+        for number in range(rounds):
+            turn = number % len(names)
+            for name in names[turn:] + names[:turn]:
+                measured[name].append(_rate(contestants[name]))
     return {name: np.array(values) for name, values in measured.items()}
+
+
+@contextlib.contextmanager
+def _old_kept() -> Iterator[None]:
+    """Meanwhile the garbage collector passes over what is there already."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _rate(one: Contestant) -> float:

@@ -1,7 +1,7 @@
 """Evolution strategies: natural ones beside CMA-ES.
 
 Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.
-Run time: 4 minutes on 2 cores.
+Run time: 3 minutes on 2 cores.
 
 A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
 rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  What counts are evaluations until f < 1e-8;
