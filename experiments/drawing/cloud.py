@@ -1,4 +1,4 @@
-"""Where a marker is in many poses, as a cloud of points about the robot (as thesis figs. 3.1, 3.2)."""
+"""Where markers are in many poses, as a cloud of points about the robot (as thesis figs. 3.1, 3.2)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ GROUP = -3
 def marker_cloud(
     model: Model,
     q: ArrayLike,
-    marker: str,
+    markers: str | Sequence[str],
     path: Path,
     shown: ArrayLike | None = None,
     views: Sequence[View] = ("front", "side", "oblique"),
@@ -35,15 +35,18 @@ def marker_cloud(
     title: str = "",
     height: int = 400,
 ) -> Path:
-    """Write a PNG of a marker's places in the poses q (P, n) rad, beside the robot in the pose `shown` (n,), at home if None.
+    """Write a PNG of the places of markers in the poses q (P, n) rad, beside the robot in the pose `shown` (n,), at home if None.
 
     `values` (P,): what the points' colours tell, blue for the least, orange for the largest; the height of each if None.
     Raises InvalidValue, UnknownName.
     """
-    places = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))).position(marker)
-    told = places[:, 2] if values is None else np.asarray(values, dtype=np.float64)
-    if told.shape != places.shape[:1] or not len(places):
-        raise InvalidValue(f"{len(places)} poses and values of shape {told.shape}: must be one value a pose, and at least one pose")
+    pose, names = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))), [markers] if isinstance(markers, str) else list(markers)
+    if not names or not len(pose.q):
+        raise InvalidValue(f"{len(pose.q)} poses and {len(names)} markers: must be at least one of each")
+    places = np.concatenate([pose.position(name) for name in names])
+    told = places[:, 2] if values is None else np.tile(np.asarray(values, dtype=np.float64), len(names))
+    if told.shape != places.shape[:1]:
+        raise InvalidValue(f"{len(pose.q)} poses and values of shape {np.shape(values)}: must be one value a pose")
     scene = cloud_solids(model.evaluate(model.robot.home if shown is None else shown), places, told)
     row = [Panel(pictures_of([scene], view, height)[0], view if isinstance(view, str) else "") for view in views]
     return write_sheet([(title, row)], path)

@@ -28,6 +28,7 @@ _BENT = {  # degrees
     "pinky": 80,
 }
 _ASIDE = {"shoulder_pitch": -40, "shoulder_roll": 40, "shoulder_yaw": -30, "elbow": 100}
+_HELD = (0.85, 0.45, 0.10, 1.0)  # colour
 LEFT_ARM, RIGHT_ARM = (tuple(f"{side}_{joint}" for joint in _JOINTS) for side in "lr")  # without the hand
 NECK = ("neck_pitch", "neck_roll", "neck_yaw")
 ONE_HAND = ("torso", *RIGHT_ARM)
@@ -54,7 +55,7 @@ def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, a
     if not x.any():
         x = m.rotation @ np.asarray(FINGERS, dtype=np.float64)
     x = x / np.linalg.norm(x)
-    model.world.add(name, shape, role="ghost")
+    model.world.add(name, shape, role="ghost", color=_HELD)
     model.world.attach(name, model.robot.links[m.link], (m.position + ahead * m.normal, np.column_stack([x, np.cross(z, x), z])))
 
 

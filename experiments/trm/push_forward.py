@@ -7,7 +7,7 @@ nor goes aside.
 from __future__ import annotations
 
 import mobee
-from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, TO_THE_LEFT, TO_THE_RIGHT, UP, at_table
+from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, THUMBS_UP, TO_THE_RIGHT, UP, at_table
 from experiments.trm.example import Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
@@ -25,7 +25,7 @@ def example() -> Example:
         model=model,
         costs=(
             *held(WIDTH),
-            costs.orientation(RIGHT, TO_THE_LEFT),
+            costs.orientation(RIGHT, THUMBS_UP),
             costs.plane(RIGHT, UP, HEIGHT),
             costs.plane(RIGHT, TO_THE_RIGHT, 0.5 * WIDTH),
             costs.collision(),

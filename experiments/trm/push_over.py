@@ -7,7 +7,7 @@ turns nor goes forward.
 from __future__ import annotations
 
 import mobee
-from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, TO_THE_LEFT, UP, at_table
+from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, THUMBS_UP, UP, at_table
 from experiments.trm.example import Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
@@ -25,7 +25,7 @@ def example() -> Example:
         model=model,
         costs=(
             *held(WIDTH),
-            costs.orientation(RIGHT, TO_THE_LEFT),
+            costs.orientation(RIGHT, THUMBS_UP),
             costs.plane(RIGHT, UP, HEIGHT),
             costs.plane(RIGHT, (1, 0, 0), -BEFORE),
             costs.collision(),
