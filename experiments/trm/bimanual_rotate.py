@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import mobee
-from experiments.trm.body import BOTH_HANDS, FORWARD, LEFT, RIGHT, TO_THE_LEFT, alone
+from experiments.trm.body import BOTH_HANDS, FORWARD, LEFT, RIGHT, TO_THE_LEFT, alone, elbows_out
 from experiments.trm.example import Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
@@ -32,9 +32,10 @@ def example() -> Example:
             costs.collision(),
             costs.home(),
         ),
-        task=tasks.angle(RIGHT, FORWARD, TO_THE_LEFT, -np.pi / 2, np.pi / 2),
+        task=tasks.angle(RIGHT, FORWARD, TO_THE_LEFT, -0.4 * np.pi, 0.4 * np.pi),
         spacing=float(np.deg2rad(5.0)),
         motors=BOTH_HANDS,
+        start=elbows_out(model.robot.home, model.robot),
         markers=(LEFT, RIGHT),
         views=("front",),
         way=[(np.deg2rad(-55.0),), (np.deg2rad(55.0),)],

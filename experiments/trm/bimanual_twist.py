@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import mobee
-from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, TO_THE_LEFT, UP, at_table
+from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, TO_THE_LEFT, UP, at_table, elbows_out
 from experiments.trm.example import Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
@@ -35,6 +35,7 @@ def example() -> Example:
         task=tasks.angle(RIGHT, UP, TO_THE_LEFT, -np.pi / 2, np.pi / 2),
         spacing=float(np.deg2rad(5.0)),
         motors=BOTH_HANDS,
+        start=elbows_out(model.robot.home, model.robot),
         markers=(LEFT, RIGHT),
         views=("top",),
         way=[(np.deg2rad(-40.0),), (np.deg2rad(40.0),)],

@@ -16,6 +16,7 @@ DOWN, UP, FORWARD, TO_THE_LEFT, TO_THE_RIGHT = (0, 0, -1), (0, 0, 1), (-1, 0, 0)
 FINGERS, THUMB = (1, 0, 0), (0, -1, 0)  # where they point, in the frame of either palm
 THUMBS_UP = np.column_stack([FORWARD, DOWN, TO_THE_LEFT])  # the frame of a palm whose fingers point forward, its thumb up
 
+_HELD = (0.85, 0.45, 0.10, 1.0)  # colour
 _JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw")
 _BENT = {  # degrees
     "thumb_oppose": 60,
@@ -28,7 +29,7 @@ _BENT = {  # degrees
     "pinky": 80,
 }
 _ASIDE = {"shoulder_pitch": -40, "shoulder_roll": 40, "shoulder_yaw": -30, "elbow": 100}
-_HELD = (0.85, 0.45, 0.10, 1.0)  # colour
+_OUT = {"shoulder_pitch": 0, "shoulder_roll": 80, "shoulder_yaw": -20, "elbow": 70}
 LEFT_ARM, RIGHT_ARM = (tuple(f"{side}_{joint}" for joint in _JOINTS) for side in "lr")  # without the hand
 NECK = ("neck_pitch", "neck_roll", "neck_yaw")
 ONE_HAND = ("torso", *RIGHT_ARM)
@@ -61,16 +62,23 @@ def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, a
 
 def left_aside(robot: Robot) -> Array:
     """Home with the left arm bent out of the way, so that its hand does not meet the table when the torso leans, (n,) rad."""
-    return _posture(robot.home, robot, {f"l_{joint}": angle for joint, angle in _ASIDE.items()})
+    return changed(robot.home, robot, _ASIDE, "l")
+
+
+def elbows_out(q: Array, robot: Robot, sides: str = "lr") -> Array:
+    """A posture with the elbows at the sides, (n,) rad: about it hands can turn far without a jump."""
+    return changed(q, robot, _OUT, sides)
 
 
 def grasping(q: Array, robot: Robot, sides: str = "lr") -> Array:
     """A posture with bent fingers, (n,) rad."""
-    return _posture(q, robot, {f"{side}_{joint}": angle for side in sides for joint, angle in _BENT.items()})
+    return changed(q, robot, _BENT, sides)
 
 
-def _posture(q: Array, robot: Robot, degrees: Mapping[str, float]) -> Array:
-    changed = q.copy()
-    for motor, angle in degrees.items():
-        changed[robot.motor_index(motor)] = np.deg2rad(angle)
-    return changed
+def changed(q: Array, robot: Robot, degrees: Mapping[str, float], sides: str) -> Array:
+    """A posture with some motors of the arms elsewhere, (n,) rad."""
+    new = q.copy()
+    for side in sides:
+        for joint, angle in degrees.items():
+            new[robot.motor_index(f"{side}_{joint}")] = np.deg2rad(angle)
+    return new

@@ -1,8 +1,7 @@
 """Both hands hold something, and move it up and down, forward and back (thesis fig. 3.1, left).
 
-Where the hands are to each other is fixed, as by a box between them, and the box stays level and straight before the
-robot; the task space is the height of the
-hands and how far forward they are.
+Where the hands are to each other is fixed, as by a box between them, and the box stays level and straight before the robot;
+the task space is the height of the hands and how far forward they are.
 """
 
 from __future__ import annotations

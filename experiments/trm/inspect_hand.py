@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import mobee
-from experiments.trm.body import FORWARD, NECK, ONE_HAND, RIGHT, THUMB, UP, alone, carry, grasping, left_aside
+from experiments.trm.body import FORWARD, NECK, ONE_HAND, RIGHT, THUMB, UP, alone, carry, elbows_out, grasping, left_aside
 from experiments.trm.example import Example
 from mobee import costs, tasks
 
@@ -34,6 +34,6 @@ def example() -> Example:
         task=tasks.angle(RIGHT, UP, FORWARD, -np.pi / 2, np.pi),
         spacing=float(np.deg2rad(5.0)),
         motors=(*ONE_HAND, *NECK),
-        start=grasping(left_aside(model.robot), model.robot, "r"),
-        way=[(np.deg2rad(170.0),), (np.deg2rad(-40.0),)],
+        start=elbows_out(grasping(left_aside(model.robot), model.robot, "r"), model.robot, "r"),
+        way=[(np.deg2rad(170.0),), (np.deg2rad(-60.0),)],
     )
