@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.roadmap.alike import made_alike
+from mobee.roadmap.flood_points import FloodPoints, Missed
 from mobee.roadmap.goals import Goals
 from mobee.roadmap.lattice_points import LatticePoints, Point
 from mobee.roadmap.problem import Problem
@@ -35,13 +38,16 @@ class Patience:
     scouts: int = 256
 
 
+_DEFAULT = Patience()
+
+
 def flooded(
     problem: Problem,
     task: Task,
     spacing: Array,
     rng: np.random.Generator,
     tick: Callable[[int], None] | None = None,
-    patience: Patience = Patience(),
+    patience: Patience = _DEFAULT,
 ) -> tuple[Array, Array]:
     """Poses q (V, n) and their task coordinates y (V, m): one at every point that is reached of a lattice of that spacing (m,).
 
@@ -51,86 +57,104 @@ def flooded(
     Raises:
         InvalidValue: a coordinate has no derivative.
     """
-    flood = _Flood(problem, task, spacing, rng, patience)
-    if flood.begin():
-        going = True
-        while going:
-            while flood.wave():
-                if tick is not None:
-                    tick(len(flood.q))
-            going = flood.climb() or flood.look_between() or flood.scout()
+    flood = Flood(problem, task, spacing, rng, patience)
+    while flood.step():
+        if tick is not None:
+            tick(flood.vertices)
     return flood.result()
 
 
-class _Flood:
-    def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, patience: Patience) -> None:
-        self._problem, self._task, self._rng, self._patience = problem, task, rng, patience
+class Flood:
+    """A map that is being filled, see `flooded`; `rng` draws all that is random."""
+
+    def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, patience: Patience = _DEFAULT) -> None:
+        self.problem, self.rng = problem, rng
+        self._task, self._patience = task, patience
         self._goals = Goals(problem, task, OFF * spacing)
         self._lattice = LatticePoints(task.box, spacing)
-        self._vertex: dict[Point, int] = {}
-        self._untried: dict[Point, list[int]] = {}  # points beside vertices, and of which of these the posture is still to be tried
-        self._missed: dict[Point, _Missed] = {}
-        self._between: set[Point] = set()  # points off the lattice that were or are to be tried
-        self.q: list[Array] = []
-        self.y: list[Array] = []
+        self._known = FloodPoints(len(problem.start), len(spacing))
 
-    def begin(self) -> bool:
+    @property
+    def vertices(self) -> int:
+        """How many there are."""
+        return len(self._known.q)
+
+    @property
+    def open(self) -> int:
+        """How many points beside vertices are still to be tried."""
+        return len(self._known.untried)
+
+    def step(self) -> bool:
+        """Try what is to be tried next; says whether there was anything."""
+        if not self.vertices:
+            return self._begin()
+        return self._wave() or self._climb() or self._look_between() or self._scout()
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All that is known between two steps, but for the state of `rng`; with the vertices' poses "q" and task points "y"."""
+        return self._known.state()
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on where another flood was, see `state`."""
+        self._known.restore(state)
+
+    def result(self) -> tuple[Array, Array]:
+        """Poses (V, n) and task points (V, m), neighbours' postures made alike."""
+        points, q, y = self._known.vertices()
+        vertex = self._known.vertex
+        pairs = [(k, vertex[one]) for k, beside in enumerate(self._lattice.around(points)) for one in beside if one in vertex]
+        once = np.array([pair for pair in pairs if pair[0] < pair[1]], dtype=np.intp).reshape(-1, 2)
+        return made_alike(self._goals, self._lattice.y(points), q, y, once, self.rng)
+
+    def _begin(self) -> bool:
         """Find a first pose, near the start if there is one; says whether there is one."""
-        start = self._problem.start[None]
-        here = self._lattice.nearest(self._task.of(self._problem.model.evaluate(start)))[0]
+        start = self.problem.start[None]
+        here = self._lattice.nearest(self._task.of(self.problem.model.evaluate(start)))[0]
         starts = np.concatenate([start, self._anywhere(self._patience.starts)])
-        return self._solve([tuple(here.tolist())] * len(starts), starts, most=1) or any(self.scout(most=1) for _ in range(ROUNDS))
+        return self._solve([tuple(here.tolist())] * len(starts), starts, most=1) or any(self._scout(most=1) for _ in range(ROUNDS))
 
-    def wave(self) -> bool:
+    def _wave(self) -> bool:
         """Try every point beside a vertex from the posture of one; says whether there was any."""
-        if not self._untried:
+        if not self._known.untried:
             return False
-        points = list(self._untried)
-        sources = [self._untried[point].pop(0) for point in points]
-        self._untried = {point: left for point, left in self._untried.items() if left}
-        self._solve(points, np.array([self.q[source] for source in sources]))
+        points = list(self._known.untried)
+        sources = [self._known.untried[point].pop(0) for point in points]
+        self._known.untried = {point: left for point, left in self._known.untried.items() if left}
+        self._solve(points, np.array([self._known.q[source] for source in sources]))
         return True
 
-    def climb(self) -> bool:
+    def _climb(self) -> bool:
         """Try every point that was missed from about the least bad posture it had so far; says whether there was any to try."""
-        points = [point for point, missed in self._missed.items() if missed.left > 0]
+        points = [point for point, missed in self._known.missed.items() if missed.left > 0]
         if not points:
             return False
         for point in points:
-            self._missed[point].left -= 1
+            self._known.missed[point].left -= 1
         each = self._patience.starts
-        starts = self._about(np.repeat([self._missed[point].q for point in points], each, axis=0))
+        starts = self._about(np.repeat([self._known.missed[point].q for point in points], each, axis=0))
         random = np.tile(np.arange(each) < ANYWHERE * each, len(points))
         starts[random] = self._anywhere(int(random.sum()))
         self._solve([point for point in points for _ in range(each)], starts)
         return True
 
-    def look_between(self) -> bool:
+    def _look_between(self) -> bool:
         """Have the points between the lattice's tried around those that were missed; says whether there are any new ones."""
-        missed = [point for point in self._missed if point not in self._between]
+        missed = [point for point in self._known.missed if point not in self._known.between]
         found = False
         for point, halves in zip(missed, self._lattice.between(np.array(missed)) if missed else [], strict=True):
             for half in halves:
-                if half not in self._between and self._is_free(half):
-                    self._between.add(half)
-                    self._missed[half] = _Missed(self._missed[point].q, np.inf, self._patience.between)
+                if half not in self._known.between and self._is_free(half):
+                    self._known.between.add(half)
+                    self._known.missed[half] = Missed(self._known.missed[point].q, np.inf, self._patience.between)
                     found = True
         return found
 
-    def scout(self, most: int | None = None) -> bool:
+    def _scout(self, most: int | None = None) -> bool:
         """Try points of the box that no vertex is near, from anywhere; says whether one was reached."""
         low, high = self._task.box.T
-        drawn = self._lattice.nearest(self._rng.uniform(low, high, (self._patience.scouts, len(low))))
-        points = [point for point in map(tuple, drawn.tolist()) if point not in self._vertex and point not in self._missed]
+        drawn = self._lattice.nearest(self.rng.uniform(low, high, (self._patience.scouts, len(low))))
+        points = [point for point in map(tuple, drawn.tolist()) if point not in self._known.vertex and point not in self._known.missed]
         return self._solve(points, self._anywhere(len(points)), most, remember=False)
-
-    def result(self) -> tuple[Array, Array]:
-        """Poses (V, n) and task points (V, m), neighbours' postures made alike."""
-        q, y = np.array(self.q).reshape(-1, len(self._problem.start)), np.array(self.y).reshape(-1, len(self._task.box))
-        points = np.array(list(self._vertex), dtype=np.intp).reshape(-1, len(self._task.box))
-        pairs = [(k, self._vertex[one]) for k, beside in enumerate(self._lattice.around(points)) for one in beside if one in self._vertex]
-        between = np.array([pair for pair in pairs if pair[0] < pair[1]], dtype=np.intp).reshape(-1, 2)
-        return made_alike(self._goals, self._lattice.y(points), q, y, between, self._rng)
 
     def _solve(self, points: Sequence[Point], starts: Array, most: int | None = None, remember: bool = True) -> bool:
         """Add the points that are reached from the starts, `most` of them; says whether any was."""
@@ -140,17 +164,17 @@ class _Flood:
         added: list[Point] = []
         for k in np.lexsort((costs, wrong)).tolist():
             point = points[k]
-            if point in self._vertex:
+            if point in self._known.vertex:
                 continue
             if wrong[k] == 0.0 and (most is None or len(added) < most) and self._is_free(point):
-                self._vertex[point] = len(self.q)
-                self.q.append(q[k])
-                self.y.append(y[k])
+                self._known.vertex[point] = len(self._known.q)
+                self._known.q.append(q[k])
+                self._known.y.append(y[k])
                 added.append(point)
             elif remember:
-                known = self._missed.setdefault(point, _Missed(q[k], np.inf, self._patience.hopeless))
+                known = self._known.missed.setdefault(point, Missed(q[k], np.inf, self._patience.hopeless))
                 if wrong[k] < known.wrong:
-                    if np.isinf(known.wrong) and point not in self._between:
+                    if np.isinf(known.wrong) and point not in self._known.between:
                         known.left += self._patience.tries - self._patience.hopeless
                     known.q, known.wrong = q[k], float(wrong[k])
         if added:
@@ -160,32 +184,25 @@ class _Flood:
     def _spread(self, added: Sequence[Point]) -> None:
         """Remember which points are beside new vertices."""
         for point, beside in zip(added, self._lattice.around(np.array(added)), strict=True):
-            self._untried.pop(point, None)
-            self._missed.pop(point, None)
+            self._known.untried.pop(point, None)
+            self._known.missed.pop(point, None)
             for one in beside:
-                if one not in self._vertex and self._is_free(one):
-                    self._untried.setdefault(one, []).append(self._vertex[point])
+                if one not in self._known.vertex and self._is_free(one):
+                    self._known.untried.setdefault(one, []).append(self._known.vertex[point])
 
     def _is_free(self, point: Point) -> bool:
         """Whether no vertex is too near to a point."""
-        return not self._between or not any(one in self._vertex for one in self._lattice.close(point))
+        return not self._known.between or not any(one in self._known.vertex for one in self._lattice.close(point))
 
     def _about(self, q: Array) -> Array:
         """Starts about postures q (N, n)."""
-        low, high = self._problem.limits.T
-        moved, free = q.copy(), self._problem.free
-        noise = self._rng.choice(NOISES, (len(q), 1)) * (high - low) * self._rng.standard_normal((len(q), len(free)))
+        low, high = self.problem.limits.T
+        moved, free = q.copy(), self.problem.free
+        noise = self.rng.choice(NOISES, (len(q), 1)) * (high - low) * self.rng.standard_normal((len(q), len(free)))
         moved[:, free] = np.clip(q[:, free] + noise, low, high)
         return moved
 
     def _anywhere(self, count: int) -> Array:
         """Random starts (count, n)."""
-        low, high = self._problem.limits.T
-        return self._problem.whole(self._rng.uniform(low, high, (count, len(low))))
-
-
-class _Missed:
-    """A point that was not reached so far: the least bad posture, what is wrong with it, and how often it is still to be tried."""
-
-    def __init__(self, q: Array, wrong: float, left: int) -> None:
-        self.q, self.wrong, self.left = q, wrong, left
+        low, high = self.problem.limits.T
+        return self.problem.whole(self.rng.uniform(low, high, (count, len(low))))

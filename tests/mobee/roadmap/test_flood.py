@@ -8,7 +8,7 @@ import pytest
 import mobee
 from mobee import costs, tasks
 from mobee.errors import InvalidValue
-from mobee.roadmap.flood import OFF, flooded
+from mobee.roadmap.flood import OFF, Flood, flooded
 from mobee.roadmap.problem import Problem
 from mobee.roadmap.task import Task
 from tests.mobee.planar import planar_arm
@@ -99,3 +99,21 @@ def test_progress_is_told(arm: mobee.Model) -> None:
     problem = Problem(arm, [costs.collision()], None, None)
     q, _ = flooded(problem, TIP, SPACING, np.random.default_rng(0), told.append)
     assert told == sorted(told) and told[-1] <= len(q)
+
+
+def test_it_goes_on_where_it_was_interrupted(arm: mobee.Model) -> None:
+    whole = flood(arm, TIP)[1:]
+    rng = np.random.default_rng(0)
+    first = Flood(Problem(arm, [costs.collision()], None, None), TIP, SPACING, rng)
+    for _ in range(9):
+        assert first.step()
+    state, generator = first.state(), rng.bit_generator.state
+    assert 0 < len(state["q"]) == first.vertices < len(whole[0]) and first.open > 0
+    again = np.random.default_rng(5)
+    again.bit_generator.state = generator
+    second = Flood(Problem(arm, [costs.collision()], None, None), TIP, SPACING, again)
+    second.restore(state)
+    while second.step():
+        pass
+    for one, other in zip(second.result(), whole, strict=True):
+        np.testing.assert_array_equal(one, other)
