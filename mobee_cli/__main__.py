@@ -24,6 +24,7 @@ VERBS = {
     "convert": "a robot from zero-position XML to URDF, or back",
     "plan": "a way to anywhere, by what an agent has learned",
     "reach": "put a hand on a place, on the robot that runs or offline",
+    "roadmap": "maps of whole-body motions: build, show, query, play",
     "export": "the transitions of a run as one table",
     "experiment": "claims of the papers, measured: list, run, figure",
     "bench": "how fast mobee is on this machine, beside its peers",

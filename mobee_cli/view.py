@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from mobee.collision.world import World
 from mobee.errors import MobeeError
 from mobee.robot.load import load_robot, load_world
+from mobee.robot.robot import Robot
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
 from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
@@ -25,24 +29,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Load, move, show."""
+    save: Path | None = arguments.save
+    require_recording(save)
+    try:
+        robot = load_robot(arguments.file, **urdf_options(arguments))
+        world = load_world(arguments.world) if arguments.world else None
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    return show(robot, world, save)
+
+
+def require_recording(save: Path | None) -> None:
+    """Raise UserError unless a recording can be written there."""
+    if save is not None and save.suffix.lower() != ".rrd":
+        raise UserError(f"--save {save}: it writes recordings only: give a name that ends in .rrd", BAD_INPUT)
+    if save is not None and not save.resolve().parent.is_dir():
+        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
+
+
+def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None) -> int:
+    """Show the robot on a page until Ctrl-C, or save it to a file; `stretches`: of the motion, None: a sweep."""
     try:
         from services.monitor.view import view  # needs the viewer, which is an extra
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "rerun":
             raise
         raise UserError("a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder", ENVIRONMENT) from None
-    save: Path | None = arguments.save
-    if save is not None and save.suffix.lower() != ".rrd":
-        raise UserError(f"--save {save}: it writes recordings only: give a name that ends in .rrd", BAD_INPUT)
-    if save is not None and not save.resolve().parent.is_dir():
-        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
     try:
-        robot = load_robot(arguments.file, **urdf_options(arguments))
-        world = load_world(arguments.world) if arguments.world else None
-    except MobeeError as error:
-        raise UserError(str(error), BAD_INPUT) from None
-    try:
-        view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True))
+        view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True), stretches)
     except KeyboardInterrupt:
         if save is not None:
             raise

@@ -17,7 +17,7 @@ from mobee.roadmap.reference import ROUNDING, Reference, reference
 from mobee.robot.robot import Array, Robot
 from mobee.simulation import OfflinePlant
 
-SPEED = 0.5  # of what the springs can do
+SPEED = 0.8  # of what the springs can do
 PERIOD = 0.05  # s between two places of the attractor
 PATIENCE = 5.0  # s for coming to rest behind the path
 _HARD = 0.8  # of its largest force: what a spring gives at most to follow
@@ -107,9 +107,23 @@ def play(
     q, encoders = (np.concatenate([getattr(one, name) for one in traces]) for name in ("q", "encoders"))
     solid, field = (np.concatenate([getattr(one, name) for one in traces]) for name in ("solid", "field"))
     times: Array = plant.dt * np.arange(1.0, len(q) + 1.0)
+    return Played(times, at(wanted, times), q, solid, field, rested, touched_most(model, encoders, solid))
+
+
+def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: bool) -> Played:
+    """What was played elsewhere, by the poses q (T, n) rad that were seen at times (T,) s."""
+    depths = np.zeros((2, len(q)))  # solids, fields
+    table = model.track().evaluate(q).table
+    np.maximum.at(depths, (table.kind, table.pose), table.depth)
+    return Played(times, at(wanted, times), q, depths[0], depths[1], rested, touched_most(model, q, depths[0]))
+
+
+def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
+    """The solid contacts in the one of the poses q (T, n) in which they are deepest, solid (T,) m."""
     worst = int(solid.argmax())
-    touched = tuple(one for one in model.evaluate(encoders[worst]).contacts if one.kind == "solid") if solid[worst] > 0.0 else ()
-    return Played(times, at(wanted, times), q, solid, field, rested, touched)
+    if not solid[worst] > 0.0:
+        return ()
+    return tuple(one for one in model.evaluate(q[worst]).contacts if one.kind == "solid")
 
 
 def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:

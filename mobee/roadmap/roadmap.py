@@ -17,7 +17,7 @@ from mobee.roadmap.graph import Graph, graph
 from mobee.roadmap.problem import chosen
 from mobee.roadmap.told_world import told_world, world_told
 from mobee.robot.load import load_robot, shipped_robots
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array, Ints, Robot
 
 NEAR = 1.5  # spacings: a goal further from all vertices is not of the map
 
@@ -114,7 +114,7 @@ class Roadmap:
 
     def told(self, y: Array) -> str:
         """Task coordinates (m,) in words."""
-        return ", ".join(f"{name} {value:.3g}" for name, value in zip(self.names, y, strict=True))
+        return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
     def _posture(self, given: ArrayLike) -> Array:
         q, n = np.array(given, dtype=np.float64), len(self.model.robot.motors)
@@ -144,10 +144,10 @@ class Roadmap:
         )
 
 
-def load_roadmap(path: str | Path, model: Model | None = None) -> Roadmap:
+def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | None = None) -> Roadmap:
     """The map of a file, for the robot and the world that it was made for.
 
-    `model` None: the robot that comes with mobee under the name that the map was made with, in the world as it was then.
+    `model` None: in the world as it was then, for this robot; `robot` None: the one that comes with mobee under the name in the map.
 
     Raises:
         MobeeError: no map, not a whole one, or one of another robot or world, with the digests of both.
@@ -157,7 +157,7 @@ def load_roadmap(path: str | Path, model: Model | None = None) -> Roadmap:
         settings, made_in = dict(notes["settings"]), notes["world"]
         q, y, spacing = (arrays[name].astype(np.float64, casting="same_kind") for name in ("q", "y", "spacing"))
         edges = arrays["edges"].astype(np.intp, casting="same_kind")
-        here = _rebuilt(path, settings, made_in, notes["reaching"]) if model is None else model
+        here = _rebuilt(path, settings, made_in, notes["reaching"], robot) if model is None else model
         _require_same(path, settings, here)
         return Roadmap(here, q, y, edges, spacing, settings)
     except (KeyError, TypeError) as error:
@@ -175,11 +175,11 @@ def digests(model: Model) -> dict[str, str]:
     }
 
 
-def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any) -> Model:
+def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any, robot: Robot | None) -> Model:
     name = settings["robot"]
-    if name not in shipped_robots():
+    if robot is None and name not in shipped_robots():
         raise MobeeError(f"{path}: made for the robot {name!r}, which does not come with mobee: its file must be named too.")
-    model = Model(load_robot(name), told_world(made_in))
+    model = Model(load_robot(name) if robot is None else robot, told_world(made_in))
     model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
     return model
 
@@ -193,3 +193,8 @@ def _require_same(path: str | Path, settings: dict[str, Any], model: Model) -> N
                 f"{path}: made for {what} {made}, and this {what} is {now}: not every pose and edge of it need be free here. "
                 f"Build it anew, or load it with the {what} it was made for."
             )
+
+
+def _short(value: float) -> str:
+    """Four digits behind the point, without those that say nothing."""
+    return f"{round(float(value), 4) + 0.0:.4f}".rstrip("0").rstrip(".")

@@ -1,9 +1,9 @@
-"""A view of a robot's file: the robot is moved through all it can do, and what touches is shown."""
+"""A view of a robot: it is moved through all it can do, or as it is told, and what touches is shown."""
 
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,32 +17,35 @@ from services.monitor.blueprint import BACKGROUND
 from services.monitor.config import Config
 from services.monitor.figure import TIMELINE, Figure
 from services.monitor.output import open_output
-from services.monitor.sweep import RATE, sweep
+from services.monitor.sweep import RATE, Stretch, sweep
 
 VIEWPOINT = np.array([-1.0, -0.9, 0.6])  # from where the robot is seen
 MOST_NAMES = 4  # a longer legend hides the plot
 DISTANCE = 1.4  # of the eye, in diameters of the scene
 
 
-def view(robot: Robot, world: World | None, save: Path | None, tell: Callable[[str], None]) -> None:
-    """Show a swept motion on a page until the user interrupts or the page's server ends, or save it to a file.
+def view(
+    robot: Robot, world: World | None, save: Path | None, tell: Callable[[str], None], stretches: Sequence[Stretch] | None = None
+) -> None:
+    """Show a motion on a page until the user interrupts or the page's server ends, or save it to a file.
 
-    `tell` is given the page's address when all is there to be seen.
+    `tell` is given the page's address when all is there to be seen.  `stretches`: of the motion, RATE poses a second; None: a sweep
+    through all that the robot can do.
     """
     web_port, grpc_port = _free_ports()
     config = Config(serve=save is None, web_port=web_port, grpc_port=grpc_port, memory_limit="1GB")
     with open_output(config, layout(robot), save) as output:
-        _log(output.stream, robot, world)
+        _log(output.stream, robot, world, sweep(robot) if stretches is None else stretches)
         output.stream.disconnect()  # when all has arrived: the page's server keeps it
         if output.page is not None:
             tell(output.url)
             output.page.wait()
 
 
-def _log(stream: rr.RecordingStream, robot: Robot, world: World | None) -> None:
+def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretches: Sequence[Stretch]) -> None:
     figure = Figure(stream, robot, world)
     begin = 0.0
-    for stretch in sweep(robot):
+    for stretch in stretches:
         figure.say(begin, stretch.title)
         figure.move(begin, RATE, stretch.poses)
         begin += len(stretch.poses) / RATE

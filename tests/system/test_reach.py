@@ -1,4 +1,4 @@
-"""Reaching with all services: as the offline plant reaches, to the bit; and what is left when who reaches is killed."""
+"""Reaching with all services: as offline, to the bit; what is left when who reaches is killed; and a map that is played."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from bus_schema.rpc import Empty, World
 from experiments.launched import summary_of
 from mobee import Gains, Model, OfflinePlant, load_robot, load_world
 from mobee.reach import TARGET
+from mobee.roadmap.roadmap import Roadmap
 from services.common import rpc
 from tests.services.harness import ROOT
 from tests.system.live import Watcher, running, until
@@ -46,8 +48,11 @@ def test_live_reaches_in_lockstep_are_those_of_the_offline_plant_to_the_bit(tmp_
     print("mm missing:", [round(1e3 * outcome["missing"]) for outcome in offline if "missing" in outcome])
 
 
-def test_when_who_reaches_is_killed_the_arm_brakes_and_the_target_is_gone(tmp_path: Path) -> None:
+def test_a_map_is_played_and_when_who_reaches_is_killed_the_arm_brakes_and_the_target_is_gone(tmp_path: Path) -> None:
     with running(tmp_path, str(SCENARIO)) as (system, watcher):
+        played = play_a_map(tmp_path / "map.npz", system.endpoint)
+        assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
+        until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be given back")
         told: list[Reach] = []
         kept = watcher.session.declare_subscriber(
             keys.reach(PART), lambda sample: told.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
@@ -72,6 +77,20 @@ def test_when_who_reaches_is_killed_the_arm_brakes_and_the_target_is_gone(tmp_pa
         assert TARGET not in objects(watcher)
         assert told[-1].phase == "interrupted"
         kept.undeclare()
+
+
+def play_a_map(path: Path, endpoint: str) -> dict[str, Any]:
+    """Two poses of the right arm in the open, and the way to the second, as `mobee roadmap play --live --json` tells of it."""
+    robot, world = load_robot("icub"), load_world("table")
+    world.remove("ball")
+    q = np.repeat(robot.home[None], 2, axis=0)
+    moves = ["r_shoulder_pitch", "r_shoulder_roll", "r_elbow"]
+    q[:, [robot.motor_index(name) for name in moves]] = [(-0.5, 0.8, 0.9), (-0.6, 0.9, 1.1)]
+    Roadmap(Model(robot, world), q, np.array([[0.0], [1.0]]), np.array([[0, 1]]), np.ones(1), {"motors": moves}).save(path)
+    argv = [sys.executable, "-m", "mobee_cli", "roadmap", "play", str(path), "--to", "1", "--live", "--endpoint", endpoint, "--json"]
+    done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
 
 
 def objects(watcher: Watcher) -> set[str]:

@@ -1,0 +1,56 @@
+"""Maps on the command line: where they are read from, and what places of them are."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from mobee.roadmap.roadmap import Roadmap, load_roadmap
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array
+from mobee_cli.errors import BAD_INPUT, UserError
+
+PLACES = """A place is the task's coordinates, in the order of `mobee roadmap show`.
+The way begins at home, or at --from: a place of the map, or all motors in rad."""
+
+
+def add_map(parser: argparse.ArgumentParser) -> None:
+    """The map, and its robot."""
+    parser.add_argument("map", type=Path, metavar="MAP", help="a map's file, as `mobee roadmap build` writes it")
+    parser.add_argument("--robot", metavar="FILE", help="the robot it was made for, where it is none that comes with mobee")
+
+
+def add_places(parser: argparse.ArgumentParser) -> None:
+    """Where to, where from."""
+    parser.add_argument("--to", nargs="+", type=float, required=True, metavar="Y", help="the place: task coordinates")
+    parser.add_argument("--from", nargs="+", type=float, dest="start", metavar="Y", help="where from (default: home)")
+
+
+def map_given(arguments: argparse.Namespace) -> Roadmap:
+    """The map that is named, in the world it was made in."""
+    return load_roadmap(arguments.map, robot=load_robot(arguments.robot) if arguments.robot else None)
+
+
+def start_of(trm: Roadmap, given: list[float] | None) -> Array:
+    """The posture (n,) rad where the way begins."""
+    robot = trm.model.robot
+    if given is None:
+        return robot.home.copy()
+    if len(given) == len(trm.spacing):
+        found: Array = trm.q[trm.exit(given)]
+        return found
+    if len(given) != len(robot.motors):
+        names = ", ".join(trm.names)
+        raise UserError(
+            f"--from has {len(given)} numbers; give {len(trm.spacing)} task coordinates ({names}), or {len(robot.motors)} angles in rad",
+            BAD_INPUT,
+        )
+    q = np.array(given)
+    low, high = robot.limits.T
+    for motor in np.flatnonzero((q < low - 0.01) | (q > high + 0.01))[:1]:
+        raise UserError(
+            f"--from: {robot.motors[motor]} cannot be at {q[motor]:g} rad: valid is {low[motor]:.3g} to {high[motor]:.3g}", BAD_INPUT
+        )
+    return np.clip(q, low, high)

@@ -1,0 +1,26 @@
+"""The tasks that come with mobee, by the thesis figures that show their maps."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+NOTES = "`mobee roadmap build TASK` builds the map of one."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """None."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List them."""
+    from experiments.trm.examples import EXAMPLES
+
+    found = [(name, make()) for name, make in EXAMPLES.items()]
+    if arguments.json:
+        told = [{"task": name, "figure": one.figure, "title": one.title, "coordinates": list(one.task.names)} for name, one in found]
+        print(json.dumps(told, indent=2))
+        return 0
+    for name, one in found:
+        print(f"{name:<18}{one.figure:<15}{one.title:<19}{', '.join(one.task.names)}"[:80])
+    return 0

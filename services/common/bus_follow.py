@@ -1,0 +1,120 @@
+"""Motions of several parts at once on the bus: their attractors are moved along together, by the robot's own clock."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.chain import Tick
+from bus_schema.rpc import Goal
+from mobee.errors import ActionInterrupted, MobeeError
+from mobee.plant import Outcome
+from mobee.robot.robot import Array, Robot
+from services.common.bus_plant import BusPlant
+from services.common.rpc import CallFailed
+from services.common.service import Service
+
+CONTROL = 8.0  # s for the parts to come under control and their goals to be free
+STALLED = 5.0  # s in which the robot's clock must have moved
+RESTING = 60.0  # s for coming to rest behind the motion; the controller's own patience ends before
+
+
+class BusFollower(BusPlant):
+    """A BusPlant whose parts move together; all that it waits for has an end."""
+
+    def __init__(self, service: Service, robot: Robot) -> None:
+        super().__init__(service, robot, tuple(robot.parts))
+        self._seen: list[tuple[float, Array]] = []  # s of the robot's clock, encoders (n,)
+        service.on_newest(keys.TICK, Tick, self._note_tick)
+
+    def q(self) -> Array:
+        """All motors, (n,) rad, as the encoders say; raises MobeeError where there is no robot."""
+        self._service.spin(time.monotonic() + CONTROL, lambda: bool(self._seen))
+        if not self._seen:
+            raise MobeeError("no tick of the robot came: `mobee status` says whether robot_sim runs")
+        return self._seen[-1][1]
+
+    def take(self, parts: Sequence[str]) -> None:
+        """Take the goals of parts; raises MobeeError if one stays in hold or somebody else's."""
+        give_up = time.monotonic() + CONTROL
+        while not self._has(parts):
+            if time.monotonic() > give_up:
+                waiting = ", ".join(part for part in parts if not self._has([part]))
+                raise MobeeError(f"{waiting} in hold: `mobee status` says why, `mobee estop --reset` ends an emergency stop")
+            for part in parts:
+                self._take(part)
+            self._wait(lambda: self._has(parts))
+
+    def follow(self, parts: Sequence[str], attractors: Sequence[Array], period: float) -> dict[str, Outcome]:
+        """Move the attractor (n,) rad of parts that were taken, one place each period [s of the robot's clock], until all rest.
+
+        A place that comes too late is left out, but for the last.  Raises ActionInterrupted when a part is in hold or not ours any
+        more, or the robot's clock stands still: `let_go` then.
+        """
+        begun, run, last = self._now, self._runs, len(attractors) - 1
+        self._seen.clear()
+        asked: dict[str, tuple[str, int]] = {}
+        row, before = 0, None
+        while True:
+            here = attractors[row]
+            for part in parts:
+                where = self.robot.part(part).slice
+                if before is None or row == last or not np.array_equal(here[where], before[where]):
+                    asked[part] = self._aim(part, here[where])
+            if row == last:
+                break
+            self._until(parts, run, self._reached(begun + (row + 1) * period), STALLED, "the robot's clock stands still")
+            row, before = min(max(row + 1, int((self._now - begun) / period)), last), here
+        rests = [lambda part=part, one=one: self._is_over(part, *one) for part, one in asked.items()]
+        self._until(parts, run, lambda: all(rest() for rest in rests), RESTING, "it does not come to rest")
+        return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
+
+    def seen(self) -> tuple[Array, Array]:
+        """The encoders (T, n) of the ticks that came since `follow` began, and their times (T,) s since the first."""
+        times = np.array([time_ for time_, _ in self._seen])
+        return times - times[:1], np.array([q for _, q in self._seen])
+
+    def let_go(self) -> None:
+        """Give back all goals, of which some may be lost: the parts then stay where they are."""
+        for part in list(self._epochs):
+            with suppress(CallFailed):  # lost already, or nobody is there: then it holds
+                self.release(part)
+
+    @property
+    def _now(self) -> float:
+        return float(self._service.bus.t) * 1e-9
+
+    def _reached(self, moment: float) -> Callable[[], bool]:
+        return lambda: self._now >= moment
+
+    def _has(self, parts: Sequence[str]) -> bool:
+        return all(self._owns(part) and self._is_free(part) for part in parts)
+
+    def _aim(self, part: str, target: Array) -> tuple[str, int]:
+        """Set a part's attractor (n_part,) rad; returns the action's id, and the tick at which it began."""
+        action_id = uuid.uuid4().hex
+        return action_id, self._ask(part, "goal", Goal, action_id=action_id, q=[float(x) for x in target])
+
+    def _until(self, parts: Sequence[str], run: int, enough: Callable[[], bool], patience: float, why: str) -> None:
+        """Wait until it is enough, as long as all parts are ours; raises ActionInterrupted."""
+        give_up = time.monotonic() + patience
+        while not enough():
+            if run != self._runs:
+                raise ActionInterrupted("robot_sim started a new run")
+            if not self._service.alive.get("controller"):
+                raise ActionInterrupted("the controller is gone")
+            if not self._has(parts):
+                lost = ", ".join(part for part in parts if not self._has([part]))
+                raise ActionInterrupted(f"{lost}: in hold, or somebody else's")
+            if time.monotonic() > give_up:
+                raise ActionInterrupted(why)
+            self._service.check_router()
+            self._wait(lambda: enough() or not self._has(parts))
+
+    def _note_tick(self, tick: Tick) -> None:
+        self._seen.append((tick.t * 1e-9, np.array(tick.q)))

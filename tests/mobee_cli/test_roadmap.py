@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.roadmap.roadmap import Roadmap
+from mobee_cli.__main__ import main
+from mobee_cli.roadmap.tour import PLACES, tour
+
+MOTORS = ("r_shoulder_yaw", "r_elbow")
+SIDE, STEP = 5, 0.1
+
+
+def square(folder: Path, name: str = "map.npz", block: bool = False) -> Path:
+    """A map over two motors of the right arm, away from the body; `block`: with something in the middle of its world."""
+    robot, world = mobee.load_robot("icub"), mobee.World()
+    model = mobee.Model(robot, world)
+    start = robot.home.copy()
+    start[robot.motor_index("r_shoulder_roll")] = 1.0
+    rows, columns = (one.ravel() for one in np.meshgrid(range(SIDE), range(SIDE), indexing="ij"))
+    q = np.repeat(start[None], SIDE**2, axis=0)
+    q[:, robot.motor_index(MOTORS[0])] = 0.2 + STEP * rows
+    q[:, robot.motor_index(MOTORS[1])] = 0.7 + STEP * columns
+    if block:
+        world.add("block", mobee.sphere(0.03), position=model.evaluate(q[12]).position("right_palm"))
+    edges = np.argwhere(np.triu(np.abs(rows[:, None] - rows) + np.abs(columns[:, None] - columns) == 1))
+    y = STEP * np.stack([rows, columns], axis=1).astype(float)
+    moved = ["r_shoulder_roll", *MOTORS]
+    settings = {"names": ["yaw", "elbow"], "units": ["rad", ""], "motors": moved, "box": [[0.0, 0.4], [0.0, 0.4]], "method": "by hand"}
+    Roadmap(model, q, y, edges, np.array([STEP, STEP]), settings).save(folder / name)
+    return folder / name
+
+
+@pytest.fixture(scope="module")
+def free(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return square(tmp_path_factory.mktemp("maps"))
+
+
+@pytest.fixture(scope="module")
+def blocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return square(tmp_path_factory.mktemp("maps"), block=True)
+
+
+Say = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def say(capsys: pytest.CaptureFixture[str]) -> Say:
+    """Run `mobee roadmap`; its exit code, what it printed, and its errors."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        try:
+            code = main(["roadmap", *map(str, words)])
+        except SystemExit as end:
+            code = int(end.code or 0)
+        told = capsys.readouterr()
+        assert all(len(line) <= 80 for line in told.out.splitlines() if not line.lstrip().startswith(('"', "{", "[")))
+        return code, told.out, told.err
+
+    return run
+
+
+def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path) -> None:
+    code, out, _ = say("show", free, "--check", "--picture", tmp_path / "a.png")
+    lines = out.splitlines()
+    assert code == 0
+    assert "25 poses, 40 edges." in out and "r_shoulder_roll, r_shoulder_yaw, r_elbow" in out
+    assert next(line for line in lines if line.startswith("yaw [rad]")).split()[2:] == ["0.1", "0.000", "0.400", "0", "0.4"]
+    assert "None of the 40 edges touches something" in out
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> None:
+    trm = mobee.load_roadmap(free)
+    stretches = tour(trm)
+    moves = [trm.model.robot.motor_index(name) for name in MOTORS]
+    seen = np.concatenate([one.poses for one in stretches])[:, moves]
+    assert len(stretches) == PLACES - 1 and all("yaw" in one.title and "elbow" in one.title for one in stretches)
+    assert np.abs(np.diff(seen, axis=0)).max() < 0.05
+    np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [[0.2, 0.7], [0.6, 1.1]], atol=1e-9)
+
+
+def test_query_tells_the_way(say: Say, free: Path) -> None:
+    code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2)
+    assert code == 0
+    assert "To yaw 0.4, elbow 0.2, 0.00 spacings from what was asked: over 7 poses" in " ".join(out.split())
+    assert "Nothing is in the way" in out
+    code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2, "--json")
+    found = json.loads(out)
+    assert code == 0 and found["free"] and found["vertices"][0] == 0 and found["vertices"][-1] == 22
+    assert found["length"] == pytest.approx(0.6) and len(found["poses"]) == 7
+
+
+def test_a_way_from_home_begins_there(say: Say, free: Path) -> None:
+    robot = mobee.load_robot("icub")
+    found = json.loads(say("query", free, "--to", 0, 0, "--json")[1])
+    assert found["poses"][0] == robot.home.tolist() and found["entry"] > 0.3
+    again = json.loads(say("query", free, "--to", 0, 0, "--from", *robot.home, "--json")[1])
+    assert again["poses"] == found["poses"]
+
+
+def test_what_is_in_the_way_is_told_with_exit_code_1(say: Say, blocked: Path) -> None:
+    code, out, _ = say("query", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
+    assert code == 1 and "Something is in the way: on" in out
+    code, out, err = say("play", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
+    assert code == 1 and out == "" and "--anyway" in err
+
+
+def test_play_arrives_offline(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("experiments.drawing.filmstrip.filmstrip", lambda strips, path: drawn.extend(strips) or path)
+    code, out, _ = say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--picture", tmp_path / "film.png")
+    assert code == 0
+    assert out.startswith("Arrived at yaw 0.4, elbow 0.2 after ") and "No solids touched" in out
+    assert f"Filmstrip: {tmp_path}" in out and drawn[0].motion.moved() == ("right_arm",)
+    found = json.loads(say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--json")[1])
+    assert found["arrived"] and found["missing"] < 0.05 and found["solid"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["query", "{map}", "--to", "9", "0"], "the nearest vertex"),
+        (["query", "{map}", "--to", "0"], "it must be (2,) finite numbers: yaw, elbow"),
+        (["query", "{map}", "--to", "0", "0", "--from", "1", "2", "3"], "give 2 task coordinates (yaw, elbow), or 41 angles"),
+        (["query", "{map}", "--to", "0", "0", "--from", *["9"] * 41], "cannot be at 9 rad"),
+        (["query", "no.npz", "--to", "0"], "no such file"),
+        (["play", "{map}", "--to", "0", "0", "--speed", "2"], "--speed 2: must be above 0"),
+        (["play", "{map}", "--to", "0", "0", "--gains", "soft"], "unknown gain set 'soft'"),
+        (["play", "{map}", "--to", "0", "0", "--picture", "a.jpg"], "ends in .png"),
+        (["show", "{map}", "--marker", "palm"], "unknown marker 'palm'"),
+        (["show", "{map}", "--picture", "/nowhere/a.png"], "there is no folder /nowhere"),
+        (["show", "{map}", "--robot", "icub_2014"], "made for robot"),
+        (["build", "palm-dwn"], "Did you mean 'palm-down'?"),
+        (["build", "no.py"], "there is no such file"),
+        (["build", "palm-down", "-o", "/nowhere/a.npz"], "there is no folder /nowhere"),
+    ],
+)
+def test_bad_input_is_told_in_a_line(say: Say, free: Path, words: list[str], text: str) -> None:
+    code, out, err = say(*(word.replace("{map}", str(free)) for word in words))
+    assert code == 2 and out == ""
+    assert text in err and err.count("\n") == 1
+
+
+def test_without_a_system_live_says_so(say: Say, free: Path) -> None:
+    code, _, err = say("play", free, "--to", 0, 0, "--live", "--endpoint", "tcp/127.0.0.1:1")
+    assert code == 3 and "mobee launch" in err
+    code, _, err = say("play", free, "--to", 0, 0, "--from", 0, 0, "--live", "--endpoint", "tcp/127.0.0.1:1")
+    assert code == 2 and "begins where it is" in err
+
+
+def test_tasks_are_listed_with_their_figures(say: Say) -> None:
+    code, out, _ = say("tasks")
+    assert code == 0 and any(line.split()[:3] == ["pregrasp", "4.8", "pre-grasp"] for line in out.splitlines())
+    assert {one["task"] for one in json.loads(say("tasks", "--json")[1])} >= {"palm-down", "unscrew"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x = (\n", r"task.py:1: SyntaxError"),
+        ("import mobee\n1 / 0\n", r"task.py:2: ZeroDivisionError"),
+        ("x = 1\n", "no function example()"),
+        ("def example():\n    return 1\n", "example() returned int"),
+    ],
+)
+def test_a_task_file_that_cannot_be_used_is_told_with_its_line(say: Say, tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "task.py").write_text(text)
+    code, out, err = say("build", tmp_path / "task.py")
+    assert code == 2 and out == "" and told in err and err.count("\n") == 1
+
+
+def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+
+    def built(model: mobee.Model, **settings: Any) -> Roadmap:
+        given.update(settings)
+        settings["progress"](SimpleNamespace(vertices=3, evaluations=40, open=1, seconds=0.5))
+        return mobee.load_roadmap(free)
+
+    monkeypatch.setattr(mobee, "build_roadmap", built, raising=False)
+    path = tmp_path / "own.npz"
+    (tmp_path / "own.py").write_text("from experiments.trm.palm_down import example\n")
+    code, out, _ = say("build", tmp_path / "own.py", "-o", path, "--method", "nes", "--neighbours", 8, "--longest", 0, "--seed", 4)
+    assert code == 0 and out.startswith(f"{path}"[:20])
+    assert (given["method"], given["neighbours"], given["longest"], given["seed"], given["file"]) == ("nes", 8, None, 4, path)
+    assert given["spacing"] == 0.02 and given["task"].names == ("right_palm x", "right_palm y")
+
+
+def test_an_interrupted_build_says_how_to_go_on(say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(model: mobee.Model, **settings: Any) -> Roadmap:
+        settings["progress"](SimpleNamespace(vertices=30, evaluations=400, open=10, seconds=12.0))
+        settings["file"].write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(mobee, "build_roadmap", interrupted, raising=False)
+    code, out, err = say("build", "palm-down", "-o", tmp_path / "map.npz")
+    assert code == 130 and out == ""
+    assert "interrupted at 30 vertices, 10 open" in err and "the same command goes on" in err
