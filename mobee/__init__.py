@@ -18,7 +18,9 @@ from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 from mobee.roadmap import costs, tasks
 from mobee.roadmap.adaptive import AdaptiveRoadmap
+from mobee.roadmap.build import build_roadmap
 from mobee.roadmap.explorer import MapExplorer
+from mobee.roadmap.front import Front
 from mobee.roadmap.nes import NES
 from mobee.roadmap.ngik import IK, solve_ik
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
@@ -38,6 +40,7 @@ __all__ = [
     "Controller",
     "CuriousAgent",
     "Forces",
+    "Front",
     "Gains",
     "Geometry",
     "IK",
@@ -72,6 +75,7 @@ __all__ = [
     "World",
     "WorldObject",
     "box",
+    "build_roadmap",
     "capsule",
     "constraint_forces",
     "costs",
