@@ -29,14 +29,21 @@ class Contestant:
 @contextlib.contextmanager
 def one_core() -> Iterator[int | None]:
     """Keep every thread of this process on one core, whose number it gives; None where the system has no such call."""
+    with some_cores(1) as cores:
+        yield cores[0] if cores else None
+
+
+@contextlib.contextmanager
+def some_cores(count: int) -> Iterator[tuple[int, ...]]:
+    """Keep every thread of this process on so many cores, whose numbers it gives; on all, (), where the system has no such call."""
     if not hasattr(os, "sched_setaffinity"):
-        yield None
+        yield ()
         return
     allowed = os.sched_getaffinity(0)
-    core = max(allowed)
-    _pin({core})
+    cores = tuple(sorted(allowed, reverse=True)[:count])
+    _pin(set(cores))
     try:
-        yield core
+        yield cores
     finally:
         _pin(allowed)
 

@@ -44,25 +44,29 @@ class Coverage:
         return float(self.far.max())
 
 
-def coverage(
+def reachable(
     model: mobee.Model,
     costs: Sequence[Cost],
     task: Task,
-    y: Array,
     spacing: Array,
     motors: Sequence[str] | None = None,
     start: Array | None = None,
     seed: int = 1,
-) -> Coverage:
-    """How much of what is reachable vertices y (V, m) cover, at a spacing (m,).
+) -> Array:
+    """Task points (R, m) that can be reached, densely.
 
-    Reachable is: what a flood of half the spacing reaches, with far more starts a point than a map gets; what random starts reach at
-    random points, which knows of no neighbours; and the vertices.
+    They are what a flood of half the spacing (m,) reaches, with far more starts a point than a map gets, and what random starts reach
+    at random points, which knows of no neighbours.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors)
     _, flood = flooded(problem, task, spacing / FINER, rng, patience=GENEROUS)
-    points = np.concatenate([flood, _blind(problem, task, spacing, rng), y])
+    return np.concatenate([flood, _blind(problem, task, spacing, rng)])
+
+
+def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
+    """How much of reachable task points (R, m) vertices y (V, m) cover, at a spacing (m,); the vertices are reachable, too."""
+    points = np.concatenate([points, y])
     far, _ = cKDTree(y / spacing).query(points / spacing)
     return Coverage(points, np.asarray(far))
 

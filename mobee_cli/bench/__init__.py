@@ -16,6 +16,7 @@ BENCHES = {
     "vi": "planning: value iteration beside SciPy and quantecon",
     "nes": "evolution strategies beside CMA-ES",
     "ik": "inverse kinematics beside mink, CMA-ES and others",
+    "trm": "a map of 5000 poses by least squares and by evolution",
     "edges": "checking the edges of a map of 5000 poses",
     "model": "the egocentric model beside MuJoCo and python-fcl",
 }

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import pytest
+
+from experiments.bench.trm import LEAST_SQUARES, Settings, measure, report
+from experiments.trm import coverage
+from mobee.roadmap.flood import Patience
+
+
+@pytest.fixture(scope="module")
+def result() -> dict:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(coverage, "GENEROUS", Patience(starts=4, tries=2, scouts=64))
+        patch.setattr(coverage, "BLIND", 20)
+        return measure(Settings(spacing=0.08, seeds=2, vertices=20, methods=(LEAST_SQUARES,)))
+
+
+def test_it_tells_how_complete_and_how_valid_a_map_is(result: dict) -> None:
+    row = result["rows"][LEAST_SQUARES]
+    assert row["vertices"] >= 20 and row["valid"] == 1.0
+    assert 0.9 < row["coverage"] <= 1.0 and 0.0 < row["largest_hole"] < 3.0
+    assert 0.0 < row["short_edges"] <= 1.0 and row["processor_s"] > 0.0
+
+
+def test_every_requirement_of_the_methods_asked_for_is_judged(result: dict) -> None:
+    assert len(result["requirements"]) == 5
+    assert result["passed"] == all(one["passed"] for one in result["requirements"])
+
+
+def test_the_report_fits_80_columns_and_marks_what_falls_short(result: dict) -> None:
+    result["requirements"][1] |= {"passed": False}
+    lines = report(result).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert [line.split()[-1] for line in lines if line.endswith(("pass", "SHORT"))][1] == "SHORT"
