@@ -8,7 +8,7 @@ from mobee.roadmap.goals import Goals
 from mobee.robot.robot import Array, Ints
 
 STEP = 0.25  # rad: where a motor moves further along an edge, the postures about it are drawn together
-SWEEPS = 16
+SWEEPS = 32
 
 
 def made_alike(goals: Goals, wanted: Array, q: Array, y: Array, pairs: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
