@@ -28,10 +28,11 @@ DRAW_IN_SOFTWARE = (
     "--use-angle=swiftshader",
     "--ignore-gpu-blocklist",
 )
-SIZE = {"width": 1280, "height": 800}
-DRAWN = {"robot": 120_000, "learning": 50_000}  # bytes: a page on which nothing is drawn yet packs into less
+SIZE = (1280, 800)  # pixels
+DRAWN = {"robot": 120_000, "learning": 50_000}  # bytes at that size: a page on which nothing is drawn yet packs into less
 READY = 60.0  # s for the system to come up
 PATIENCE = 120.0  # s for the first picture
+POLL = 1.0  # s between two looks
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
 
 
@@ -46,7 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     settings = [f"services.monitor.page={options.page}", *options.set]
     with _attached(options.url) if options.url else _launched(options.scenario, settings) as url:
         step_back()
-        for path in take(url, chromium, options.out, DRAWN[options.page], options.shots, options.gap, options.warm_up):
+        drawn = options.drawn or DRAWN[options.page]
+        for path in take(url, chromium, options.out, drawn, options.size, options.shots, options.gap, options.warm_up):
             print(path)
     return 0
 
@@ -57,6 +59,8 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--scenario", default="default", help="what to start otherwise")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", help="change a setting of the scenario")
     parser.add_argument("--page", choices=DRAWN, default="robot", help="the tab that is open (default: robot)")
+    parser.add_argument("--size", type=int, nargs=2, default=SIZE, metavar=("WIDTH", "HEIGHT"), help="pixels (default: 1280 800)")
+    parser.add_argument("--drawn", type=int, metavar="BYTES", help="what a page packs into that is drawn; goes with the size")
     parser.add_argument("--shots", type=int, default=1)
     parser.add_argument("--gap", type=float, default=10.0, help="s between two shots")
     parser.add_argument("--warm-up", type=float, default=45.0, help="s from the first picture to the first shot")
@@ -75,19 +79,19 @@ def step_back() -> None:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def take(url: str, chromium: str, folder: Path, drawn: int, shots: int, gap: float, warm_up: float) -> Iterator[Path]:
+def take(url: str, chromium: str, folder: Path, drawn: int, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
     """Screenshots of the page at `url`, `gap` seconds apart, once one has that many bytes."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAW_IN_SOFTWARE))
-        page = browser.new_page(viewport=SIZE, color_scheme="dark")
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
         page.goto(f"{url}&renderer=webgl")
         give_up = time.monotonic() + PATIENCE
         while len(page.screenshot(timeout=0)) < drawn:
             if time.monotonic() > give_up:
                 raise SystemExit(f"live picture: the page at {url} drew no scene within {PATIENCE:g} s")
-            time.sleep(2.0)
+            time.sleep(POLL)
         time.sleep(warm_up)
         for shot in range(1, shots + 1):
             path = folder / ("live.png" if shots == 1 else f"live-{shot}.png")
