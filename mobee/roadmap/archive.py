@@ -55,7 +55,9 @@ def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
     except OSError as error:
         raise MobeeError(f"{place}: the map cannot be read ({error.strerror or error}).") from error
     except (ValueError, KeyError, AttributeError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise MobeeError(f"{place}: no roadmap, or only a part of one ({_line(error)}). Build it anew.") from error
+        raise MobeeError(
+            f"{place}: no roadmap, or only a part of one ({_line(error)}). Give another file, or remove it and build it anew."
+        ) from error
     if found != FORMAT:
         raise MobeeError(f"{place}: written as {found!r}, this mobee reads {FORMAT!r}. Use the version that wrote it, or build it anew.")
     return arrays, notes

@@ -161,7 +161,9 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
         _require_same(path, settings, here)
         return Roadmap(here, q, y, edges, spacing, settings)
     except (KeyError, TypeError) as error:
-        raise MobeeError(f"{path}: no roadmap, or only a part of one ({error}). Build it anew.") from error
+        raise MobeeError(
+            f"{path}: no roadmap, or only a part of one ({error}). Give another file, or remove it and build it anew."
+        ) from error
     except InvalidValue as error:
         raise MobeeError(f"{path}: damaged: {error}") from error
 

@@ -67,14 +67,17 @@ def say(capsys: pytest.CaptureFixture[str]) -> Say:
     return run
 
 
-def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path) -> None:
+def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("experiments.drawing.cloud.marker_cloud", lambda *given, **_: drawn.append(given) or given[3])
     code, out, _ = say("show", free, "--check", "--picture", tmp_path / "a.png")
     lines = out.splitlines()
     assert code == 0
     assert "25 poses, 40 edges." in out and "r_shoulder_roll, r_shoulder_yaw, r_elbow" in out
     assert next(line for line in lines if line.startswith("yaw [rad]")).split()[2:] == ["0.1", "0.000", "0.400", "0", "0.4"]
     assert "None of the 40 edges touches something" in out
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert f"right_palm is: {tmp_path}" in " ".join(out.split())
+    assert drawn[0][1].shape == (25, 41) and drawn[0][2:] == ("right_palm", tmp_path / "a.png")
 
 
 def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> None:
@@ -159,7 +162,6 @@ def test_without_a_system_live_says_so(say: Say, free: Path) -> None:
 def test_tasks_are_listed_with_their_figures(say: Say) -> None:
     code, out, _ = say("tasks")
     assert code == 0 and any(line.split()[:3] == ["pregrasp", "4.8", "pre-grasp"] for line in out.splitlines())
-    assert {one["task"] for one in json.loads(say("tasks", "--json")[1])} >= {"palm-down", "unscrew"}
 
 
 @pytest.mark.parametrize(

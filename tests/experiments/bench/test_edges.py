@@ -8,7 +8,7 @@ from experiments.bench.edges_workload import palm_map, scene
 
 @pytest.fixture(scope="module")
 def result() -> dict:
-    return measure(Settings(spacing=0.06, rounds=1))
+    return measure(Settings(spacing=0.1, rounds=1))
 
 
 def test_all_ways_of_checking_agree_and_look_at_fewer_poses(result: dict) -> None:
@@ -25,7 +25,7 @@ def test_the_report_fits_80_columns(result: dict) -> None:
 
 def test_the_map_is_of_free_poses_above_the_table() -> None:
     model = scene()
-    trm = palm_map(model, 0.08)
+    trm = palm_map(model, 0.12)
     pose = model.evaluate(trm.q)
     assert (pose.count == 0).all()
     assert abs(pose.position("right_palm")[:, :2] - trm.y).max() < 0.002

@@ -8,7 +8,7 @@ from mobee.roadmap.edge_watch import EdgeWatch, apart
 from mobee.roadmap.edges import check_edges
 
 STEP = 0.005
-COUNT = 60
+COUNT = 40
 
 
 @pytest.fixture
@@ -29,9 +29,7 @@ def poses(icub: mobee.Robot) -> np.ndarray:
 EDGES = np.array([(a, b) for a in range(COUNT) for b in range(a + 1, min(a + 5, COUNT))])
 
 
-@pytest.mark.parametrize(
-    "shape", [mobee.sphere(0.04), mobee.box(0.1, 0.05, 0.2), mobee.cylinder(0.03, 0.2), mobee.capsule(0.02, 0.2)], ids=lambda one: one.kind
-)
+@pytest.mark.parametrize("shape", [mobee.box(0.1, 0.05, 0.2), mobee.capsule(0.02, 0.2)], ids=lambda one: one.kind)
 def test_after_a_change_the_edges_are_as_if_all_were_checked(model: mobee.Model, poses: np.ndarray, shape: mobee.Geometry) -> None:
     watch = EdgeWatch(model, poses, EDGES, STEP)
     rng = np.random.default_rng(1)
@@ -40,10 +38,10 @@ def test_after_a_change_the_edges_are_as_if_all_were_checked(model: mobee.Model,
     turn *= np.sign(np.linalg.det(turn))
     model.world.add("block", shape, position=palm[3], rotation=turn)
     again = []
-    for k in range(5):
+    for k in range(3):
         again.append(len(watch.update()))
         np.testing.assert_array_equal(watch.free, check_edges(model, poses, EDGES, STEP))
-        model.world.move("block", position=palm[11 * k] + 0.02 * rng.normal(size=3))
+        model.world.move("block", position=palm[13 * k] + 0.02 * rng.normal(size=3))
     model.world.remove("block")
     watch.update()
     np.testing.assert_array_equal(watch.free, check_edges(model, poses, EDGES, STEP))

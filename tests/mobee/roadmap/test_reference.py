@@ -16,7 +16,7 @@ def walk(seed: int, count: int, size: float) -> np.ndarray:
     return np.cumsum(np.random.default_rng(seed).normal(size=(count, 3)) * size, axis=0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.sampled_from([0.01, 0.1, 0.5]), st.sampled_from([0.0, 0.05, 1.0]))
 def test_no_motor_is_too_fast_or_too_hard_and_both_ends_are_reached_at_rest(seed: int, count: int, size: float, rounding: float) -> None:
     path = walk(seed, count, size)
@@ -29,7 +29,7 @@ def test_no_motor_is_too_fast_or_too_hard_and_both_ends_are_reached_at_rest(seed
     assert (np.abs(np.diff(steps, axis=0)) / DT <= ACCELERATIONS + 1e-9).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.1, 0.3]))
 def test_the_motion_stays_within_half_the_rounding_of_the_path(seed: int, rounding: float) -> None:
     path = walk(seed, 5, 0.2)
