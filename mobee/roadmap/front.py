@@ -13,20 +13,20 @@ class Front:
 
     `delta`: what a vertex's expansion weight of 1 falls by when a search from it fails.  `frontier`: search only where a place one
     spacing away is free, and aim at it; False: from all vertices, to anywhere, as printed.  `predict`: with an aim, begin where the
-    postures of the neighbours lead to; False: at the vertex.  `std`, `wide_std`: standard deviation of a search from a vertex, and of
-    one for the first pose or for what such a search has missed, in ranges of the motors.  `population`: samples a generation; None:
-    4 + 3 ln(d).  `patience`, `wide_patience`: generations after which these have failed.  `tries`: failures about a place, within half
-    a spacing, after which it is taken for out of reach.  `searches`: how many go on at once.
+    postures of the neighbours lead to, and as wide as that is far; False: at the vertex.  `std`: standard deviation of a search from a
+    vertex, at most, and `wide_std` of one for the first pose or where another has failed, in ranges of the motors.  `population`:
+    samples a generation; None: 4 + 3 ln(d).  `patience`: a search has failed after so many times the generations in which three
+    quarters of the last ones have succeeded.  `tries`: failures about a place, within half a spacing, after which it is taken for out
+    of reach.  `searches`: how many go on at once.
     """
 
     delta: float = 0.5
     frontier: bool = True
     predict: bool = True
-    std: float = 0.007
+    std: float = 0.02
     wide_std: float = 0.2
     population: int | None = None
-    patience: int = 30
-    wide_patience: int = 120
+    patience: float = 3.0
     tries: int = 2
     searches: int = 32
 
@@ -39,6 +39,6 @@ class Front:
                 raise InvalidValue(f"{name} {getattr(self, name)!r}: must be above 0 and at most 1, in ranges of the motors.")
         if self.population is not None and self.population < 4:
             raise InvalidValue(f"population {self.population!r}: must be at least 4, or None.")
-        for name in ("patience", "wide_patience", "tries", "searches"):
+        for name in ("patience", "tries", "searches"):
             if getattr(self, name) < 1:
                 raise InvalidValue(f"{name} {getattr(self, name)!r}: must be at least 1.")

@@ -25,6 +25,12 @@ BEYOND = 1000.0  # of a sample that was moved back into the limits: times its sq
 APART = 2.0 * NEAREST  # spacings between what two searches aim at
 ALIKE = 0.5  # spacings: aims nearer than this are one for the count of failures
 FIRST_AT_ONCE, FIRST_MOST = 4, 60  # searches for the first pose
+FIRST_PATIENCE = 30  # generations a motor, where nothing is known of how long a search takes
+RECENT, ENOUGH = 200, 8  # successes that tell
+LEAST = 100  # generations over the dimensions of the task space, that a search has at least
+WIDER = 4  # times as many for one after another has failed there
+MOVE, NARROW = 0.5, 0.003  # a standard deviation: this share of the move that is predicted; and the least one, in ranges
+STALLED = 1e-4  # of the ranges: a search that is as narrow has failed
 _IDLE, _FIRST = -1, -2  # instead of a vertex that a search began at
 
 
@@ -48,6 +54,7 @@ class Growth:
         self._patience = np.zeros(count, dtype=np.int64)
         self._near = np.full((count, 16 * 2 ** min(self.chart.dimensions, 4), self.chart.dimensions), np.inf)
         self._begun = 0
+        self._ages = Rows((), np.int64)  # generations that searches took which succeeded
         self.best, self.best_cost = self._start, np.inf  # of the search for the first pose
 
     @property
@@ -96,7 +103,13 @@ class Growth:
         """All that `restore` needs, but for the generator."""
         lanes = {name: getattr(self._searches, name) for name in ("mean", "sigma", "shape", "path", "age")}
         own = {"vertex": self._vertex, "aim": self._aim, "patience": self._patience, "begun": np.array(self._begun)}
-        rows = {"postures": self._postures.all, "places": self.chart.places, "weights": self.chart.weights, "failed": self._failed.all}
+        rows = {
+            "postures": self._postures.all,
+            "places": self.chart.places,
+            "weights": self.chart.weights,
+            "failed": self._failed.all,
+            "ages": self._ages.all,
+        }
         return lanes | own | rows | {"best": self.best, "best_cost": np.array(self.best_cost)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -104,8 +117,9 @@ class Growth:
         for posture, place in zip(state["postures"], state["places"], strict=True):
             self._add(posture, place)
         self.chart.weights[:] = state["weights"]
-        for aim in state["failed"]:
-            self._failed.append(aim)
+        for rows, name in ((self._failed, "failed"), (self._ages, "ages")):
+            for row in state[name]:
+                rows.append(row)
         for name in ("mean", "sigma", "shape", "path", "age"):
             getattr(self._searches, name)[:] = state[name]
         self._vertex[:], self._aim[:], self._patience[:] = state["vertex"], state["aim"], state["patience"]
@@ -142,6 +156,8 @@ class Growth:
                 break
         else:
             return
+        if self._vertex[number] >= 0:
+            self._ages.append(self._searches.age[number])
         self._add(postures[k], places[k])
         self._vertex[number] = _IDLE
         self._vertex[self._vertex == _FIRST] = _IDLE
@@ -153,7 +169,7 @@ class Growth:
 
     def _give_up(self) -> None:
         """End the searches that have failed, and lower the weights of where they began."""
-        over = (self._vertex != _IDLE) & (self._searches.age >= self._patience)
+        over = (self._vertex != _IDLE) & ((self._searches.age >= self._patience) | (self._searches.sigma < STALLED))
         for number in np.flatnonzero(over & (self._vertex >= 0)):
             self.chart.weights[self._vertex[number]] -= self.how.delta
             self._failed.append(self._aim[number])
@@ -197,7 +213,7 @@ class Growth:
             mean = self._start if self._begun % 2 == 0 else self.rng.uniform(size=len(self._start))
             self._begun += 1
             self._searches.begin(number, mean, self.how.wide_std)
-            self._vertex[number], self._patience[number] = _FIRST, self.how.wide_patience
+            self._vertex[number], self._patience[number] = _FIRST, FIRST_PATIENCE * len(self._start)
 
     def _places_to_go(self, vertex: int) -> Array:
         """What a search from a vertex may aim at, (k, m); without aims, the vertex's own place."""
@@ -209,7 +225,7 @@ class Growth:
 
     def _begin(self, number: int, vertex: int, places: Array) -> bool:
         """Begin a search from a vertex to one of the places (k, m), with the fewest failures about it; False: all out of reach."""
-        mean, std, patience = self._postures.all[vertex], self.how.std, self.how.patience
+        mean, std, patience = self._postures.all[vertex], self.how.std, self._patient()
         if self.how.frontier:
             failed = (((places[:, None] - self._failed.all) ** 2).sum(axis=-1) < ALIKE**2).sum(axis=1)
             if failed.min() >= self.how.tries:
@@ -218,13 +234,22 @@ class Growth:
             places = places[failed == failed.min()]
             self._aim[number] = places[self.rng.integers(len(places))]
             if failed.min() > 0:
-                std, patience = self.how.wide_std, self.how.wide_patience
+                std, patience = self.how.wide_std, WIDER * patience
             elif self.how.predict:
                 mean = predicted(self.chart, self._postures.all, vertex, self._aim[number])
+                move = float(np.sqrt(((mean - self._postures.all[vertex]) ** 2).mean()))
+                std = min(max(MOVE * move, NARROW), std)
         self._vertex[number], self._patience[number] = vertex, patience
         self._searches.begin(number, mean, std)
         self._look_around(number)
         return True
+
+    def _patient(self) -> int:
+        """Generations after which a search has failed, by what those took that did not."""
+        ages = self._ages.all[-RECENT:]
+        if len(ages) < ENOUGH:
+            return FIRST_PATIENCE * len(self._start)
+        return max(LEAST // self.chart.dimensions, int(self.how.patience * np.quantile(ages, 0.75)))
 
     def _centre(self, number: int) -> Array:
         """Where a search may be expected to end, or where it began."""

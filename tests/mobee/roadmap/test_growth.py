@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from mobee import MobeeError
+from mobee.roadmap import growth as growth_module
 from mobee.roadmap.chart import NEAREST
 from mobee.roadmap.front import Front
 from mobee.roadmap.growth import Growth
@@ -68,11 +69,12 @@ def test_without_the_test_of_the_frontier_it_ends_too_and_takes_longer() -> None
     assert per_vertex[1] > 1.3 * per_vertex[0]
 
 
-def test_one_unlucky_search_ends_a_vertex_of_delta_1() -> None:
+def test_one_unlucky_search_ends_a_vertex_of_delta_1(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reading 8: so the map stops early where searches are short."""
-    hasty, patient = (
-        [len(_grown(0.06, seed, delta=delta, patience=3, tries=99, wide_patience=3).chart) for seed in range(3)] for delta in (1.0, 0.1)
-    )
+    for name in ("LEAST", "WIDER"):
+        monkeypatch.setattr(growth_module, name, 1)
+    hurried = {"patience": 1.0, "tries": 99}
+    hasty, patient = ([len(_grown(0.06, seed, delta=delta, **hurried).chart) for seed in range(3)] for delta in (1.0, 0.1))
     assert sum(hasty) < 0.9 * sum(patient)
 
 
@@ -98,9 +100,10 @@ def test_it_goes_on_from_given_vertices_and_keeps_them() -> None:
     assert (_uncovered(growth) <= 1.0).mean() > 0.98
 
 
-def test_nothing_to_be_found_is_said_and_ends() -> None:
+def test_nothing_to_be_found_is_said_and_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth_module, "FIRST_MOST", 5)
     judge = Level(0.05, low=(1.5, 1.5), high=(2.0, 2.0))
-    growth = Growth(judge, Front(wide_patience=5), np.random.default_rng(0))
+    growth = Growth(judge, Front(), np.random.default_rng(0))
     with pytest.raises(MobeeError, match=r"no pose was found .* misses level\. Loosen"):
         while growth.step():
             pass
