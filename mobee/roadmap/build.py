@@ -16,7 +16,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.roadmap.costs import collision
 from mobee.roadmap.draft import Draft, Progress
-from mobee.roadmap.flood import flooded
+from mobee.roadmap.flood import Flood
 from mobee.roadmap.front import Front
 from mobee.roadmap.growth import Growth
 from mobee.roadmap.judge import Judge
@@ -30,7 +30,8 @@ from mobee.robot.robot import Array
 
 LONGEST = 0.4  # rad
 WORKERS = 4  # threads at most
-_AS_PUBLISHED = Front()
+FLOOD, FRONT = "flood", "front"  # stages
+_DEFAULT = Front()
 
 
 def build_roadmap(
@@ -46,7 +47,7 @@ def build_roadmap(
     longest: float | None = LONGEST,
     file: str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
-    front: Front = _AS_PUBLISHED,
+    front: Front = _DEFAULT,
 ) -> Roadmap:
     """A map of poses that are within the tolerances of all costs, touch nothing, and are spread evenly over the box of a task.
 
@@ -85,21 +86,24 @@ def build_roadmap(
     if (finished := draft.finished()) is not None:
         return finished
     rng = np.random.default_rng(seed)
-    if method == "least_squares":
-        q, y = _flooded(problem, task, apart, rng, draft)
-        return draft.finish(q, y, problem.evaluations)
+    given = None
+    if draft.stage != FRONT and (method == "least_squares" or (method == "hybrid" and _has_derivatives(model, task))):
+        flood = Flood(problem, task, apart, rng)
+        draft.run(FLOOD, flood)
+        given = flood.result()
+    if given is not None and method == "least_squares":
+        return draft.finish(*given, problem.evaluations)
     workers = min(WORKERS, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
         growth = Growth(Judge(problem, task, apart, pool), front, rng)
-        if not draft.restore(growth) and method == "hybrid" and task.aims(model.robot, task.box.mean(axis=1)) is not None:
-            growth.begin_from(*_flooded(problem, task, apart, rng, draft))
-        while growth.step():
-            draft.keep(growth)
-    return draft.finish(growth.q, growth.chart.places * apart, problem.evaluations, growth.chart.edges)
+        if given is not None:
+            growth.begin_from(*given)
+        draft.run(FRONT, growth)
+    return draft.finish(*growth.result(), problem.evaluations)
 
 
-def _flooded(problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, draft: Draft) -> tuple[Array, Array]:
-    return flooded(problem, task, spacing, rng, lambda vertices: draft.tell(vertices, problem.evaluations, vertices))
+def _has_derivatives(model: Model, task: Task) -> bool:
+    return task.aims(model.robot, task.box.mean(axis=1)) is not None
 
 
 def _with_contacts(costs: Sequence[Cost]) -> list[Cost]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from mobee.errors import MobeeError
 from mobee.model import Model
 from mobee.roadmap.archive import read, write
-from mobee.roadmap.growth import Growth
-from mobee.roadmap.neighbours import nearest, nearest_before, short, sorted_edges
+from mobee.roadmap.neighbours import nearest, nearest_before, short
+from mobee.roadmap.problem import Problem
 from mobee.roadmap.request import digest
 from mobee.roadmap.roadmap import Roadmap, digests, load_roadmap
 from mobee.roadmap.told_world import world_told
@@ -37,8 +37,31 @@ class Progress:
     seconds: float
 
 
+class Stage(Protocol):
+    """What finds vertices step by step; the same steps follow from the same state, generator and number of evaluations."""
+
+    rng: np.random.Generator
+    problem: Problem
+
+    @property
+    def vertices(self) -> int: ...  # noqa: D102
+
+    @property
+    def open(self) -> int: ...  # noqa: D102
+
+    def step(self) -> bool: ...  # noqa: D102
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """With the vertices' "q" (V, n) rad and "y" (V, m)."""
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None: ...  # noqa: D102
+
+
 class Draft:
-    """Where a map that is asked for is kept, if anywhere, and who is told of it."""
+    """Where a map that is asked for is kept, if anywhere, and who is told of it.
+
+    `stage`: the name of the stage that the file was left in; None: there is no file.
+    """
 
     def __init__(
         self, model: Model, asked: dict[str, Any], spacing: Array, file: str | Path | None, progress: Callable[[Progress], None] | None
@@ -48,10 +71,12 @@ class Draft:
         self._digest = digest(asked)
         self._began = self._kept = time.monotonic()
         self._told = -np.inf
+        self.stage: str | None = None
         self._found: tuple[dict[str, NDArray[Any]], dict[str, Any]] | None = None
         if self._file is not None and self._file.exists():
             self._found = read(self._file)
             self._require_same(self._found[1].get("settings", {}))
+            self.stage = self._found[1].get("stage")
 
     def finished(self) -> Roadmap | None:
         """The map, if the file holds all of it."""
@@ -59,58 +84,51 @@ class Draft:
             return None
         return load_roadmap(self._file, self._model)
 
-    def restore(self, growth: Growth) -> bool:
-        """Let a growth go on where the file says it was; False: there is none."""
-        if self._found is None:
-            return False
-        arrays, notes = self._found
-        growth.restore({name.removeprefix(_OWN): value for name, value in arrays.items() if name.startswith(_OWN)})
-        growth.rng.bit_generator.state = notes["generator"]
-        growth.judge.problem.evaluations = notes["settings"]["evaluations"]
-        self._began -= notes["settings"]["seconds"]
-        return True
+    def run(self, name: str, stage: Stage) -> None:
+        """Take all steps of a stage, from where the file was left if that was in it."""
+        if self._found is not None and self.stage == name:
+            arrays, notes = self._found
+            own = {key.removeprefix(_OWN): value for key, value in arrays.items() if key.startswith(_OWN)}
+            stage.restore(own | {key: arrays[key] for key in ("q", "y")})
+            stage.rng.bit_generator.state = notes["generator"]
+            stage.problem.evaluations = notes["settings"]["evaluations"]
+            self._began -= notes["settings"]["seconds"]
+        while stage.step():
+            if self._file is not None and time.monotonic() - self._kept >= EVERY:
+                self._checkpoint(self._file, name, stage)
+            if self._progress is not None and time.monotonic() - self._told >= TELL:
+                self._tell(stage.vertices, stage.problem.evaluations, stage.open)
 
-    def keep(self, growth: Growth) -> None:
-        """Write it down if that is due, and tell of it."""
-        evaluations = growth.judge.problem.evaluations
-        if self._file is not None and time.monotonic() - self._kept >= EVERY:
-            self._checkpoint(self._file, growth, evaluations)
-        self.tell(len(growth.chart), evaluations, growth)
-
-    def _checkpoint(self, file: Path, growth: Growth, evaluations: int) -> None:
-        q, y = growth.q, growth.chart.places * self._spacing
-        roadmap = Roadmap(self._model, q, y, self._edges(q, y, growth.chart.edges), self._spacing, self._settings(evaluations, False))
-        own = {_OWN + name: value for name, value in growth.state().items()}
-        self._write(file, roadmap, own, {"generator": growth.rng.bit_generator.state})
+    def _checkpoint(self, file: Path, name: str, stage: Stage) -> None:
+        state = stage.state()
+        q, y = state.pop("q"), state.pop("y")
+        settings = self._settings(stage.problem.evaluations, False)
+        roadmap = Roadmap(self._model, q, y, self._edges(q, y), self._spacing, settings)
+        own = {_OWN + key: value for key, value in state.items()}
+        self._write(file, roadmap, own, {"generator": stage.rng.bit_generator.state, "stage": name})
         self._kept = time.monotonic()
 
-    def tell(self, vertices: int, evaluations: int, still: int | Growth, at_once: bool = False) -> None:
-        """Call for progress, unless it was called just now."""
-        now = time.monotonic()
-        if self._progress is not None and (at_once or now - self._told >= TELL):
-            self._told = now
-            left = still.open if isinstance(still, Growth) else still
-            self._progress(Progress(vertices, evaluations, left, now - self._began))
+    def _tell(self, vertices: int, evaluations: int, left: int) -> None:
+        if self._progress is not None:
+            self._told = time.monotonic()
+            self._progress(Progress(vertices, evaluations, left, self._told - self._began))
 
-    def finish(self, q: Array, y: Array, evaluations: int, edges: Ints | None = None) -> Roadmap:
+    def finish(self, q: Array, y: Array, evaluations: int) -> Roadmap:
         """The whole map, and on disk where it is to be; raises MobeeError if robot and world are no longer those it was built for."""
         here = digests(self._model)
         if any(self._asked[what] != here[what] for what in here):
             made, now = (" ".join(which[f"{what}_digest"] for what in ("robot", "world")) for which in (self._asked, here))
             raise MobeeError(f"robot and world have changed while the map was built: {made}, now {now}. Build it anew.")
-        self.tell(len(q), evaluations, 0, at_once=True)
-        roadmap = Roadmap(self._model, q, y, self._edges(q, y, edges), self._spacing, self._settings(evaluations, True))
+        self._tell(len(q), evaluations, 0)
+        roadmap = Roadmap(self._model, q, y, self._edges(q, y), self._spacing, self._settings(evaluations, True))
         if self._file is not None:
             self._write(self._file, roadmap, {}, {})
         return roadmap
 
-    def _edges(self, q: Array, y: Array, found: Ints | None) -> Ints:
+    def _edges(self, q: Array, y: Array) -> Ints:
         count, longest = self._asked["neighbours"], self._asked["longest"]
-        if count is not None:
-            return short(q, nearest(y, self._spacing, count), longest)
-        if found is None:
-            return short(q, nearest_before(y, self._spacing, len(self._spacing)), longest)
-        return short(q, sorted_edges(found), longest)
+        joined = nearest_before(y, self._spacing, len(self._spacing)) if count is None else nearest(y, self._spacing, count)
+        return short(q, joined, longest)
 
     def _settings(self, evaluations: int, finished: bool) -> dict[str, Any]:
         versions = {name: version(name) for name in ("mobee", "numpy")}

@@ -42,6 +42,7 @@ class Growth:
 
     def __init__(self, judge: Judge, how: Front, rng: np.random.Generator) -> None:
         self.judge, self.how, self.rng = judge, how, rng
+        self.problem = judge.problem
         self._low, self._high = judge.problem.limits.T
         self._start = (judge.problem.start[judge.problem.free] - self._low) / (self._high - self._low)
         d, count = len(self._low), how.searches
@@ -58,18 +59,22 @@ class Growth:
         self.best, self.best_cost = self._start, np.inf  # of the search for the first pose
 
     @property
-    def q(self) -> Array:
-        """(V, n) rad."""
-        return self._poses(self._postures.all)
+    def vertices(self) -> int:
+        """How many there are."""
+        return len(self.chart)
 
     @property
     def open(self) -> int:
         """How many vertices may still be searched from."""
         return int(self._may_grow().sum())
 
+    def result(self) -> tuple[Array, Array]:
+        """Poses (V, n) rad and their task coordinates (V, m)."""
+        return self._poses(self._postures.all), self.chart.places * self.judge.spacing
+
     def begin_from(self, q: Array, y: Array) -> None:
         """Take poses q (V, n) rad, at task coordinates y (V, m), for the first vertices."""
-        postures = (q[:, self.judge.problem.free] - self._low) / (self._high - self._low)
+        postures = (q[:, self.problem.free] - self._low) / (self._high - self._low)
         for posture, place in zip(postures, y / self.judge.spacing, strict=True):
             self._add(posture, place)
 
@@ -103,14 +108,10 @@ class Growth:
         """All that `restore` needs, but for the generator."""
         lanes = {name: getattr(self._searches, name) for name in ("mean", "sigma", "shape", "path", "age")}
         own = {"vertex": self._vertex, "aim": self._aim, "patience": self._patience, "begun": np.array(self._begun)}
-        rows = {
-            "postures": self._postures.all,
-            "places": self.chart.places,
-            "weights": self.chart.weights,
-            "failed": self._failed.all,
-            "ages": self._ages.all,
-        }
-        return lanes | own | rows | {"best": self.best, "best_cost": np.array(self.best_cost)}
+        rows = {"postures": self._postures, "failed": self._failed, "ages": self._ages}
+        known = {name: one.all for name, one in rows.items()} | {"places": self.chart.places, "weights": self.chart.weights}
+        q, y = self.result()
+        return lanes | own | known | {"q": q, "y": y, "best": self.best, "best_cost": np.array(self.best_cost)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on where `state` was taken, by a growth of the same settings."""
@@ -133,7 +134,7 @@ class Growth:
 
     def _poses(self, postures: Array) -> Array:
         """All motors (N, n) rad from fractions of the ranges of the free ones (N, d)."""
-        return self.judge.problem.whole(np.minimum(self._low + postures * (self._high - self._low), self._high))
+        return self.problem.whole(np.minimum(self._low + postures * (self._high - self._low), self._high))
 
     def _spread(self, which: Ints, places: Array) -> tuple[Array, Flags]:
         """Eq. 3.6 and the aims at places (k, population, m), and which of them keep their distance to what is near, (k, population)."""
@@ -203,7 +204,7 @@ class Growth:
         going = int((self._vertex == _FIRST).sum())
         if self._begun >= FIRST_MOST and not going:
             raise MobeeError(
-                f"no pose was found that meets all costs inside the task's box, by {self.judge.problem.evaluations} evaluations from the "
+                f"no pose was found that meets all costs inside the task's box, by {self.problem.evaluations} evaluations from the "
                 f"start and from elsewhere. The nearest misses {self.judge.missed(self._poses(self.best[None])[0])}. Loosen a tolerance, "
                 f"widen the box, let more motors move, or begin nearer (start)."
             )
