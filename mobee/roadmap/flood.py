@@ -35,7 +35,7 @@ class Patience:
     tries: int = 12
     hopeless: int = 3
     between: int = 1
-    scouts: int = 256
+    scouts: int = 1024
 
 
 _DEFAULT = Patience()
