@@ -16,7 +16,7 @@ from mobee.roadmap.map_store import MapStore
 from mobee.roadmap.walker import NEAR, Walker
 from mobee.robot.robot import Array
 
-QUERIES = 3  # ways from one vertex that are asked for, before it is given up
+QUERIES = 3  # ways to one vertex that are asked for, before it is given up
 
 Query = Callable[[Array, Array], Array | None]
 
@@ -48,7 +48,7 @@ class MapExplorer(Walker):
         self.repairs = 0
         """Ways that the query found since it was started."""
         self._query, self._draws = query, Draws(f"map of {self.part}")
-        self._asked_from: Counter[int] = Counter()
+        self._asked_for: Counter[int] = Counter()
         self._target: int | None = None
 
     @property
@@ -86,15 +86,17 @@ class MapExplorer(Walker):
 
     def _escape(self, here: int) -> bool:
         """Join this vertex to where something is left to try, by the query; whether it found a way."""
-        others = np.setdiff1d(self.roadmap.unexplored[:, 0], here)
-        if self._query is None or not len(others) or self._asked_from[here] >= QUERIES:
+        left = sorted({*self.roadmap.unexplored[:, 0].tolist()} - self.record.joined - {here})
+        others = [vertex for vertex in left if self._asked_for[vertex] < QUERIES]
+        if self._query is None or not others:
             return False
-        self._asked_from[here] += 1
         space = self.roadmap.space
         way = self._query(self.plant.measure(self.part)[space.columns], space.samples[others])
         if way is None:
+            self._asked_for.update(QUERIES * others)
             return False
-        goal = int(others[int(np.abs(space.samples[others] - way[-1]).max(axis=1).argmin())])
+        goal = others[int(np.abs(space.samples[others] - way[-1]).max(axis=1).argmin())]
+        self._asked_for[goal] += 1
         between = way[1:-1] if len(way) > 2 else 0.5 * (way[:1] + way[-1:])
         self.record.change("join", state=here, samples=between.tolist(), goal=goal)
         self.repairs += 1

@@ -23,6 +23,8 @@ class MapRecord:
         self.roadmap, self._store = roadmap, store
         self.transitions = 0
         """Edges observed, those of the store included."""
+        self.joined: set[int] = set()
+        """Vertices that are there since a way was joined to the map."""
         if store is not None:
             store.bind(settings)
             self._replay(store)
@@ -50,7 +52,15 @@ class MapRecord:
             raise UnknownName("change of a map", what, CHANGES)
         if self._store is not None:
             self._store.changed(what, **given)
-        return getattr(self.roadmap, what)(**given)
+        return self._apply(what, given)
+
+    def _apply(self, what: str, given: dict[str, Any]) -> Any:
+        result = getattr(self.roadmap, what)(**given)
+        if what == "join":
+            self.joined.update(result.tolist())
+        elif what == "prune":
+            self.joined = {int(result[vertex]) for vertex in self.joined if result[vertex] >= 0}
+        return result
 
     def _learn(self, made: Transition) -> None:
         self.roadmap.observe(made.s, made.a, made.s_next)
@@ -61,7 +71,7 @@ class MapRecord:
         for made in store.load():
             while changes and changes[-1].n < made.n:
                 change = changes.pop()
-                getattr(self.roadmap, change.what)(**change.given)
+                self._apply(change.what, change.given)
             self._learn(made)
         for change in changes[::-1]:
-            getattr(self.roadmap, change.what)(**change.given)
+            self._apply(change.what, change.given)

@@ -93,7 +93,9 @@ def prm_star(
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 
-def query(model: Model, joints: Sequence[str], rest: ArrayLike, seed: int = 0) -> Callable[[Array, Array], Array | None]:
+def query(
+    model: Model, joints: Sequence[str], rest: ArrayLike, seed: int = 0, extensions: int = EXTENSIONS
+) -> Callable[[Array, Array], Array | None]:
     """`rrt_connect` over some joints as a `MapExplorer` asks for it, the other motors at `rest` (n,) rad."""
     whole = _poses(model, rest)
     columns = np.array([model.robot.motor_index(joint) for joint in joints])
@@ -101,7 +103,7 @@ def query(model: Model, joints: Sequence[str], rest: ArrayLike, seed: int = 0) -
     def ask(start: Array, goals: Array) -> Array | None:
         ends = np.repeat(whole[None], len(goals) + 1, axis=0)
         ends[:, columns] = np.concatenate([start[None], goals])
-        way = rrt_connect(model, ends[0], ends[1:], joints, seed)
+        way = rrt_connect(model, ends[0], ends[1:], joints, seed, extensions)
         return None if way is None else way[:, columns]
 
     return ask

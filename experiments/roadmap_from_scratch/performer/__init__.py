@@ -1,0 +1,1 @@
+"""The service that explores: a MapExplorer on the bus."""

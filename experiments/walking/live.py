@@ -1,0 +1,70 @@
+"""A service that walks on a map, on the live robot with PyBullet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from experiments.launched import summary_of
+from mobee.errors import MobeeError
+from services.launcher.engine import EngineMissing, compile_engine
+
+PATIENCE = 60.0  # s for a tick of lockstep: a way is looked for in one
+
+_SCENARIO = """# Written by an experiment of thesis 4.3.
+title = "{title}"
+
+[shared]
+robot = "icub"
+world = "{world}"
+gains = "default"
+seed = {seed}
+{mode}
+
+[services.robot_sim]
+rate = {rate:g}
+record = "{folder}"
+
+[services.model]
+
+[services.controller]
+speed_scale = {speed:g}
+
+[services.{who}]
+module = "{module}"
+run_dir = "{folder}"
+"""
+
+
+def launch(
+    folder: Path,
+    who: str,
+    module: str,
+    *,
+    title: str,
+    world: str,
+    seed: int,
+    rate: float,
+    speed: float,
+    seconds: float,
+    lockstep: bool = True,
+) -> dict[str, Any]:
+    """Launch the system with that service, which ends it; its record is left in the folder, and its summary returned.
+
+    `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time, after which it is ended.  Raises LaunchFailed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
+    scenario = folder / "scenario.toml"
+    told = {"title": title, "world": world, "seed": seed, "mode": mode, "rate": rate, "speed": speed, "who": who, "module": module}
+    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **told))
+    limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
+    return summary_of(str(scenario), runs=folder / "launch", **limit)
+
+
+def compiled() -> None:
+    """Compile the engine here, where progress is seen; raises MobeeError if that cannot be."""
+    try:
+        compile_engine()
+    except EngineMissing as error:
+        raise MobeeError(str(error)) from None
