@@ -35,6 +35,7 @@ EXPERIMENTS = {
     "reach": "experiments.reach",
     "reach-predictors": "experiments.reach_predictors",
     "reach-vs-planners": "experiments.reach_vs_planners",
+    "replanning": "experiments.replanning",
     "roadmap-from-scratch": "experiments.roadmap_from_scratch",
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",

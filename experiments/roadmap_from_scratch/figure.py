@@ -39,10 +39,10 @@ def draw(found: Mapping[str, CellResult], live: Mapping[str, Any] | None, path: 
     for kind, which in kinds.items():
         _edges(after, values, which, places, *STYLES[kind], label=f"{kind}: {int(which.sum())}")
     after.set_title("explored " + ("offline" if live is None else "live"))
-    after.legend(fontsize=8, loc="upper right")
+    after.plot(*places[SAMPLES:].T, "o", color="tab:orange", markersize=3, zorder=3, label="joined by single queries")
+    after.legend(fontsize=7, loc="upper left")
     for axes in (before, after):
         axes.plot(*places[:SAMPLES].T, "o", color="black", markersize=4, zorder=3)
-        axes.plot(*places[SAMPLES:].T, "o", color="tab:orange", markersize=4, zorder=3)
         axes.set(xlabel="palm, y [m]", ylabel="palm, z [m]", aspect="equal")
     for result in results:
         minutes = result.values["minutes"]

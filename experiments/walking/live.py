@@ -16,16 +16,17 @@ title = "{title}"
 
 [shared]
 robot = "icub"
-world = "{world}"
 gains = "default"
 seed = {seed}
 {mode}
 
 [services.robot_sim]
+world = "{simulated}"
 rate = {rate:g}
 record = "{folder}"
 
 [services.model]
+world = "{world}"
 
 [services.controller]
 speed_scale = {speed:g}
@@ -48,15 +49,18 @@ def launch(
     speed: float,
     seconds: float,
     lockstep: bool = True,
+    simulated: str = "",
 ) -> dict[str, Any]:
     """Launch the system with that service, which ends it; its record is left in the folder, and its summary returned.
 
-    `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time, after which it is ended.  Raises LaunchFailed.
+    `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time, after which it is ended; `simulated`: the simulator's world
+    where it is not the model's.  Raises LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
-    told = {"title": title, "world": world, "seed": seed, "mode": mode, "rate": rate, "speed": speed, "who": who, "module": module}
+    told: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
+    told |= {"rate": rate, "speed": speed, "who": who, "module": module}
     scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **told))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)

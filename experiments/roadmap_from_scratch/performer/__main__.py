@@ -8,21 +8,15 @@ from pathlib import Path
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
 from experiments.roadmap_from_scratch.live import DONE, JOB
+from experiments.roadmap_from_scratch.performer.config import Config
 from experiments.roadmap_from_scratch.settings import PART, explorer
 from experiments.run_folder import read, write
 from mobee import ActionInterrupted, load_robot
 from mobee.roadmap.map_store import MapStore
 from services.common.bus_plant import BusPlant
-from services.common.config import ServiceConfig, load_config
+from services.common.config import load_config
 from services.common.entry import explained
 from services.common.service import Service
-
-
-class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The performer's settings."""
-
-    run_dir: str = ""
-    """Folder of its job, and of what came of it."""
 
 
 def main(argv: Sequence[str] | None = None) -> None:

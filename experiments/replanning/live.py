@@ -1,0 +1,31 @@
+"""Crossings on the live robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from experiments.replanning.job import Job, write_job
+from experiments.replanning.scene import RATE, SIMULATED, SPEED, WORLD
+from experiments.walking.live import launch
+
+MODULE = "experiments.replanning.performer"
+LONGEST = 60.0  # s for a crossing
+
+
+def perform(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[str, Any]:
+    """Launch a system that does a job; its record of every tick is left in the folder.  Raises LaunchFailed."""
+    write_job(folder, job)
+    return launch(
+        folder,
+        "performer",
+        MODULE,
+        title="Re-planning",
+        world=str(WORLD),
+        simulated=str(SIMULATED),
+        seed=seed,
+        rate=RATE,
+        speed=SPEED,
+        seconds=LONGEST * (1 + len(job.after)),
+        lockstep=lockstep,
+    )

@@ -1,0 +1,47 @@
+"""`python -m experiments.replanning.performer`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from bus_schema import keys
+from bus_schema.rpc import Done, Empty
+from experiments.replanning.job import append_crossing, read_job
+from experiments.replanning.performer.config import Config
+from experiments.replanning.performer.crosser import Crosser
+from experiments.replanning.scene import BALL, LEFT, PART, RIGHT, new_map
+from experiments.walking.feeling import FeelingPlant
+from mobee import load_robot
+from services.common.config import load_config
+from services.common.entry import explained
+from services.common.service import Service
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Cross as often as the job says, and have the system end."""
+    name = "experiments.replanning.performer"
+    config = load_config(Config, argv, name)
+    with explained(name):
+        robot, folder = load_robot(config.robot), Path(config.run_dir)
+        job = read_job(folder)
+        new_map().plan(RIGHT, LEFT)  # what is imported for the first plan is imported before the robot moves
+        with Service("performer", config, robot) as service, ExitStack() as stack:
+            watcher = None
+            if config.mode == "lock":
+                watcher = stack.enter_context(Service("watcher", config, robot, inbox=service.inbox))
+                watcher.ready()
+            hand = FeelingPlant(service, robot, PART, {BALL}, watcher)
+            crosser = Crosser(service, hand)
+            service.ready()
+            hand.measure(PART)
+            for after in job.after:
+                append_crossing(folder, crosser.cross(after))
+            hand.leave()
+            service.call(keys.service_rpc("launcher", "shutdown"), Empty, Done, tries=3)
+            service.run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""A live part that stops what it does when it begins to touch something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from bus_schema import keys
+from bus_schema.chain import Commands
+from bus_schema.messages import Clock, Forces
+from bus_schema.rpc import Request
+from mobee.plant import Outcome
+from mobee.robot.robot import Array, Robot
+from services.common.bus_plant import BusPlant
+from services.common.lockstep import Participant
+from services.common.service import Service
+
+APART = 500_000_000  # ns for which an object must not be felt, so that it is touched anew: at a field's border noise decides
+
+
+class FeelingPlant(BusPlant):
+    """A BusPlant whose actions end, not settled, as soon as the model says that the part begins to touch one of some objects.
+
+    In lockstep a second service of the same process, the watcher, takes part in every tick, for a part under way is told of none;
+    it answers a tick when the forces of that tick have been looked at, so what is decided on them falls into that tick.
+
+    Args:
+        service, robot, part: see BusPlant.
+        objects: names of the objects; fields count, so nothing is hit yet.
+        watcher: in lockstep, with the inbox of the service; None in free mode.
+    """
+
+    def __init__(self, service: Service, robot: Robot, part: str, objects: Collection[str], watcher: Service | None = None) -> None:
+        super().__init__(service, robot, (part,))
+        self._part, self._objects = part, frozenset(objects)
+        self._last = -APART  # ns, when an object was last felt
+        self.bump: int | None = None
+        """Tick at which the part began to touch an object since its last action was asked for."""
+        self.asked = 0
+        """Tick at which the last action was asked for."""
+        self.commanded = -1
+        """Tick in which a command that knows of the last action is first in force, -1: not yet."""
+        self.each: Callable[[int], None] = lambda k: None
+        """Called with every tick of which the forces have come."""
+        self._felt, self._watched = -1, -1
+        self._watcher = None if watcher is None else Participant(watcher)
+        if watcher is not None:
+            watcher.on_clock(self._note_watch)
+        service.on_each(keys.MODEL_FORCES, Forces, self._feel)
+        service.on_each(keys.COMMANDS, Commands, self._note_commands)
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """See FeelingPlant."""
+        self.bump = None
+        return super().act(part, target)
+
+    def leave(self) -> None:
+        """See BusPlant."""
+        super().leave()
+        if self._watcher is not None:
+            self._watcher.done(max(self._watched, 0), last=True)
+            self._watcher = None
+
+    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
+        self.asked, self.commanded = super()._ask(part, verb, request, **fields), -1
+        return self.asked
+
+    def _is_over(self, part: str, action_id: str, asked: int) -> bool:
+        if super()._is_over(part, action_id, asked):
+            return True
+        motion = self._motion.get(part)
+        return self.bump is not None and motion is not None and motion.action_id == action_id
+
+    def _feel(self, forces: Forces) -> None:
+        if not self._objects.isdisjoint(forces.touched.get(self._part, ())):
+            if forces.t - self._last > APART and self.bump is None:
+                self.bump = forces.re_k
+            self._last = forces.t
+        self._felt = forces.re_k
+        self.each(forces.re_k)
+
+    def _note_commands(self, commands: Commands) -> None:
+        """What was asked for in tick k is known to the commands formed of later ones, each of which acts a tick later."""
+        if self.commanded < 0 and commands.re_k > self.asked > 0:
+            self.commanded = commands.re_k + 1
+
+    def _note_watch(self, clock: Clock) -> None:
+        self._watched = clock.k
+
+    def _answer(self) -> None:
+        super()._answer()
+        if self._watcher is not None and self._watched >= 0 and (self._watched == 0 or self._felt >= self._watched):
+            self._watcher.done(self._watched)
+            self._watched = -1
