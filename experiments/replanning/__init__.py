@@ -9,7 +9,7 @@ through the ball than over it.  The real processes with PyBullet, in free mode, 
 crossing begins on a map as it was made; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
 simulator.  Bump: the first tick at which the model says that the arm touches the ball, fields included; the motion ends there, the
 edge is out, and the arm goes on to the next vertex of the new way at once.  Under way: the first tick in which a command is in
-force that knows of the new goal.  Besides, when the joints come nearer to the new vertex than they were, which is the law's doing.
+force that knows of the new goal.  Besides, when the joints come no nearer to where the old way led, which is the law's doing.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
 def _times(crossings: Sequence[Measured], path: Path) -> None:
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()
-    for name, label in (("command", "a command of the new way is in force"), ("turn", "the joints come nearer to its first vertex")):
+    for name, label in (("command", "a command of the new way is in force"), ("turn", "the joints come no nearer to the old goal")):
         values = np.sort([getattr(one, name) for one in crossings if one.bumped])
         axes.step(values, np.arange(1, len(values) + 1) / max(len(values), 1), where="post", label=label)
     axes.axvline(SOON, color="0.5", linestyle="--", linewidth=0.8)

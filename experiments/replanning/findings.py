@@ -14,9 +14,7 @@ from experiments.replanning.scene import ABOVE, LEFT
 SOON = 200.0  # ms
 FEW = 10  # crossings with a bump: of fewer no verdict is made
 CLAIMS = (
-    Claim(
-        "thesis 4.3.2, fig. 4.7", "when the ball turns solid the hand finds the way around it: it arrives at the other side", "immediately"
-    ),
+    Claim("thesis 4.3.2, fig. 4.7", "when the ball turns solid the hand finds the way around it, to the other side", "immediately"),
     Claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms"),
     Claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0"),
 )
@@ -42,15 +40,16 @@ def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[C
     command, turn = (np.array([getattr(one, name) for one in bumped]) for name in ("command", "turn"))
     arrived = sum(one.arrived for one in bumped)
     straight = sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)
+    seconds = float(np.median([one.seconds for one in bumped]))
     deepest = 1e3 * max(one.deepest for one in crossings)
     return [
         CLAIMS[0].measured(
-            f"{arrived} of {len(bumped)} arrive, {straight} without another motion; {np.median([one.seconds for one in bumped]):.1f} s in all",
+            f"{arrived} of {len(bumped)} arrive, {straight} of them straight on; {seconds:.1f} s in all",
             arrived == len(bumped) if enough else None,
         ),
         CLAIMS[1].measured(
-            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints come nearer to the new vertex "
-            f"after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
+            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints come no nearer to the old goal"
+            f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
             bool(command.max() <= SOON) if enough else None,
         ),
         CLAIMS[2].measured(f"{deepest:.1f} mm in {len(crossings)} crossings", bool(deepest <= 1e3 * DEEP) if enough else None),

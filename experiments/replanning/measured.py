@@ -23,7 +23,7 @@ class Measured(Struct, frozen=True):
 
     bumped: bool  # the ball was felt on the short way
     command: float  # ms from the bump to the first command in force that knows of the new way
-    turn: float  # ms from the bump until the joints come nearer to the first vertex of the new way, and go on so
+    turn: float  # ms from the bump until the joints come no nearer to where the old way led
     on: list[int]  # vertices to which it was sent
     arrived: bool
     seconds: float  # from the start to the other side
@@ -69,14 +69,13 @@ def _measured(crossing: Crossing, q: Array, deepest: float) -> Measured:
     if failed is None:
         return Measured(False, -1.0, -1.0, **told, seconds=seconds, deepest=deepest, thinking=0.0)
     bump, new = motions[failed].bump, motions[failed + 1]
-    turn = _turned(q, bump, new.vertex, new.ended)
+    turn = _turned(q, bump, motions[failed].vertex, new.ended)
     command = 1e3 * (new.commanded - bump) / RATE
     return Measured(True, command, 1e3 * turn / RATE, **told, seconds=seconds, deepest=deepest, thinking=1e3 * new.thinking)
 
 
 def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
-    """Ticks from a bump until the arm comes nearer to a vertex; row k - 2 of q (T, n) rad is of the beginning of tick k."""
+    """Ticks from a bump until the arm is nearest to a vertex; row k - 2 of q (T, n) rad is of the beginning of tick k."""
     space = new_map().space
     arm = q[:, robot().parts[PART].slice][:, space.columns]
-    away = np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1)
-    return int(away.argmax())
+    return int(np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1).argmin())

@@ -41,7 +41,9 @@ class FeelingPlant(BusPlant):
         """Tick in which a command that knows of the last action is first in force, -1: not yet."""
         self.each: Callable[[int], None] = lambda k: None
         """Called with every tick of which the forces have come."""
-        self._felt, self._watched = -1, -1
+        self.felt = -1
+        """The newest tick of which the forces have come."""
+        self._watched = -1
         self._watcher = None if watcher is None else Participant(watcher)
         if watcher is not None:
             watcher.on_clock(self._note_watch)
@@ -75,7 +77,7 @@ class FeelingPlant(BusPlant):
             if forces.t - self._last > APART and self.bump is None:
                 self.bump = forces.re_k
             self._last = forces.t
-        self._felt = forces.re_k
+        self.felt = forces.re_k
         self.each(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
@@ -88,6 +90,6 @@ class FeelingPlant(BusPlant):
 
     def _answer(self) -> None:
         super()._answer()
-        if self._watcher is not None and self._watched >= 0 and (self._watched == 0 or self._felt >= self._watched):
+        if self._watcher is not None and self._watched >= 0 and (self._watched == 0 or self.felt >= self._watched):
             self._watcher.done(self._watched)
             self._watched = -1

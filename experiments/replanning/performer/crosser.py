@@ -42,7 +42,7 @@ class Crosser:
         vertex = int(np.abs(space.samples - target[space.columns]).max(axis=1).argmin())
         outcome = hand.act(part, target)
         bump = -1 if hand.bump is None else hand.bump
-        self.motions.append(Acted(vertex, hand.asked, hand.commanded, bump, self._service.bus.k, asked_for - self._ended))
+        self.motions.append(Acted(vertex, hand.asked, hand.commanded, bump, hand.felt, asked_for - self._ended))
         self._ended = time.process_time()
         return outcome
 
