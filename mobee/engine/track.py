@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,6 +130,7 @@ def _joints_at(axis: Array, point: Array, parent: Ints) -> Array:
     return at
 
 
+@lru_cache(maxsize=8)
 def _common(packed: Packed) -> UInts:
     """The last link that carries both of two links, (L L,)."""
     links = int(packed.integers[LINKS])

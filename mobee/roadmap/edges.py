@@ -52,15 +52,16 @@ def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
     solid = solid_model(model)
-    vertices = np.unique(edges)
+    vertices, ends = np.unique(edges, return_inverse=True)
+    q, ends = np.ascontiguousarray(q[vertices]), ends.reshape(-1, 2)
     stands = np.ones(len(q), dtype=bool)
-    for some in np.array_split(vertices, len(vertices) // _AT_ONCE + 1):
+    for some in np.array_split(np.arange(len(q)), len(q) // _AT_ONCE + 1):
         stands[some] = np.asarray(solid.evaluate(q[some]).count) == 0
-    free: Flags = stands[edges[:, 0]] & stands[edges[:, 1]]
+    free: Flags = stands[ends[:, 0]] & stands[ends[:, 1]]
     left = np.flatnonzero(free)
-    poses = between(solid, q, edges[left], step, marker)
+    poses = between(solid, q, ends[left], step, marker)
     passed = np.empty(len(left), dtype=np.bool_)
-    looked = _sweep(solid, q, edges[left], poses, passed)
+    looked = _sweep(solid, q, ends[left], poses, passed)
     free[left] = passed
     return Checked(free, len(vertices) + looked)
 
@@ -95,7 +96,7 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
 def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, free: Flags) -> int:
     neighbours = Neighbours(engine_of(model.robot), SKIN)
     here = neighbours.scene(model.world.snapshot, hands(*model.hands))
-    return int(_compiled().sweep(*here, *neighbours.memory, np.ascontiguousarray(q), np.ascontiguousarray(edges), poses, free))
+    return int(_compiled().sweep(*here, *neighbours.memory, q, np.ascontiguousarray(edges), poses, free))
 
 
 def _compiled() -> ModuleType:

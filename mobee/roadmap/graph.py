@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf
@@ -20,8 +21,11 @@ class Graph:
     lengths: list[list[float]]
     components: Ints  # (V,) which connected part a vertex belongs to, the largest is 0
 
-    def shortest(self, start: int, goal: int) -> list[int] | None:
-        """The vertices of the shortest way from one to the other, both included; None where there is none."""
+    def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
+        """The vertices of the shortest way from one to the other, both included; None where there is none.
+
+        `without`: edges that are not gone, the lower vertex first.
+        """
         if self.components[start] != self.components[goal]:
             return None
         ahead = np.linalg.norm(self.q - self.q[goal], axis=1).tolist()  # never more than the way that is left
@@ -36,9 +40,11 @@ class Graph:
                 continue
             for other, length in zip(self.neighbours[vertex], self.lengths[vertex], strict=True):
                 way = here + length
-                if way < best[other]:
+                if way < best[other] and not (without and (min(vertex, other), max(vertex, other)) in without):
                     best[other], before[other] = way, vertex
                     heappush(queue, (way + ahead[other], way, other))
+        if best[goal] == inf:
+            return None
         path = [goal]
         while path[-1] != start:
             path.append(before[path[-1]])

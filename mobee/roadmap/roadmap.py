@@ -13,6 +13,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.model import Model
 from mobee.roadmap.archive import read, write
 from mobee.roadmap.fingerprint import robot_digest, world_digest
+from mobee.roadmap.free_way import free_way
 from mobee.roadmap.graph import Graph, graph
 from mobee.roadmap.problem import chosen
 from mobee.roadmap.told_world import told_world, world_told
@@ -22,7 +23,7 @@ from mobee.robot.robot import Array, Ints, Robot
 NEAR = 1.5  # spacings: a goal further from all vertices is not of the map
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Roadmap:
     """A graph of poses.
 
@@ -37,7 +38,7 @@ class Roadmap:
     edges: Ints
     spacing: Array
     settings: dict[str, Any]
-    graph: Graph = field(init=False, repr=False)
+    graph: Graph = field(init=False)
 
     def __post_init__(self) -> None:
         """Check that the arrays belong together; raises InvalidValue."""
@@ -64,44 +65,44 @@ class Roadmap:
 
     def entry(self, q_from: ArrayLike) -> int:
         """The vertex nearest to a posture (n,) rad, in fractions of the ranges of the motors that moved."""
-        start = self._posture(q_from)
-        free = chosen(self.model.robot, self.motors)
-        low, high = self.model.robot.limits[free].T
-        return int(np.linalg.norm((self.q[:, free] - start[free]) / (high - low), axis=1).argmin())
+        return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
         """The vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than NEAR of them."""
-        goal = self._goal(y_goal)
-        apart = np.linalg.norm((self.y - goal) / self.spacing, axis=1)
-        nearest = int(apart.argmin())
-        if apart[nearest] > NEAR:
-            raise InvalidValue(
-                f"nothing of the map is at {self.told(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
-                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {NEAR:g} spacings of one."
-            )
-        return nearest
+        return int(self._to(y_goal).argmin())
 
-    def way(self, q_from: ArrayLike, y_goal: ArrayLike) -> list[int]:
-        """The vertices from `entry` to `exit` by the shortest way in joint space; raises MobeeError where there is none."""
-        self._require_vertices()
+    def way(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
+        """The vertices of the `path`, from that at which the map is entered to that at which it is left."""
+        if free:
+            return free_way(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
         start, goal = self.entry(q_from), self.exit(y_goal)
         way = self.graph.shortest(start, goal)
         if way is None:
             raise MobeeError(self._apart(start, goal))
         return way
 
-    def path(self, q_from: ArrayLike, y_goal: ArrayLike) -> Array:
+    def path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> Array:
         """Poses (K, n) rad from the posture q_from (n,) over the map to the vertex nearest to y_goal (m,), by the shortest way.
 
         Straight lines lead from each to the next; the first, from q_from to its nearest vertex, is none of the map's own.
 
+        Args:
+            q_from: (n,) rad.
+            y_goal: (m,), in the units of the coordinates.
+            free: only where nothing touches in the world as it is now: edges that do are gone round, and so is a first step, by the next
+                nearest vertices, and a last pose, by those as near as NEAR spacings.  Edges are checked when a way needs them.
+
         Raises:
             InvalidValue: the map is empty, or has nothing near the goal; says what is.
-            MobeeError: the two are in parts of the map that no edge connects.
+            MobeeError: the two are in parts of the map that no edge connects, or no way is free.
         """
         start = self._posture(q_from)
-        poses = self.q[self.way(start, y_goal)]
+        poses = self.q[self.way(start, y_goal, free)]
         return poses if np.array_equal(start, poses[0]) else np.concatenate([start[None], poses])
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"Roadmap({len(self.q)} poses, {len(self.edges)} edges, {self.model.robot.name!r}: {', '.join(self.names)})"
 
     def save(self, path: str | Path) -> None:
         """Write it to a .npz file, whole or not at all; raises MobeeError."""
@@ -123,12 +124,28 @@ class Roadmap:
         self._require_vertices()
         return q
 
-    def _goal(self, given: ArrayLike) -> Array:
-        y, m = np.atleast_1d(np.array(given, dtype=np.float64)), len(self.spacing)
-        if y.shape != (m,) or not np.isfinite(y).all():
-            raise InvalidValue(f"y_goal has shape {y.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
+    def _from(self, q_from: ArrayLike) -> Array:
+        """How far every vertex is from a posture (n,) rad, (V,), see `entry`."""
+        start = self._posture(q_from)
+        free = chosen(self.model.robot, self.motors)
+        low, high = self.model.robot.limits[free].T
+        apart: Array = np.linalg.norm((self.q[:, free] - start[free]) / (high - low), axis=1)
+        return apart
+
+    def _to(self, y_goal: ArrayLike) -> Array:
+        """How far every vertex is from task coordinates (m,), (V,) spacings, infinite beyond NEAR of them."""
+        goal, m = np.atleast_1d(np.array(y_goal, dtype=np.float64)), len(self.spacing)
+        if goal.shape != (m,) or not np.isfinite(goal).all():
+            raise InvalidValue(f"y_goal has shape {goal.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
         self._require_vertices()
-        return y
+        apart: Array = np.linalg.norm((self.y - goal) / self.spacing, axis=1)
+        nearest = int(apart.argmin())
+        if apart[nearest] > NEAR:
+            raise InvalidValue(
+                f"nothing of the map is at {self.told(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
+                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {NEAR:g} spacings of one."
+            )
+        return np.where(apart > NEAR, np.inf, apart)
 
     def _require_vertices(self) -> None:
         if not len(self.q):

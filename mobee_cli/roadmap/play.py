@@ -16,7 +16,6 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
-from mobee_cli.roadmap.query import told as told_way
 from mobee_cli.roadmap.query import way_of
 from mobee_cli.roadmap.show import marker_of
 from mobee_cli.roadmap.text import wrapped
@@ -77,7 +76,7 @@ def tell(trm: Roadmap, way: dict[str, Any], played: Played, gains: Gains, argume
 def require_free(trm: Roadmap, way: dict[str, Any], anyway: bool) -> None:
     """Raise UserError where something is in the way."""
     if not way["free"] and not anyway:
-        raise UserError(f"{told_way(trm, way)[-1]} `mobee roadmap query` tells more; --anyway plays it all the same", FAILED)
+        raise UserError(f"something is in the way: {way['why']} --anyway plays the shortest all the same", FAILED)
 
 
 def result_of(trm: Roadmap, way: dict[str, Any], played: Played) -> dict[str, Any]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue, MobeeError
-from mobee.roadmap.edges import check_edges
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.robot import Array
@@ -42,34 +42,47 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def way_of(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
-    """The way as plain JSON values; raises UserError where there is none.
+    """The shortest free way as plain JSON values; where there is none, the shortest, with why.  UserError where there is none at all.
 
     Motors that the map does not move stay where they are, if they are near their place in it.
     """
-    exit_ = trm.exit(goal)
+    shortest = _way(trm, start, goal)
+    stay = np.abs(start - trm.q[shortest[0]]) < _NEAR
+    stay[[trm.model.robot.motor_index(name) for name in trm.motors]] = False
+    trm = replace(trm, q=np.where(stay, start, trm.q))
+    why = ""
     try:
-        path, vertices = trm.path(start, goal), trm.way(start, goal)
+        vertices = trm.way(start, goal, free=True)
+    except InvalidValue:
+        raise
+    except MobeeError as error:
+        vertices, why = shortest, str(error)
+    poses = trm.q[vertices]
+    path = poses if np.array_equal(poses[0], start) else np.concatenate([start[None], poses])
+    steps = np.abs(np.diff(path, axis=0))
+    place = trm.y[vertices[-1]]
+    return {
+        "vertices": vertices,
+        "place": place.tolist(),
+        "missing": (np.abs(place - goal) / trm.spacing).tolist(),
+        "poses": path.tolist(),
+        "length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
+        "entry": float(np.abs(path[0] - poses[0]).max()),
+        "largest_step": float(steps.max(initial=0.0)),
+        "seconds": float(timed(trm.model.robot, path, Gains.default()).times[-1]),
+        "shortest": vertices == shortest,
+        "free": not why,
+        "why": why,
+    }
+
+
+def _way(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
+    try:
+        return trm.way(start, goal)
     except InvalidValue:
         raise
     except MobeeError as error:
         raise UserError(str(error), FAILED) from None
-    stay = np.abs(path[0] - path[-1]) < _NEAR
-    stay[[trm.model.robot.motor_index(name) for name in trm.motors]] = False
-    path[:, stay] = start[stay]
-    steps = np.abs(np.diff(path, axis=0))
-    free = check_edges(trm.model, path, np.stack([np.arange(len(path) - 1), np.arange(1, len(path))], axis=1))
-    return {
-        "vertices": vertices,
-        "place": trm.y[exit_].tolist(),
-        "missing": (np.abs(trm.y[exit_] - goal) / trm.spacing).tolist(),
-        "poses": path.tolist(),
-        "length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
-        "entry": float(np.abs(path[0] - trm.q[vertices[0]]).max()),
-        "largest_step": float(steps.max(initial=0.0)),
-        "seconds": float(timed(trm.model.robot, path, Gains.default()).times[-1]),
-        "blocked": np.flatnonzero(~free).tolist(),
-        "free": bool(free.all()),
-    }
 
 
 def told(trm: Roadmap, found: dict[str, Any]) -> list[str]:
@@ -86,9 +99,7 @@ def told(trm: Roadmap, found: dict[str, Any]) -> list[str]:
         )
     shown = vertices if count <= _MOST else [*vertices[: _MOST // 2], None, *vertices[-_MOST // 2 :]]
     lines += [f"  {'...' if one is None else f'{one:>6}  {trm.told(trm.y[one])}'}"[:80] for one in shown]
-    if found["free"]:
-        return [*lines, "Nothing is in the way, by a check every millimetre."]
-    first = found["blocked"][0]
-    return lines + wrapped(
-        f"Something is in the way: on {len(found['blocked'])} of its {len(found['poses']) - 1} steps, first on step {first + 1}."
-    )
+    if not found["free"]:
+        return lines + wrapped(f"Something is in the way: {found['why']}")
+    round_it = "" if found["shortest"] else "The shortest way touches something: this one leads round it. "
+    return lines + wrapped(f"{round_it}Nothing is in its way, by a check every millimetre.")

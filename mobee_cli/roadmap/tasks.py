@@ -22,5 +22,14 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(told, indent=2))
         return 0
     for name, one in found:
-        print(f"{name:<18}{one.figure:<15}{one.title:<19}{', '.join(one.task.names)}"[:80])
+        print(f"{name:<17} {one.figure:<16} {one.title:<16} {_short(one.task.names, 28)}")
     return 0
+
+
+def _short(names: tuple[str, ...], room: int) -> str:
+    """The names, as many as there is room for."""
+    whole, kept = ", ".join(names), list(names)
+    while len(whole) > room and len(kept) > 1:
+        kept.pop()
+        whole = f"{', '.join(kept)}, ..."
+    return whole[:room]

@@ -14,8 +14,8 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
 from mobee_cli.roadmap.tour import PLACES, tour
 
-MOTORS = ("r_shoulder_yaw", "r_elbow")
-SIDE, STEP = 5, 0.1
+MOTORS = ("r_shoulder_pitch", "r_shoulder_roll")
+SIDE, STEP, TURN = 5, 0.1, 0.2
 
 
 def square(folder: Path, name: str = "map.npz", block: bool = False) -> Path:
@@ -23,16 +23,16 @@ def square(folder: Path, name: str = "map.npz", block: bool = False) -> Path:
     robot, world = mobee.load_robot("icub"), mobee.World()
     model = mobee.Model(robot, world)
     start = robot.home.copy()
-    start[robot.motor_index("r_shoulder_roll")] = 1.0
+    start[robot.motor_index("r_elbow")] = 0.8
     rows, columns = (one.ravel() for one in np.meshgrid(range(SIDE), range(SIDE), indexing="ij"))
     q = np.repeat(start[None], SIDE**2, axis=0)
-    q[:, robot.motor_index(MOTORS[0])] = 0.2 + STEP * rows
-    q[:, robot.motor_index(MOTORS[1])] = 0.7 + STEP * columns
+    q[:, robot.motor_index(MOTORS[0])] = -0.9 + TURN * rows
+    q[:, robot.motor_index(MOTORS[1])] = 0.6 + TURN * columns
     if block:
-        world.add("block", mobee.sphere(0.03), position=model.evaluate(q[12]).position("right_palm"))
+        world.add("block", mobee.sphere(0.01), position=model.evaluate(q[12]).position("right_palm"))
     edges = np.argwhere(np.triu(np.abs(rows[:, None] - rows) + np.abs(columns[:, None] - columns) == 1))
     y = STEP * np.stack([rows, columns], axis=1).astype(float)
-    moved = ["r_shoulder_roll", *MOTORS]
+    moved = [*MOTORS, "r_elbow"]
     settings = {"names": ["yaw", "elbow"], "units": ["rad", ""], "motors": moved, "box": [[0.0, 0.4], [0.0, 0.4]], "method": "by hand"}
     Roadmap(model, q, y, edges, np.array([STEP, STEP]), settings).save(folder / name)
     return folder / name
@@ -73,7 +73,7 @@ def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path
     code, out, _ = say("show", free, "--check", "--picture", tmp_path / "a.png")
     lines = out.splitlines()
     assert code == 0
-    assert "25 poses, 40 edges." in out and "r_shoulder_roll, r_shoulder_yaw, r_elbow" in out
+    assert "25 poses, 40 edges." in out and "r_shoulder_pitch, r_shoulder_roll, r_elbow" in out
     assert next(line for line in lines if line.startswith("yaw [rad]")).split()[2:] == ["0.1", "0.000", "0.400", "0", "0.4"]
     assert "None of the 40 edges touches something" in out
     assert f"right_palm is: {tmp_path}" in " ".join(out.split())
@@ -87,32 +87,40 @@ def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> No
     seen = np.concatenate([one.poses for one in stretches])[:, moves]
     assert len(stretches) == PLACES - 1 and all("yaw" in one.title and "elbow" in one.title for one in stretches)
     assert np.abs(np.diff(seen, axis=0)).max() < 0.05
-    np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [[0.2, 0.7], [0.6, 1.1]], atol=1e-9)
+    np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [[-0.9, 0.6], [-0.1, 1.4]], atol=1e-5)
 
 
 def test_query_tells_the_way(say: Say, free: Path) -> None:
     code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2)
     assert code == 0
     assert "To yaw 0.4, elbow 0.2, 0.00 spacings from what was asked: over 7 poses" in " ".join(out.split())
-    assert "Nothing is in the way" in out
+    assert "Nothing is in its way" in out
     code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2, "--json")
     found = json.loads(out)
     assert code == 0 and found["free"] and found["vertices"][0] == 0 and found["vertices"][-1] == 22
-    assert found["length"] == pytest.approx(0.6) and len(found["poses"]) == 7
+    assert found["length"] == pytest.approx(1.2) and len(found["poses"]) == 7
 
 
 def test_a_way_from_home_begins_there(say: Say, free: Path) -> None:
     robot = mobee.load_robot("icub")
     found = json.loads(say("query", free, "--to", 0, 0, "--json")[1])
-    assert found["poses"][0] == robot.home.tolist() and found["entry"] > 0.3
+    assert found["poses"][0] == robot.home.tolist() and found["entry"] > 0.2
     again = json.loads(say("query", free, "--to", 0, 0, "--from", *robot.home, "--json")[1])
     assert again["poses"] == found["poses"]
 
 
-def test_what_is_in_the_way_is_told_with_exit_code_1(say: Say, blocked: Path) -> None:
+def test_a_way_goes_round_what_is_in_it(say: Say, blocked: Path) -> None:
     code, out, _ = say("query", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
-    assert code == 1 and "Something is in the way: on" in out
-    code, out, err = say("play", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
+    assert code == 0 and "The shortest way touches something: this one leads round it." in " ".join(out.split())
+
+
+def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: Path) -> None:
+    robot = mobee.load_robot("icub")
+    start = mobee.load_roadmap(blocked).q[12]
+    assert mobee.load_roadmap(blocked).model.evaluate(start).count and len(start) == len(robot.motors)
+    code, out, _ = say("query", blocked, "--from", *start, "--to", 0.2, 0.3)
+    assert code == 1 and "Something is in the way: no free way: the straight ones" in " ".join(out.split())
+    code, out, err = say("play", blocked, "--from", *start, "--to", 0.2, 0.3)
     assert code == 1 and out == "" and "--anyway" in err
 
 
