@@ -70,12 +70,8 @@ class Chart:
         _, apart = self.nearest(place, self.dimensions)
         return bool(NEAREST <= apart[0] <= FIRST and apart[-1] <= OTHERS and not self.region.covers(place[None])[0])
 
-    def is_free(self, place: Array) -> bool:
-        """Whether a place (m,) keeps its distance to all vertices and is not covered."""
-        return bool(self.nearest(place, 1)[1][0] >= NEAREST and not self.region.covers(place[None])[0])
-
-    def add(self, place: Array) -> None:
-        """Add a vertex (m,), its edges, and the simplex of it and its n nearest."""
+    def add(self, place: Array) -> Array | None:
+        """Add a vertex (m,), its edges, and the simplex of it and its n nearest; this one's inverse edges, None where there is none."""
         number, n = len(self), self.dimensions
         corners, _ = self.nearest(place, n)
         simplex = self.region.add(np.concatenate([place[None], self.places[corners]])) if len(corners) == n else None
@@ -85,6 +81,7 @@ class Chart:
         self._free.append(self._free_around(place))
         for corner in corners:
             self._edges.append((corner, number))
+        return simplex
 
     def _free_around(self, place: Array) -> Flags:
         aims = place + self.ways
