@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,8 @@ from mobee.roadmap.rates import default_population, path_rates, published_utilit
 from mobee.roadmap.shapes import stretched, turned
 from mobee.robot.robot import Array
 
-METHODS = ("full", "separable", "xnes", "snes")
+Method = Literal["full", "separable", "xnes", "snes"]
+METHODS: tuple[str, ...] = get_args(Method)
 
 
 class NES:
@@ -40,7 +41,7 @@ class NES:
         start: ArrayLike,
         std: ArrayLike,
         population: int | None = None,
-        method: Literal["full", "separable", "xnes", "snes"] = "full",
+        method: Method = "full",
         seed: int | np.random.Generator = 0,
     ) -> None:
         mean = np.array(start, dtype=np.float64)

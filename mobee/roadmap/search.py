@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
-from mobee.roadmap.nes import NES
+from mobee.roadmap.nes import NES, Method
 from mobee.robot.robot import Array
 
 PENALTY = 100.0  # of a sample that was moved back into the box: times its squared way in box widths
@@ -60,7 +59,7 @@ class Search:
         limits: ArrayLike | None = None,
         restart: Restart | None = None,
         population: int | None = None,
-        method: Literal["full", "separable", "xnes", "snes"] = "full",
+        method: Method = "full",
         seed: int | np.random.Generator = 0,
     ) -> None:
         first = np.array(start, dtype=np.float64)
@@ -131,7 +130,7 @@ def minimize(
     evaluations: int = EVALUATIONS,
     restart: Restart | None = None,
     population: int | None = None,
-    method: Literal["full", "separable", "xnes", "snes"] = "full",
+    method: Method = "full",
     seed: int | np.random.Generator = 0,
 ) -> Minimum:
     """The best sample found when one costs no more than the target, or when another generation would pass the number of evaluations.
