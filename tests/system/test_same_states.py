@@ -11,7 +11,7 @@ from tests.system.live import running, transitions, until
 
 pytestmark = pytest.mark.system
 
-ACTIONS = 8
+ACTIONS = 6
 SEED = 4
 GAINS = "default"
 ATTEMPTS = 5
