@@ -22,6 +22,7 @@ T = TypeVar("T")
 
 THESIS = 400_000  # poses: 5000 vertices, 8 edges each, 10 poses an edge; at 1 kHz "roughly 7 minutes"
 CUP = mobee.cylinder(0.04, 0.12)
+CUP_AT = (-0.5, 0.16)  # m, x and y
 EDGES_AT_ONCE = 512
 
 # Name, key, at most.
@@ -69,8 +70,7 @@ def _round(model: mobee.Model, trm: Roadmap) -> dict[str, float]:
     both, both_s = _timed(lambda: checked(model, trm.q, both_ways, marker=MARKER))
     once, once_s = _timed(lambda: checked(model, trm.q, trm.edges, marker=MARKER))
     watch = EdgeWatch(model, trm.q, trm.edges, marker=MARKER)
-    middle = trm.y[len(trm.y) // 2]
-    model.world.add("cup", CUP, position=(*middle, -0.1 + 0.5 * CUP.size[1]))
+    model.world.add("cup", CUP, position=(*CUP_AT, -0.1 + 0.5 * CUP.size[1]))
     near, change_s = _timed(watch.update)
     after, all_s = _timed(lambda: checked(model, trm.q, trm.edges, marker=MARKER))
     model.world.remove("cup")
