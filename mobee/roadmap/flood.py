@@ -138,8 +138,8 @@ class Flood:
         return True
 
     def _look_between(self) -> bool:
-        """Have the points between the lattice's tried around those that were missed; says whether there are any new ones."""
-        missed = [point for point in self._known.missed if point not in self._known.between]
+        """Have the points between the lattice's tried around those that contacts keep out; says whether there are any new ones."""
+        missed = [point for point, one in self._known.missed.items() if np.isfinite(one.wrong) and point not in self._known.between]
         found = False
         for point, halves in zip(missed, self._lattice.between(np.array(missed)) if missed else [], strict=True):
             for half in halves:

@@ -117,3 +117,10 @@ def test_it_goes_on_where_it_was_interrupted(arm: mobee.Model) -> None:
         pass
     for one, other in zip(second.result(), whole, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_three_dimensions(arm: mobee.Model) -> None:
+    _, q, y = flood(arm, tasks.motors({name: (-1.0, 1.0) for name in ("m0", "m1", "m2")}), np.full(3, 0.5))
+    np.testing.assert_array_equal(q, y)
+    far = np.linalg.norm(np.random.default_rng(0).uniform(-0.75, 0.75, (50, 1, 3)) - y, axis=2).min(axis=1)
+    assert far.max() <= 0.5 / np.sqrt(2.0) + 0.02
