@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.progress import Progress
+from mobee.roadmap.ngik import METHODS
 from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
 
-METHODS = ("hybrid", "nes", "least_squares")
 NOTES = """The map is on disk every 10 s: after Ctrl-C, or a crash, the same command goes
 on with it. A file of other settings, or of another robot or world, is refused.
 A task of your own is a Python file with a function example(): docs/roadmaps.md."""

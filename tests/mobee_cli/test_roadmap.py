@@ -187,6 +187,33 @@ def test_a_task_file_that_cannot_be_used_is_told_with_its_line(say: Say, tmp_pat
     assert code == 2 and out == "" and told in err and err.count("\n") == 1
 
 
+TASK = """
+import mobee
+from experiments.trm.example import Example
+
+def example():
+    model = mobee.Model(mobee.load_robot("icub"))
+    start = model.robot.home.copy()
+    start[model.robot.motor_index("r_shoulder_roll")] = 0.9
+    task = mobee.tasks.motors({"r_elbow": (0.5, 0.9), "r_shoulder_roll": (0.7, 1.0)})
+    motors = ("r_elbow", "r_shoulder_roll")
+    return Example("own", "", model, (mobee.costs.collision(), mobee.costs.home()), task, 0.1, motors, (), start=start)
+"""
+
+
+def test_a_map_of_a_task_of_ones_own_is_built_kept_and_played(say: Say, tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(TASK)
+    path = tmp_path / "own.npz"
+    code, out, _ = say("build", tmp_path / "own.py", "-o", path, "--method", "least_squares", "--neighbours", 4)
+    assert code == 0 and "Made by method least_squares, seed 0, neighbours 4" in " ".join(out.split())
+    before = path.read_bytes()
+    assert say("build", tmp_path / "own.py", "-o", path, "--method", "least_squares", "--neighbours", 4)[0] == 0
+    assert path.read_bytes() == before
+    code, _, err = say("build", tmp_path / "own.py", "-o", path, "--method", "least_squares")
+    assert code == 2 and "differ in neighbours" in err
+    assert say("play", path, "--from", 0.6, 0.8, "--to", 0.8, 0.9)[0] == 0
+
+
 def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
 
