@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mobee.engine import engine_of
 from mobee.engine.hands import hands
-from mobee.engine.track import Neighbours
 from mobee.errors import InvalidValue
 from mobee.model import Model
 from mobee.roadmap.solids import solid_model
@@ -94,6 +93,8 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
 
 
 def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, free: Flags) -> int:
+    from mobee.engine.track import Neighbours  # compiled: not before somebody asks
+
     neighbours = Neighbours(engine_of(model.robot), SKIN)
     here = neighbours.scene(model.world.snapshot, hands(*model.hands))
     return int(_compiled().sweep(*here, *neighbours.memory, q, np.ascontiguousarray(edges), poses, free))
