@@ -17,7 +17,8 @@ from mobee.roadmap.map_store import MapStore
 from mobee.robot.robot import Array
 
 NEAR = 0.15  # rad: within so much of a vertex in every joint the part is there
-DOORS = 5  # vertices that are tried when it is beside the map
+DOORS = 5  # nearest vertices that are tried when it is beside the map
+TRAIL = 50  # vertices back the way it came that are tried before
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,7 @@ class Walker:
         self.near, self.back = near, back
         self.here: int | None = None
         """The vertex where the part is; None: beside the map, or not known."""
+        self._trail: list[int] = []  # the vertices where it was, the last at the end
         self.record = MapRecord(roadmap, store, self.settings)
         """What was observed and changed; changes go through it, and set `here` to None where vertices may have got new numbers."""
 
@@ -91,14 +93,15 @@ class Walker:
         outcome = self._move(goal)
         worked = self._is_at(outcome.q, goal)
         self.record.observe(state, action, goal if worked else state, outcome)
+        self._trail = [*self._trail[-TRAIL:], state]
         if worked:
             self.here = goal
-        elif self.back and self._is_at(self._move(state).q, state):
+        elif self.back and self._comes_to(state):
             self.here = state
         return worked
 
     def enter(self) -> int:
-        """The vertex where the part is; if it is beside the map, the first of the nearest ones to which it comes.
+        """The vertex where the part is; if it is beside the map, the first to which it comes: back the way it came, then of the nearest.
 
         Raises MobeeError if it comes to none.
         """
@@ -109,16 +112,24 @@ class Walker:
         return self.here
 
     def _door(self, near: list[int]) -> int:
+        trail, self._trail = self._trail, []
+        for last in range(len(trail) - 1, -1, -1):
+            if trail[last] < len(self.roadmap) and trail[last] not in trail[last + 1 :] and self._comes_to(trail[last]):
+                self._trail = trail[:last]
+                return trail[last]
         for vertex in near[:DOORS]:
-            if self._is_at(self._move(vertex).q, vertex):
+            if self._comes_to(vertex):
                 return vertex
         raise MobeeError(f"{self.part} is beside the map, and comes to none of the vertices {near[:DOORS]}: add samples near it.")
+
+    def _comes_to(self, vertex: int) -> bool:
+        return self._is_at(self._move(vertex).q, vertex)
 
     def _onward(self, state: int, goals: ArrayLike) -> int:
         """On to the next vertex of the new way, without going back first; back if that fails."""
         way = self.roadmap.plan(state, goals)
         for vertex in (way[1], state):
-            if self._is_at(self._move(vertex).q, vertex):
+            if self._comes_to(vertex):
                 self.here = vertex
                 break
         return self.enter()
