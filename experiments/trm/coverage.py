@@ -99,8 +99,8 @@ def _blind(problem: Problem, task: Task, spacing: Array, rng: np.random.Generato
     """Those of some random points of the box that random starts reach, (B, m)."""
     low, high = task.box.T
     points = np.repeat(rng.uniform(low, high, (BLIND, len(low))), STARTS, axis=0)
-    starts = problem.whole(rng.uniform(*problem.limits.T, (len(points), len(problem.free))))
-    _, there, wrong, _ = Goals(problem, task, OFF * spacing).solve(points, starts)
+    goals = Goals(problem, task, OFF * spacing)
+    _, there, wrong, _ = goals.solve(points, goals.anywhere(len(points), rng))
     met = np.flatnonzero(wrong == 0.0)
     _, once = np.unique(met // STARTS, return_index=True)
     found: Array = there[met[once]]

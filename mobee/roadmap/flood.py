@@ -110,7 +110,7 @@ class Flood:
         """Find a first pose, near the start if there is one; says whether there is one."""
         start = self.problem.start[None]
         here = self._lattice.nearest(self._task.of(self.problem.model.evaluate(start)))[0]
-        starts = np.concatenate([start, self._anywhere(self._patience.starts)])
+        starts = np.concatenate([start, self._goals.anywhere(self._patience.starts, self.rng)])
         return self._solve([tuple(here.tolist())] * len(starts), starts, most=1) or any(self._scout(most=1) for _ in range(ROUNDS))
 
     def _wave(self) -> bool:
@@ -131,9 +131,10 @@ class Flood:
         for point in points:
             self._known.missed[point].left -= 1
         each = self._patience.starts
-        starts = self._about(np.repeat([self._known.missed[point].q for point in points], each, axis=0))
+        best = np.repeat([self._known.missed[point].q for point in points], each, axis=0)
+        starts = self._goals.about(best, self.rng.choice(NOISES, len(best)), self.rng)
         random = np.tile(np.arange(each) < ANYWHERE * each, len(points))
-        starts[random] = self._anywhere(int(random.sum()))
+        starts[random] = self._goals.anywhere(int(random.sum()), self.rng)
         self._solve([point for point in points for _ in range(each)], starts)
         return True
 
@@ -154,7 +155,7 @@ class Flood:
         low, high = self._task.box.T
         drawn = self._lattice.nearest(self.rng.uniform(low, high, (self._patience.scouts, len(low))))
         points = [point for point in map(tuple, drawn.tolist()) if point not in self._known.vertex and point not in self._known.missed]
-        return self._solve(points, self._anywhere(len(points)), most, remember=False)
+        return self._solve(points, self._goals.anywhere(len(points), self.rng), most, remember=False)
 
     def _solve(self, points: Sequence[Point], starts: Array, most: int | None = None, remember: bool = True) -> bool:
         """Add the points that are reached from the starts, `most` of them; says whether any was."""
@@ -193,16 +194,3 @@ class Flood:
     def _is_free(self, point: Point) -> bool:
         """Whether no vertex is too near to a point."""
         return not self._known.between or not any(one in self._known.vertex for one in self._lattice.close(point))
-
-    def _about(self, q: Array) -> Array:
-        """Starts about postures q (N, n)."""
-        low, high = self.problem.limits.T
-        moved, free = q.copy(), self.problem.free
-        noise = self.rng.choice(NOISES, (len(q), 1)) * (high - low) * self.rng.standard_normal((len(q), len(free)))
-        moved[:, free] = np.clip(q[:, free] + noise, low, high)
-        return moved
-
-    def _anywhere(self, count: int) -> Array:
-        """Random starts (count, n)."""
-        low, high = self.problem.limits.T
-        return self.problem.whole(self.rng.uniform(low, high, (count, len(low))))

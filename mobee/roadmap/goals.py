@@ -30,6 +30,19 @@ class Goals:
         self._known: list[dict[float, Array]] = [{} for _ in task.coordinates]
         self._descent = Descent(problem, [pair for number, low in enumerate(task.box[:, 0]) for pair in self._aims(number, float(low))])
 
+    def anywhere(self, count: int, rng: np.random.Generator) -> Array:
+        """Random starts (count, n): of the motors that the aims and terms need, the others stay where the problem starts."""
+        low, high = self._problem.limits.T
+        drawn = rng.uniform(low, high, (count, len(low)))
+        return self._problem.whole(np.where(self._descent.drawn, drawn, self._problem.start[self._problem.free]))
+
+    def about(self, q: Array, noise: Array, rng: np.random.Generator) -> Array:
+        """Starts about postures q (N, n): noise (N,) in the motors' ranges, of the motors that the aims and terms need."""
+        low, high = self._problem.limits.T
+        here = q[:, self._problem.free]
+        drawn = noise[:, None] * (high - low) * rng.standard_normal(here.shape)
+        return self._problem.whole(np.clip(here + np.where(self._descent.drawn, drawn, 0.0), low, high))
+
     def solve(self, y: Array, starts: Array) -> tuple[Array, Array, Array, Array]:
         """What the starts (N, n) lead to for task points y (N, m): poses (N, n), their task points, what is wrong and their costs (N,).
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from types import ModuleType
 
 import numpy as np
 
 from mobee.engine.pack import Flags, Packed, pack
+from mobee.roadmap.needed import needed
 from mobee.roadmap.problem import Problem
 from mobee.roadmap.term import Aim
 from mobee.robot.per_robot import per_robot
@@ -28,6 +30,7 @@ class Descent:
         self._own = aim_reals(pairs)
         pairs += besides
         self.count = len(pairs)
+        self._aims = [aim for aim, _ in pairs]
         self._numbers = np.array(
             [number for aim, _ in pairs for number in (aim.kind, aim.first_link, aim.second_link, aim.motor)], dtype=np.int64
         )
@@ -36,6 +39,11 @@ class Descent:
         self._packed = _packed(robot)
         self._problem = problem
         self._low, self._high = (np.ascontiguousarray(side) for side in problem.limits.T)
+
+    @cached_property
+    def drawn(self) -> Flags:
+        """Which of the motors that may move (d,) are to be random in a random start, see `needed`."""
+        return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
         """Where poses q (B, n), within the limits, lead to that meet every aim, (K, n); goals: as of `ends`."""
@@ -77,16 +85,18 @@ def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
                 return found
         if left <= 0:
             return None
-        starts = problem.whole(_drawn(problem, rng, min(AT_ONCE, left)))
+        starts = problem.whole(_drawn(problem, rng, min(AT_ONCE, left), descent.drawn))
         left -= AT_ONCE
 
 
-def _drawn(problem: Problem, rng: np.random.Generator, count: int) -> Array:
-    """Starts of the free motors (count, d), in turn anywhere and about the start."""
+def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags) -> Array:
+    """Starts of the free motors (count, d), in turn anywhere and about the start; some motors (d,) alone, the others stay there."""
     low, high = problem.limits.T
+    start = problem.start[problem.free]
     drawn = rng.uniform(low, high, (count, len(low)))
-    about = problem.start[problem.free] + NEAR * (high - low) * rng.standard_normal((count, len(low)))
+    about = start + NEAR * (high - low) * rng.standard_normal((count, len(low)))
     drawn[::2] = np.clip(about[::2], low, high)
+    drawn[:, ~which] = start[~which]
     return drawn
 
 

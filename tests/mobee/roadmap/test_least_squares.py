@@ -9,6 +9,7 @@ import mobee
 from mobee.roadmap import costs
 from mobee.roadmap.aims import level
 from mobee.roadmap.least_squares import Descent, aim_reals, least_squares
+from mobee.roadmap.needed import needed
 from mobee.roadmap.problem import Problem
 
 PALMS = "left_palm", "right_palm"
@@ -127,3 +128,30 @@ def test_without_aims_there_is_nothing_to_do(free: mobee.Model) -> None:
     problem = Problem(free, [costs.collision()], None, None)
     assert least_squares(problem, np.random.default_rng(0)) is None
     assert problem.evaluations == 0
+
+
+def test_what_moves_no_aim_stays_where_it_was(free: mobee.Model, icub: mobee.Robot) -> None:
+    """Nothing would ever move a finger back from where a restart put it."""
+    place = free.evaluate(icub.limits.mean(axis=1)).position("right_palm")
+    terms = [costs.position("right_palm", place), costs.orientation("right_palm", [0.0, 1.0, 0.0])]
+    problem = Problem(free, terms, None, ["torso", "right_arm", "l_elbow"])
+    moved = needed(problem, [aim for one in problem.terms if one.aims for aim in one.aims(icub)])
+    names = {icub.motors[k] for k in problem.free[moved]}
+    assert names == {*icub.parts["torso"].motors, *icub.parts["right_arm"].motors[:7]}
+    hard = [*terms, costs.term(lambda pose, contacts: np.abs(pose.q[..., 0] - 0.5), tolerance=0.2)]
+    problem = Problem(free, hard, None, ["torso", "right_arm"])
+    found = least_squares(problem, np.random.default_rng(0))
+    assert found is not None and 0.3 <= found[0] <= 0.7  # which only restarts lead to
+    fingers = [icub.motor_index(name) for name in icub.parts["right_arm"].motors[7:]]
+    np.testing.assert_array_equal(found[fingers], icub.home[fingers])
+
+
+def test_what_a_plain_function_feels_is_drawn(free: mobee.Model, icub: mobee.Robot) -> None:
+    finger = icub.motor_index("r_pinky")
+    bent = costs.term(lambda pose, contacts: np.abs(pose.q[..., finger] - 1.0), tolerance=0.3)
+    soft = costs.term(lambda pose, contacts: pose.q[..., icub.motor_index("l_pinky")] ** 2, tolerance=None)
+    problem = Problem(free, [costs.position("right_palm", [-0.3, 0.1, 0.1]), bent, soft], None, None)
+    drawn = Descent(problem).drawn
+    assert drawn[finger] and not drawn[icub.motor_index("l_pinky")] and not drawn[icub.motor_index("r_thumb_oppose")]
+    found = least_squares(problem, np.random.default_rng(0))
+    assert found is not None and abs(found[finger] - 1.0) <= 0.3
