@@ -27,7 +27,7 @@ class Front:
     wide_std: float = 0.2
     population: int | None = None
     patience: float = 3.0
-    tries: int = 2
+    tries: int = 3
     searches: int = 32
 
     def __post_init__(self) -> None:
