@@ -9,8 +9,8 @@ The task of figure 4.8, palm down, 8 nearest neighbours, no edge checked, by lea
 arm's seven joints; it has poses in which no field and no limit pushes, 16 cm above the table (lower the hand feels the table), over
 0.03 m2, with spacings from 20 to 2.4 mm: 75 to 5000 vertices.  Nothing is seen: of a query is known where it ends.  A cup, 10 cm high,
 is put by the optimistic way to there; beside it there is a way on which it is nowhere 2 cm deep in a field.  Offline plant, default
-law, motors as identified.  An edge has worked as soon as every joint is within half of a usual edge of its goal; it failed, a bump,
-if the arm comes to rest elsewhere; then the arm goes back the way it came until it is at a vertex, and the way is planned anew.
+law, motors as identified.  An edge has worked as soon as every joint is within 0.02 rad of its goal, the same for all maps; it failed,
+a bump, if the arm comes to rest elsewhere; then the arm goes back the way it came until it is at a vertex, and the way is planned anew.
 "remove": what failed is out, both ways; "reweigh": it is dear.  At most 600 edges a query.
 """
 

@@ -53,11 +53,6 @@ def built(spacing: float) -> Roadmap:
     return Roadmap(made.model, at_home[calm], found.y[calm], number[edges], found.spacing, found.settings)
 
 
-def usual_step(roadmap: Roadmap) -> float:
-    """By how much the joint that turns most does along an edge, the median, in rad."""
-    return float(np.median(np.abs(roadmap.q[roadmap.edges[:, 0]] - roadmap.q[roadmap.edges[:, 1]]).max(axis=1)))
-
-
 def _beyond(robot: Robot, q: Array) -> Array:
     """By how much the arm's joints are in the zones where limits push, in all, rad."""
     columns = [robot.motor_index(joint) for joint in RIGHT_ARM]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.control.ride import place
-from experiments.pregrasp.settings import CUP, HEIGHT, PART, RADIUS, TOP, built, usual_step
+from experiments.pregrasp.settings import CUP, HEIGHT, PART, RADIUS, TOP, built
 from experiments.trm.body import RIGHT_ARM, at_table
 from mobee import (
     AdaptiveRoadmap,
@@ -26,8 +26,8 @@ from mobee import (
 from mobee.plant import Outcome
 from mobee.robot.robot import Array
 
-MOST, DRAWS, SHARE = 600, 300, 0.5  # edges of a query; draws of one; share of a usual edge within which a vertex is passed
-LEAST = 0.008  # rad, likewise: twice what encoders and springs leave
+MOST, DRAWS = 300, 300  # edges of a query; draws of one
+NEAR = 0.05  # rad, within which a vertex is passed, the same whatever the density; the arm rests within as much of where it is sent
 BESIDE = 0.01  # m: a cup stands that near to the optimistic way
 FELT = 0.02  # m, deep in a field
 DT = 0.02  # s
@@ -61,11 +61,11 @@ class Passing:
 def queried(seed: int, spacing: float, queries: int) -> dict[str, Any]:
     """Success, bumps, edges and s of plant time of each mode and query; how many vertices and edges there are."""
     roadmap = built(spacing)
-    space, near = roadmap_space(roadmap, RIGHT_ARM), max(LEAST, SHARE * usual_step(roadmap))
+    space = roadmap_space(roadmap, RIGHT_ARM)
     drawn = [_drawn(np.random.default_rng([seed, query]), roadmap, space) for query in range(queries)]
     found: dict[str, Any] = {"vertices": len(space), "edges": space.state_actions}
     for mode in MODES:
-        rows = [_walked(seed, AdaptiveRoadmap(space, mode, both_ways=True), near, *query) for query in drawn]
+        rows = [_walked(seed, AdaptiveRoadmap(space, mode, both_ways=True), *query) for query in drawn]
         for name, values in zip(("success", "bumps", "walked", "seconds"), zip(*rows, strict=True), strict=True):
             found[f"{mode}|{name}"] = np.array(values)
     return found
@@ -108,13 +108,13 @@ def _whole(space: Space, vertices: Any) -> Array:
     return q
 
 
-def _walked(seed: int, roadmap: AdaptiveRoadmap, near: float, start: int, goal: int, cup: Array) -> tuple[bool, int, int, float]:
+def _walked(seed: int, roadmap: AdaptiveRoadmap, start: int, goal: int, cup: Array) -> tuple[bool, int, int, float]:
     space = roadmap.space
     plant = OfflinePlant(
         Model(space.robot, _with_cup(cup)), seed, Gains.default(), MotorParameters.identified("icub"), DT, active=RIGHT_ARM
     )
     place(plant, _whole(space, [start])[0])
-    begun, walker, arrived = plant.time, Walker(roadmap, Passing(plant, near), near=1.2 * near), False
+    begun, walker, arrived = plant.time, Walker(roadmap, Passing(plant, NEAR), near=1.2 * NEAR), False
     try:
         arrived = walker.go(goal, MOST).arrived
     except MobeeError:

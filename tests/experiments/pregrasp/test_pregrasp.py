@@ -8,7 +8,7 @@ import pytest
 from experiments.control.ride import place
 from experiments.pregrasp.figure import draw
 from experiments.pregrasp.findings import CLAIMS, findings
-from experiments.pregrasp.settings import SPACINGS, built, usual_step
+from experiments.pregrasp.settings import SPACINGS, built
 from experiments.pregrasp.trial import MODES, Passing, queried
 from experiments.trm.body import RIGHT_ARM
 from mobee import MotorParameters, OfflinePlant
@@ -16,7 +16,7 @@ from mobee import MotorParameters, OfflinePlant
 
 def test_in_the_poses_of_the_map_the_arm_rests_where_it_is_sent() -> None:
     roadmap = built(SPACINGS[0])
-    assert len(roadmap.q) > 50 and usual_step(roadmap) > 0.05
+    assert len(roadmap.q) > 50
     plant = OfflinePlant(roadmap.model, motors=MotorParameters.identified("icub"), dt=0.02, active=RIGHT_ARM)
     arm = plant.robot.parts["right_arm"].slice
     for q in roadmap.q[::25]:
