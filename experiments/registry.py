@@ -30,7 +30,6 @@ EXPERIMENTS = {
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",
     "planner": "experiments.planner",
-    "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.reach",
