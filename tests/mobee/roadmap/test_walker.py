@@ -123,3 +123,20 @@ def test_a_store_of_another_map_is_refused(tmp_path):
 def test_an_unknown_edge_is_refused():
     with pytest.raises(mobee.InvalidValue, match=r"no edge from 0 to 2: valid are \[1, 3\]"):
         Walker(square(), BlockedPlant(A, wall(A, B))).follow(0, 2)
+
+
+def test_pushed_off_the_map_it_goes_back_the_way_it_came_until_a_vertex_holds():
+    state = {"blocked": False}
+
+    def blocked(q, target):
+        if np.allclose(q, C) and np.allclose(target, D):
+            state["blocked"] = True  # from now on neither the goal nor where it set out from can be come to
+        return state["blocked"] and (np.allclose(target, C) or np.allclose(target, D))
+
+    plant = BlockedPlant(A, blocked)
+    walker = Walker(square(), plant, near=0.05)
+    for vertex, goal in ((0, 1), (1, 2), (2, 3)):
+        walker.follow(vertex, goal)
+    plant.acted.clear()
+    assert walker.enter() == 1
+    assert np.array_equal(plant.acted, [C, B])
