@@ -43,6 +43,7 @@ EXPERIMENTS = {
     "simultaneous": "experiments.simultaneous",
     "table": "experiments.table",
     "transfer": "experiments.transfer",
+    "trm": "experiments.trm",
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
     "unmodelled": "experiments.unmodelled",

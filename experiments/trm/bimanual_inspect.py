@@ -25,7 +25,7 @@ def example() -> Example:
     across = np.multiply(0.5 * WIDTH, TO_THE_LEFT)
     return Example(
         title="bimanual inspect",
-        figure="3.4; 3.1, centre",
+        figure="3.1, 3.4",
         model=model,
         costs=(
             costs.position(LEFT, MIDDLE + across),

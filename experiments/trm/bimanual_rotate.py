@@ -14,7 +14,7 @@ from experiments.trm.example import Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
 
-WIDTH, MIDDLE = 0.20, (-0.30, 0.0, 0.15)  # m
+WIDTH, MIDDLE = 0.20, (-0.30, 0.0, 0.20)  # m
 
 
 def example() -> Example:

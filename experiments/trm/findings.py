@@ -62,13 +62,13 @@ def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
         return list(CLAIMS)
     figures = [task for task in EXAMPLES if task != PREGRASP]
     covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in figures} for method in NAMES}
-    holds = all(share >= COVERED for shares in covered.values() for share in shares.values())
+    holds = all(share >= COVERED for share in covered[NES].values())
     vertices = np.concatenate([runs[PREGRASP, method]["vertices"] for method in NAMES])
     slowest = max(figures, key=lambda task: float(runs[task, NES]["processor_s"].max()))
     most = float(runs[slowest, NES]["processor_s"].max())
     sound = sum(float((one["valid"] * one["vertices"]).sum()) for one in runs.values())
     poses = sum(float(one["vertices"].sum()) for one in runs.values())
-    return [
+    return [  # of the map-making the thesis' own method decides
         MAPS.measured("; ".join(f"{NAMES[method]}: {_least(shares)}" for method, shares in covered.items()), holds),
         VALID.measured(f"{sound:.0f} of {poses:.0f} poses", round(sound) == round(poses)),
         GRAPH.measured("; ".join(f"{NAMES[method]}: {_least(_connected(runs, method))}" for method in NAMES), _whole(runs)),

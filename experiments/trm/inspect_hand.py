@@ -35,5 +35,6 @@ def example() -> Example:
         spacing=float(np.deg2rad(5.0)),
         motors=(*ONE_HAND, *NECK),
         start=elbows_out(grasping(left_aside(model.robot), model.robot, "r"), model.robot, "r"),
+        markers=(RIGHT, "right_elbow"),  # the hand itself stays
         way=[(np.deg2rad(170.0),), (np.deg2rad(-60.0),)],
     )

@@ -71,7 +71,7 @@ def told(coordinates: Sequence[Coordinate], y: Array) -> str:
     """Task coordinates in words: places in cm, angles in degrees."""
     words = []
     for one, value in zip(coordinates, y, strict=True):
-        words.append(f"{np.rad2deg(value):.0f}°" if one.unit == "rad" else f"{one.name.split()[-1]} {100.0 * value:.0f}")
+        words.append(f"{round(np.rad2deg(value))}°" if one.unit == "rad" else f"{one.name.split()[-1]} {round(100.0 * value)}")
     return ", ".join(words) + (" cm" if any(one.unit == "m" for one in coordinates) else "")
 
 

@@ -36,6 +36,6 @@ def example() -> Example:
         spacing=float(np.deg2rad(5.0)),
         motors=BOTH_HANDS,
         start=grasping(model.robot.home, model.robot),
-        markers=(LEFT, RIGHT),
+        markers=(RIGHT, "right_elbow"),  # the hands themselves stay
         way=[(np.deg2rad(0.0),), (np.deg2rad(75.0),)],
     )
