@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 from mobee.roadmap.region import FLAT, Region
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), dimensions=st.integers(1, 4))
 def test_a_place_is_covered_where_one_of_the_simplices_has_it_inside(seed: int, dimensions: int) -> None:
     rng = np.random.default_rng(seed)
