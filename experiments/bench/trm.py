@@ -65,7 +65,7 @@ def measure(settings: Settings) -> dict[str, Any]:
                 progress.show(number / (len(settings.methods) + 1), method)
                 maps[method] = [_timed(example, settings.spacing, method, seed) for seed in range(settings.seeds)]
         progress.show(len(maps) / (len(maps) + 1), "what can be reached")
-        points = reachable(example.model, example.costs, example.task, spacing, example.motors, example.start)
+        points = reachable(example.model, example.costs, example.task, spacing, example.motors, example.start, example.margin)
         points = np.concatenate([points, *(trm.y for runs in maps.values() for trm, _ in runs)])
         for method, runs in maps.items():
             each = [figures | _judged(example, trm, points, spacing) for trm, figures in runs]
@@ -84,7 +84,16 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 def _built(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
     return mobee.build_roadmap(
-        example.model, example.costs, example.task, spacing, example.start, example.motors, method, seed, neighbours=NEIGHBOURS
+        example.model,
+        example.costs,
+        example.task,
+        spacing,
+        example.start,
+        example.motors,
+        method,
+        seed,
+        neighbours=NEIGHBOURS,
+        margin=example.margin,
     )
 
 

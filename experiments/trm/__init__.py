@@ -58,7 +58,7 @@ def work(cell: Cell) -> dict[str, Any]:
     example, method = EXAMPLES[cell.settings["task"]](), cell.settings["method"]
     if method == REACH:
         spacing = np.broadcast_to(example.spacing, len(example.task.names)).astype(np.float64)
-        return {"points": reachable(example.model, example.costs, example.task, spacing, example.motors, example.start)}
+        return {"points": reachable(example.model, example.costs, example.task, spacing, example.motors, example.start, example.margin)}
     return built(example, method, cell.seed)
 
 

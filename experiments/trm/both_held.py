@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import mobee
 from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, TO_THE_LEFT, TO_THE_RIGHT, at_table
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
 
@@ -34,5 +34,6 @@ def example() -> Example:
         spacing=0.02,
         motors=BOTH_HANDS,
         markers=(LEFT, RIGHT),
-        way=[(-0.22, 0.04), (-0.40, 0.04), (-0.30, 0.24), (-0.20, 0.26)],
+        margin=MARGIN,
+        way=[(-0.24, 0.04), (-0.40, 0.04), (-0.30, 0.24), (-0.24, 0.26)],
     )

@@ -31,6 +31,7 @@ def build(
         spacing=example.spacing,
         start=example.start,
         motors=list(example.motors),
+        margin=example.margin,
         method=method,
         seed=seed,
         file=file,

@@ -51,6 +51,7 @@ def reachable(
     spacing: Array,
     motors: Sequence[str] | None = None,
     start: Array | None = None,
+    margin: float = 0.0,
     seed: int = 1,
 ) -> Array:
     """Task points (R, m) that can be reached, densely.
@@ -59,7 +60,7 @@ def reachable(
     at random points, which knows of no neighbours.
     """
     rng = np.random.default_rng(seed)
-    problem = Problem(model, costs, start, motors)
+    problem = Problem(model, costs, start, motors, margin)
     _, flood = flooded(problem, task, spacing / FINER, rng, patience=GENEROUS)
     return np.concatenate([flood, _blind(problem, task, spacing, rng)])
 

@@ -6,7 +6,7 @@ The elbow is never higher than 10 cm below the shoulder; the task space is the p
 from __future__ import annotations
 
 from experiments.trm.body import ONE_HAND, RIGHT, UP, at_table, left_aside
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from mobee import costs, tasks
 
 HIGHEST = 0.05  # m, of the elbow
@@ -24,5 +24,6 @@ def example() -> Example:
         spacing=0.04,
         motors=ONE_HAND,
         start=left_aside(model.robot),
+        margin=MARGIN,
         way=[(-0.26, 0.20, 0.0), (-0.40, 0.06, 0.02), (-0.26, 0.06, 0.22), (-0.22, 0.30, 0.14)],
     )

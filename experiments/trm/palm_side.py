@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.trm.body import ONE_HAND, RIGHT, TO_THE_LEFT, UP, at_table, left_aside
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from mobee import costs, tasks
 
 HEIGHT = 0.0  # m, 10 cm above the table
@@ -21,5 +21,6 @@ def example() -> Example:
         spacing=0.02,
         motors=ONE_HAND,
         start=left_aside(model.robot),
+        margin=MARGIN,
         way=[(-0.20, 0.20), (-0.44, 0.16), (-0.36, -0.08), (-0.26, 0.14)],
     )

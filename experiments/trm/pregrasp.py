@@ -6,7 +6,7 @@ The thesis counts one for every square centimetre of half a square metre, for wh
 from __future__ import annotations
 
 from experiments.trm.body import DOWN, ONE_HAND, RIGHT, UP, at_table, left_aside
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from mobee import costs, tasks
 
 HEIGHT = -0.04  # m, 6 cm above the table
@@ -25,5 +25,6 @@ def example() -> Example:
         spacing=SPACING,
         motors=ONE_HAND,
         start=left_aside(model.robot),
+        margin=MARGIN,
         way=[(-0.20, 0.24), (-0.44, 0.14), (-0.36, 0.30), (-0.18, 0.34)],
     )

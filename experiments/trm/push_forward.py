@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import mobee
 from experiments.trm.body import BOTH_HANDS, LEFT, RIGHT, THUMBS_UP, TO_THE_RIGHT, UP, at_table
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from experiments.trm.grasp import between_palms, held
 from mobee import costs, tasks
 
@@ -35,5 +35,6 @@ def example() -> Example:
         spacing=0.02,
         motors=BOTH_HANDS,
         markers=(LEFT, RIGHT),
-        way=[(-0.20,), (-0.44,)],
+        margin=MARGIN,
+        way=[(-0.26,), (-0.42,)],
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import mobee
 from experiments.trm.body import ONE_HAND, RIGHT, THUMB, UP, at_table, carry, grasping, left_aside
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from mobee import costs, tasks
 
 
@@ -25,5 +25,6 @@ def example() -> Example:
         spacing=0.04,
         motors=ONE_HAND,
         start=grasping(left_aside(model.robot), model.robot, "r"),
-        way=[(-0.40, 0.20, 0.02), (-0.36, 0.10, 0.10), (-0.28, 0.08, 0.26)],
+        margin=MARGIN,
+        way=[(-0.40, 0.20, 0.02), (-0.36, 0.10, 0.10), (-0.28, 0.08, 0.22)],
     )

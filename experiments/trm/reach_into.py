@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import mobee
 from experiments.trm.body import ONE_HAND, RIGHT, alone, left_aside
-from experiments.trm.example import Example
+from experiments.trm.example import MARGIN, Example
 from mobee import Model, costs, tasks
 
 MIDDLE, FLOOR = (-0.27, 0.17), -0.22  # m
@@ -29,6 +29,7 @@ def example() -> Example:
         spacing=0.03,
         motors=ONE_HAND,
         start=left_aside(model.robot),
+        margin=MARGIN,
         way=[(x + 0.06, y, 0.05), (x, y, FLOOR + 0.09), (x - 0.03, y - 0.03, 0.08), (x - 0.10, y - 0.14, 0.06)],
     )
 

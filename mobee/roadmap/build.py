@@ -45,6 +45,7 @@ def build_roadmap(
     seed: int = 0,
     neighbours: int | None = None,
     longest: float | None = LONGEST,
+    margin: float = 0.0,
     file: str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     front: Front = _DEFAULT,
@@ -66,6 +67,8 @@ def build_roadmap(
         seed: of all that is drawn.
         neighbours: None: each vertex is joined to as many before it as there are coordinates (Algorithm 4); else to so many nearest.
         longest: edges along which a motor turns by more [rad] are left out; None: none are.
+        margin: what every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's law pushes motors out of the
+            last 10 degrees, so a robot under it rests only in poses that keep these.
         file: .npz in which what there is is kept at least every 10 s.  If it is there already, with the same settings, the building is gone
             on with.
         progress: called now and then.
@@ -77,11 +80,11 @@ def build_roadmap(
     """
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
-    problem = Problem(model, _with_contacts(costs), start, motors)
+    problem = Problem(model, _with_contacts(costs), start, motors, margin)
     apart = _checked_spacing(task, spacing)
     _check_edges(neighbours, longest)
-    asked = request(model, problem, task, apart, {"seed": seed, "method": method, "neighbours": neighbours, "longest": longest})
-    asked["front"] = asdict(front)
+    how = {"seed": seed, "method": method, "neighbours": neighbours, "longest": longest, "margin": margin, "front": asdict(front)}
+    asked = request(model, problem, task, apart, how)
     draft = Draft(model, asked, apart, file, progress)
     if (finished := draft.finished()) is not None:
         return finished

@@ -22,7 +22,9 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 class Problem:
     """The terms of a cost over some motors, the others as at the start; counts how many poses were evaluated."""
 
-    def __init__(self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None) -> None:
+    def __init__(
+        self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None, margin: float = 0.0
+    ) -> None:
         robot = model.robot
         self.model = solid_model(model)
         self.by_name = named([cost if isinstance(cost, Term) else term(cost) for cost in costs])
@@ -30,7 +32,7 @@ class Problem:
         if not self.terms:
             raise InvalidValue("costs are empty: give terms of mobee.costs, or functions of pose and contacts.")
         self.free = chosen(robot, motors)
-        self.limits = robot.limits[self.free]
+        self.limits = _within(robot.limits[self.free], margin)
         self.start = _start(model, start)
         self.start[self.free] = np.clip(self.start[self.free], *self.limits.T)
         self.must = any(one.tolerance is not None for one in self.terms)
@@ -53,6 +55,14 @@ class Problem:
             if one.tolerance is not None:
                 good &= missing <= one.tolerance
         return total, good
+
+
+def _within(limits: Array, margin: float) -> Array:
+    """The limits (d, 2) less a margin at both ends, but no more than a quarter of a range."""
+    if not (np.isfinite(margin) and margin >= 0.0):
+        raise InvalidValue(f"margin {margin!r} rad: must be finite and at least 0.")
+    kept = np.minimum(margin, 0.25 * (limits[:, 1] - limits[:, 0]))
+    return np.stack([limits[:, 0] + kept, limits[:, 1] - kept], axis=1)
 
 
 def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:

@@ -63,6 +63,7 @@ def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
                 spacing=example.spacing,
                 start=example.start,
                 motors=list(example.motors),
+                margin=example.margin,
                 method=arguments.method,
                 seed=arguments.seed,
                 neighbours=arguments.neighbours,

@@ -75,6 +75,19 @@ def test_motors_that_may_not_move_stay_at_the_start(model: mobee.Model) -> None:
     assert np.array_equal(trm.q[:, still], np.repeat(start[None, still], len(trm.q), axis=0))
 
 
+@pytest.mark.parametrize("method", ["nes", "least_squares"])
+def test_motors_keep_the_margin_from_their_limits(method: str, model: mobee.Model) -> None:
+    margin = 0.2
+    trm = _build(model, method=method, margin=margin)
+    free = [model.robot.motor_index(name) for name in trm.motors]
+    low, high = model.robot.limits[free].T
+    kept = np.minimum(margin, 0.25 * (high - low)) - 1e-9
+    assert len(trm.q) >= 4
+    assert (trm.q[:, free] >= low + kept).all() and (trm.q[:, free] <= high - kept).all()
+    with pytest.raises(mobee.InvalidValue, match="margin"):
+        _build(model, margin=-0.1)
+
+
 def test_the_same_seed_gives_the_same_map_whatever_the_number_of_threads(
     model: mobee.Model, whole: mobee.Roadmap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
