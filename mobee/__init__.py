@@ -16,17 +16,18 @@ from mobee.learning.voronoi import Voronoi
 from mobee.model import Model, Pose
 from mobee.plant import Outcome, Plant
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
-from mobee.roadmap import costs, tasks
-from mobee.roadmap.adaptive import AdaptiveRoadmap
-from mobee.roadmap.build import build_roadmap
-from mobee.roadmap.explorer import MapExplorer
-from mobee.roadmap.front import Front
-from mobee.roadmap.nes import NES
-from mobee.roadmap.ngik import IK, solve_ik
+from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+from mobee.roadmap.adaptive.explorer import MapExplorer
+from mobee.roadmap.adaptive.state_space import roadmap_space
+from mobee.roadmap.adaptive.walker import Walker
+from mobee.roadmap.building import tasks
+from mobee.roadmap.building.build import build_roadmap
+from mobee.roadmap.building.front import Front
+from mobee.roadmap.evolution.nes import NES
+from mobee.roadmap.evolution.search import Restart, minimize
+from mobee.roadmap.ik import costs
+from mobee.roadmap.ik.ngik import IK, solve_ik
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
-from mobee.roadmap.search import Restart, minimize
-from mobee.roadmap.state_space import roadmap_space
-from mobee.roadmap.walker import Walker
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Robot

@@ -12,9 +12,9 @@ from mobee.collision.touch import links_moved
 from mobee.collision.world import World
 from mobee.errors import InvalidValue
 from mobee.model import Model
-from mobee.roadmap import costs
-from mobee.roadmap.least_squares import Descent
-from mobee.roadmap.problem import Problem
+from mobee.roadmap.ik import costs
+from mobee.roadmap.ik.least_squares import Descent
+from mobee.roadmap.ik.problem import Problem
 from mobee.robot.robot import Array, Ints
 
 POINT = 1e-3  # m, radius of what stands for a place
@@ -35,7 +35,7 @@ class Nearest:
 def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
     """The posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
 
-    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.least_squares`: nothing keeps it from
+    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`: nothing keeps it from
     touching, and what it finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker, or
     for what is no place or no q.
     """

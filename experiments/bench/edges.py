@@ -15,8 +15,8 @@ from experiments.bench.rounds import one_core
 from experiments.progress import Progress
 from mobee.roadmap.edge_watch import EdgeWatch
 from mobee.roadmap.edges import STEP, Flags, between, checked
+from mobee.roadmap.ik.solids import solid_model
 from mobee.roadmap.roadmap import Roadmap
-from mobee.roadmap.solids import solid_model
 
 T = TypeVar("T")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.bench.cma_peer import CmaStrategy
-from mobee.roadmap.ngik import STD
-from mobee.roadmap.problem import Problem
-from mobee.roadmap.search import Restart, Search
+from mobee.roadmap.evolution.search import Restart, Search
+from mobee.roadmap.ik.ngik import STD
+from mobee.roadmap.ik.problem import Problem
 from mobee.robot.robot import Array
 
 COOLING = 4000  # poses of one annealing

@@ -13,7 +13,7 @@ import mobee
 from experiments.bench.ik_rivals import annealing, cma, particles, xnes
 from experiments.bench.ik_workload import MOTORS, Target
 from experiments.bench.mink_peer import MinkPeer
-from mobee.roadmap.problem import Problem
+from mobee.roadmap.ik.problem import Problem
 from mobee.robot.robot import Array, Ints
 
 MOST = 20_000  # evaluations of a rival

@@ -8,7 +8,7 @@ import numpy as np
 
 import mobee
 from experiments.bench import workload
-from mobee.roadmap.term import Term
+from mobee.roadmap.ik.term import Term
 from mobee.robot.robot import Array
 
 MARKER = "right_palm"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.cma_peer import CmaStrategy
-from mobee.roadmap.nes import NES
+from mobee.roadmap.evolution.nes import NES
 from mobee.robot.robot import Array
 
 TARGET, STD = 1e-8, 0.5

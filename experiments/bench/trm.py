@@ -15,7 +15,7 @@ from experiments.progress import Progress
 from experiments.trm import pregrasp
 from experiments.trm.coverage import coverage, reachable, valid
 from experiments.trm.example import Example
-from mobee.roadmap.build import LONGEST
+from mobee.roadmap.building.build import LONGEST
 from mobee.roadmap.neighbours import nearest, short
 from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.robot import Array

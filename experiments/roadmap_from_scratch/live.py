@@ -14,7 +14,7 @@ from experiments.roadmap_from_scratch.settings import explorer as made
 from experiments.roadmap_from_scratch.trial import agreement, outcome
 from experiments.run_folder import read, write
 from experiments.walking.live import launch
-from mobee.roadmap.map_store import MapStore
+from mobee.roadmap.adaptive.map_store import MapStore
 
 MODULE = "experiments.roadmap_from_scratch.performer"
 JOB, DONE, STORE = "job.json", "done.json", "map.sqlite"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from experiments.babbling.modes import WORLD
 from mobee import AdaptiveRoadmap, Gains, MapExplorer, Model, MotorParameters, OfflinePlant, Plant, Voronoi, load_robot, load_world
-from mobee.roadmap.map_store import MapStore
+from mobee.roadmap.adaptive.map_store import MapStore
 from mobee.roadmap.ompl import query
 from mobee.robot.robot import Robot
 

@@ -10,7 +10,7 @@ from experiments.control.listed import is_listed
 from experiments.control.ride import place
 from experiments.roadmap_from_scratch.settings import PART, explorer, offline_plant
 from mobee import AdaptiveRoadmap, MobeeError, OfflinePlant
-from mobee.roadmap.walker import NEAR
+from mobee.roadmap.adaptive.walker import NEAR
 from mobee.robot.robot import Array
 
 LOOK = 5  # ticks, 0.1 s

@@ -10,11 +10,11 @@ from scipy.spatial import cKDTree
 
 import mobee
 from mobee.engine.pack import Flags
-from mobee.roadmap.flood import Patience, flooded
-from mobee.roadmap.goals import Goals
-from mobee.roadmap.problem import Cost, Problem
-from mobee.roadmap.solids import solid_robot
-from mobee.roadmap.task import Task
+from mobee.roadmap.building.flood import Patience, flooded
+from mobee.roadmap.building.goals import Goals
+from mobee.roadmap.building.task import Task
+from mobee.roadmap.ik.problem import Cost, Problem
+from mobee.roadmap.ik.solids import solid_robot
 from mobee.robot.robot import Array
 
 FINER = 2  # points of the flood along a spacing

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.drawing.filmstrip import View
 from mobee import Model
-from mobee.roadmap.task import Task
-from mobee.roadmap.term import Term
+from mobee.roadmap.building.task import Task
+from mobee.roadmap.ik.term import Term
 from mobee.robot.robot import Array
 
 MARGIN = float(np.deg2rad(10.0))  # the default law lets no motor rest nearer to a limit

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.trm.body import LEFT, RIGHT, carry
 from mobee import Geometry, Model, costs
-from mobee.roadmap.term import Term
+from mobee.roadmap.ik.term import Term
 
 THING = "held"
 

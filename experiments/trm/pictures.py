@@ -13,8 +13,8 @@ from experiments.drawing.filmstrip import Strip, filmstrip, pictures_of
 from experiments.drawing.motion import Motion, motion_through
 from experiments.drawing.sheet import Panel
 from experiments.trm.example import Example
+from mobee.roadmap.building.task import Coordinate
 from mobee.roadmap.roadmap import Roadmap
-from mobee.roadmap.task import Coordinate
 from mobee.robot.robot import Array
 
 STEP = 0.05  # rad of the motor that moves most, between two poses of a film

@@ -9,8 +9,8 @@ from mobee.collision.world_object import WorldObject
 from mobee.engine.layout import ROW_BOUND, convex_row, volume_row
 from mobee.model import Model
 from mobee.roadmap.edges import STEP, Flags, check_edges, points
-from mobee.roadmap.solids import solid_model
-from mobee.roadmap.vectors import lengths
+from mobee.roadmap.ik.solids import solid_model
+from mobee.roadmap.ik.vectors import lengths
 from mobee.robot.robot import Array, Ints, Shape
 
 _LONGER = 1.1  # than the straight lines over the middle is the way of a shape, at most: its motors turn by no more than about 1 rad

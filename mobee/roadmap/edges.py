@@ -12,7 +12,7 @@ from mobee.engine import engine_of
 from mobee.engine.hands import hands
 from mobee.errors import InvalidValue
 from mobee.model import Model
-from mobee.roadmap.solids import solid_model
+from mobee.roadmap.ik.solids import solid_model
 from mobee.robot.robot import Array, Ints
 
 STEP = 0.001  # m

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
 from mobee.model import Model
+from mobee.roadmap.ik.problem import chosen
+from mobee.roadmap.ik.solids import solid_model
 from mobee.roadmap.ompl_base import EXTENSIONS, Free, Grown, OmplMissing, connected, grown, require_ompl
-from mobee.roadmap.problem import chosen
-from mobee.roadmap.solids import solid_model
 from mobee.robot.robot import Array
 
 __all__ = ["OmplMissing", "prm", "prm_star", "query", "require_ompl", "rrt_connect"]

@@ -15,7 +15,7 @@ from mobee.roadmap.archive import read, write
 from mobee.roadmap.fingerprint import robot_digest, world_digest
 from mobee.roadmap.free_way import free_way
 from mobee.roadmap.graph import Graph, graph
-from mobee.roadmap.problem import chosen
+from mobee.roadmap.ik.problem import chosen
 from mobee.roadmap.told_world import told_world, world_told
 from mobee.robot.load import load_robot, shipped_robots
 from mobee.robot.robot import Array, Ints, Robot

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.progress import Progress
-from mobee.roadmap.ngik import METHODS
+from mobee.roadmap.ik.ngik import METHODS
 from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
 
 NOTES = """The map is on disk every 10 s: after Ctrl-C, or a crash, the same command goes

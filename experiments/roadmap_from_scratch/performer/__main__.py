@@ -12,7 +12,7 @@ from experiments.roadmap_from_scratch.performer.config import Config
 from experiments.roadmap_from_scratch.settings import PART, explorer
 from experiments.run_folder import read, write
 from mobee import ActionInterrupted, load_robot
-from mobee.roadmap.map_store import MapStore
+from mobee.roadmap.adaptive.map_store import MapStore
 from services.common.bus_plant import BusPlant
 from services.common.config import load_config
 from services.common.entry import explained

@@ -11,7 +11,7 @@ from experiments.bench.ik import FINE, REQUIREMENTS, Settings, measure, report
 from experiments.bench.ik_solvers import RIVALS
 from experiments.bench.ik_workload import BOXES, MOTORS, scene, targets
 from experiments.bench.mink_peer import MinkMissing, MinkPeer
-from mobee.roadmap.problem import Problem
+from mobee.roadmap.ik.problem import Problem
 
 
 @pytest.fixture(scope="module")

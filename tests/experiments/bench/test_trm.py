@@ -4,7 +4,7 @@ import pytest
 
 from experiments.bench.trm import LEAST_SQUARES, Settings, measure, report
 from experiments.trm import coverage
-from mobee.roadmap.flood import Patience
+from mobee.roadmap.building.flood import Patience
 
 
 @pytest.fixture(scope="module")

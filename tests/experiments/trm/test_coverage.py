@@ -7,8 +7,8 @@ import mobee
 from experiments.trm import coverage as module
 from experiments.trm.coverage import coverage, reachable, valid
 from mobee import costs, tasks
-from mobee.roadmap.flood import Patience, flooded
-from mobee.roadmap.problem import Problem
+from mobee.roadmap.building.flood import Patience, flooded
+from mobee.roadmap.ik.problem import Problem
 from tests.mobee.planar import planar_arm
 
 SPACING = np.array([0.15, 0.15])

@@ -5,8 +5,8 @@ import pytest
 
 import mobee
 from experiments.trm.examples import EXAMPLES
-from mobee.roadmap.task import Task
-from mobee.roadmap.term import Term
+from mobee.roadmap.building.task import Task
+from mobee.roadmap.ik.term import Term
 
 
 def at(task: Task, y: tuple[float, ...], spacing: float) -> list[Term]:

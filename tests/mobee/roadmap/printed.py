@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mobee import minimize
-from mobee.roadmap.region import Region
+from mobee.roadmap.building.region import Region
 
 D = 1.0
 

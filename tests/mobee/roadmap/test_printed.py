@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.roadmap.judge import counted
-from mobee.roadmap.term import Term
+from mobee.roadmap.building.judge import counted
+from mobee.roadmap.ik.term import Term
 from tests.mobee.roadmap.printed import D, run, scalar, vector
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mobee.roadmap.judge import Seen
+from mobee.roadmap.building.judge import Seen
 
 LIMITS = np.array([[-1.5, 1.5], [0.1, 2.5], [-2.0, 2.0]])
 

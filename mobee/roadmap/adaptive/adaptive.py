@@ -1,0 +1,241 @@
+"""Adaptive roadmaps: maps that hold every motion for possible until it failed (thesis 4.2)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.edge_table import Edges, edges_of, joined, table_of
+from mobee.learning.exploit import target_states
+from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
+from mobee.roadmap.adaptive.edge_beliefs import EdgeBeliefs, Mode
+from mobee.robot.robot import Array, Ints
+
+NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)
+
+
+class AdaptiveRoadmap:
+    """A roadmap without edge checks, and what was observed of its edges.
+
+    It is a Markov decision process of the simplest kind: states are vertices, actions are edges, and an action ends at
+    its goal or where it began.  So its graph is a `Space`, its knowledge an `OutcomeModel`: `mobee.Planner` and
+    `mobee.value_iteration` plan on `roadmap.space` and `roadmap.beliefs` as on those of a curious agent.  `plan` finds
+    the same ways faster: an edge of length d that works with probability p costs d / p, for it has to be begun 1 / p times.
+
+    Args:
+        space: vertices and edges over joints of one part, e.g. `mobee.Voronoi(robot, joints, 20, neighbours=10)`
+            or `mobee.roadmap_space(roadmap)`.
+        mode: what becomes of an edge that failed, "remove" (thesis) or "reweigh"; see `EdgeBeliefs`.
+        forgetting: see `EdgeBeliefs`.
+        both_ways: whether what is observed of an edge is held for true of the way back, too.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
+    """
+
+    def __init__(self, space: Space, mode: Mode = "remove", forgetting: float = 1.0, both_ways: bool = False) -> None:
+        self.space = space
+        self.both_ways = both_ways
+        self.beliefs = EdgeBeliefs(space.goals, mode, forgetting)
+
+    def __len__(self) -> int:
+        return len(self.space)
+
+    def __repr__(self) -> str:
+        return f"<AdaptiveRoadmap of {self.space.part}: {len(self)} vertices, {self.space.state_actions} edges, {self.tried} tried>"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the map was made from, as plain JSON values."""
+        beliefs = self.beliefs
+        made = {"mode": beliefs.mode, "forgetting": beliefs.forgetting, "both_ways": self.both_ways}
+        return made | {"space": self.space.settings}
+
+    @property
+    def tried(self) -> int:
+        """How many edges were tried."""
+        return int((self.beliefs.tried > 0).sum())
+
+    @property
+    def unexplored(self) -> Ints:
+        """The edges that were never tried, as rows of (state, action)."""
+        return np.argwhere((self.space.goals != NO_ACTION) & (self.beliefs.tried == 0))
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Which edges ended at their goal when they were last tried, shape (S, A)."""
+        return (self.beliefs.tried > 0) & self.beliefs.last
+
+    @property
+    def stuck(self) -> Ints:
+        """Vertices from which every edge was tried and failed when it was tried last (thesis 4.3.1)."""
+        return np.flatnonzero(~self.beliefs.last.any(axis=1))
+
+    @property
+    def lengths(self) -> Array:
+        """Of the edges in the joints' space, shape (S, A), in [rad]; 0 where there is no edge."""
+        space = self.space
+        ways = space.samples[space.goals] - space.samples[:, None]
+        return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((ways**2).sum(axis=-1)))
+
+    def plan(self, start: int, goals: ArrayLike) -> tuple[int, ...]:
+        """The cheapest vertices from a start to one of the goals, both included.
+
+        Raises InvalidValue for no such vertex, MobeeError if no way is left.
+        """
+        here = int(target_states(self.space, start)[0])
+        targets = set(target_states(self.space, goals).tolist())
+        left, edges = self.costs(goals), self._edge_costs()
+        if not np.isfinite(left[here]):
+            raise MobeeError(
+                f"no way is left in the map from vertex {here} to {sorted(targets)}: what failed was taken out. "
+                "Grow the map, repair it by a single query, or let it reweigh edges instead of removing them."
+            )
+        path = [here]
+        while path[-1] not in targets:
+            row = self.space.goals[path[-1]]
+            onward = np.where(np.isfinite(edges[path[-1]]), edges[path[-1]] + left[row], np.inf)
+            path.append(int(row[onward.argmin()]))
+        return tuple(path)
+
+    def costs(self, goals: ArrayLike) -> Array:
+        """What it costs to come from each vertex to the nearest of the goals, shape (S,), infinite where no way is left."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import dijkstra
+
+        edges = self._edge_costs()
+        states, actions = np.nonzero(np.isfinite(edges))
+        back = (self.space.goals[states, actions], states)
+        graph = csr_array((edges[states, actions], back), shape=(len(self), len(self)))
+        found: Array = dijkstra(graph, indices=target_states(self.space, goals), min_only=True)
+        return found
+
+    def reward(self, goals: ArrayLike) -> Array:
+        """The reward (S, A) with which value iteration finds the ways of `plan`: minus the length of an edge.
+
+        -inf takes out what is removed, leads nowhere, or begins in a goal.
+        """
+        left = self.costs(goals)
+        usable = np.isfinite(self._edge_costs()) & np.isfinite(left)[self.space.goals] & np.isfinite(left)[:, None]
+        usable[target_states(self.space, goals)] = False
+        return np.where(usable, -self.lengths, -np.inf)
+
+    def reachable(self, start: int) -> NDArray[np.bool_]:
+        """The vertices to which a way is left from one, itself included, shape (S,)."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import breadth_first_order
+
+        states, actions = np.nonzero(np.isfinite(self._edge_costs()))
+        graph = csr_array((np.ones(len(states)), (states, self.space.goals[states, actions])), shape=(len(self), len(self)))
+        found = np.zeros(len(self), dtype=bool)
+        found[breadth_first_order(graph, int(target_states(self.space, start)[0]), return_predecessors=False)] = True
+        return found
+
+    def next_target(self, start: int, rng: np.random.Generator) -> int | None:
+        """A vertex to explore next from a start, drawn in proportion to its untried edges (thesis 4.3.1).
+
+        None: of the vertices that can be reached all edges were tried.
+        """
+        untried = np.bincount(self.unexplored[:, 0], minlength=len(self)) * self.reachable(start)
+        total = int(untried.sum())
+        return int(rng.choice(len(self), p=untried / total)) if total else None
+
+    def observe(self, state: int, action: int, arrived: int) -> None:
+        """Take that an edge, begun in a state, ended at vertex `arrived`: its goal, or anything else."""
+        goal = self.space.goal(state, action)
+        self.beliefs.observe(state, action, arrived == goal)
+        back = self.action(goal, state) if self.both_ways else None
+        if back is not None:
+            self.beliefs.observe(goal, back, arrived == goal)
+
+    def action(self, state: int, goal: int) -> int | None:
+        """The edge from a vertex to another, None if there is none."""
+        found = np.flatnonzero(self.space.actions(state) == goal)
+        return int(found[0]) if len(found) else None
+
+    def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
+        """Add poses of the joints (N, d) rad, joined both ways to the nearest vertices; returns their numbers."""
+        new = self._new(samples)
+        poses, old = np.concatenate([self.space.samples, new]), len(self)
+        spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
+        edges = []
+        for vertex in range(old, len(poses)):
+            away = np.linalg.norm((poses - poses[vertex]) / spans, axis=1)
+            away[vertex] = np.inf
+            for near in np.argsort(away, kind="stable")[: min(neighbours, len(poses) - 1)].tolist():
+                edges += [(vertex, near), (near, vertex)]
+        self._change(poses, [*edges_of(self.space.goals), *edges], np.arange(old))
+        return np.arange(old, len(poses))
+
+    def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
+        """Add a way from a vertex to another through poses of the joints (K, d) rad, K at least 1; returns their numbers.
+
+        So a vertex without a way out is repaired: with what a planner of single queries finds.
+        """
+        first, last = (int(target_states(self.space, vertex)[0]) for vertex in (state, goal))
+        new, old = self._new(samples), len(self)
+        chain = [first, *range(old, old + len(new)), last]
+        edges = [pair for one, other in zip(chain, chain[1:], strict=False) for pair in ((one, other), (other, one))]
+        self._change(np.concatenate([self.space.samples, new]), [*edges_of(self.space.goals), *edges], np.arange(old))
+        return np.arange(old, old + len(new))
+
+    def prune(self, start: int) -> Ints:
+        """Take out what cannot be reached from a vertex, and edges that failed where others are left.
+
+        A vertex always keeps an edge, if need be a new one to the nearest vertex.  Returns the new number of every
+        vertex, -1 of those that are gone, shape (S,).
+        """
+        kept = np.flatnonzero(self.reachable(start))
+        if len(kept) < 2:
+            raise MobeeError(f"from vertex {start} no other can be reached: repair it first, or prune from another one.")
+        number = np.full(len(self), -1)
+        number[kept] = np.arange(len(kept))
+        dead = self.beliefs.mode == "remove"
+        edges: Edges = []
+        for state in kept.tolist():
+            row = [(state, goal) for goal in self.space.actions(state).tolist() if number[goal] >= 0]
+            sound = [edge for edge, works in zip(row, self._works(row), strict=True) if works] if dead else row
+            edges += sound or row or [(state, self._nearest(state, kept))]
+        self._change(self.space.samples[kept], [(int(number[s]), int(number[g])) for s, g in edges], number)
+        return number
+
+    def _works(self, edges: Edges) -> list[bool]:
+        found = (self.action(state, goal) for state, goal in edges)
+        return [action is not None and bool(self.beliefs.last[state, action]) for (state, _), action in zip(edges, found, strict=True)]
+
+    def _nearest(self, state: int, others: Ints) -> int:
+        away = np.linalg.norm(self.space.samples[others] - self.space.samples[state], axis=1)
+        return int(others[np.where(others == state, np.inf, away).argmin()])
+
+    def _new(self, samples: ArrayLike) -> Array:
+        new = np.atleast_2d(np.asarray(samples, dtype=np.float64))
+        if new.ndim != 2 or new.shape[1] != len(self.space.joints) or not len(new) or not np.isfinite(new).all():
+            joints = ", ".join(self.space.joints)
+            raise InvalidValue(f"samples have shape {np.shape(samples)}: give at least one finite pose of {joints}, shape (N, d), in rad.")
+        return new
+
+    def _change(self, samples: Array, edges: Edges, number: Ints) -> None:
+        """Another graph; `number` (S,) says what became of the vertices, and knowledge of edges that are still there stays."""
+        before, old = self.beliefs, self.space
+        goals = table_of(joined(edges), len(samples))
+        self.space = Space(old.robot, old.joints, samples, goals, old.rest)
+        states, actions, rows, columns = [], [], [], []
+        for state, action in np.argwhere(old.goals != NO_ACTION).tolist():
+            now, goal = int(number[state]), int(number[old.goals[state, action]])
+            here = self.action(now, goal) if now >= 0 and goal >= 0 else None
+            if here is not None:
+                states.append(now)
+                actions.append(here)
+                rows.append(state)
+                columns.append(action)
+        self.beliefs = before.moved(self.space.goals, np.array(states), np.array(actions), (np.array(rows), np.array(columns)))
+
+    def _edge_costs(self) -> Array:
+        """Length over probability, shape (S, A), infinite for what is no edge or is removed."""
+        p, lengths = self.beliefs.success, self.lengths
+        costs: Array = np.divide(lengths, p, out=np.full(p.shape, np.inf), where=p > 0.0)
+        return costs

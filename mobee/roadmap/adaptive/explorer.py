@@ -1,0 +1,120 @@
+"""Who finds out which edges of an optimistic map work (thesis 4.3.1)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mobee.errors import MobeeError
+from mobee.learning.draws import Draws
+from mobee.plant import Plant
+from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.walker import NEAR, Walker
+from mobee.robot.robot import Array
+
+QUERIES = 3  # ways to one vertex that are asked for, before it is given up
+
+Query = Callable[[Array, Array], Array | None]
+
+
+class MapExplorer(Walker):
+    """A Walker that goes where untried edges are, until all are tried that can be come to.
+
+    Where it gets stuck, as a vertex may have feasible edges in and none out, it asks for a single way back to what is left to try,
+    and joins that to the map.  An explorer that is started again on its store goes on.
+
+    Args:
+        roadmap, plant, near, store: see Walker; it always goes back where an edge failed.
+        seed: of its choices.
+        query: finds a way where the map has none: from a pose of the joints (d,) to one of several (G, d), as poses (K, d)
+            from the first to the last, or None; e.g. of `mobee.roadmap.ompl.rrt_connect`.  None: it stays where it is stuck.
+    """
+
+    def __init__(
+        self,
+        roadmap: AdaptiveRoadmap,
+        plant: Plant,
+        near: float = NEAR,
+        seed: int = 0,
+        query: Query | None = None,
+        store: MapStore | None = None,
+    ) -> None:
+        self.seed = seed
+        super().__init__(roadmap, plant, near, True, store)
+        self.repairs = 0
+        """Ways that the query found since it was started."""
+        self._query, self._draws = query, Draws(f"map of {self.part}")
+        self._asked_for: Counter[int] = Counter()
+        self._target: int | None = None
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """See Walker."""
+        return super().settings | {"seed": self.seed}
+
+    def explore(self, edges: int | None = None) -> bool:
+        """Try edges, at most so many; whether all were tried that can be come to.  Raises ActionInterrupted if the plant does."""
+        done = 0
+        while edges is None or done < edges:
+            here = self.enter()
+            goal = self._choice(here)
+            if goal is not None:
+                self.follow(here, goal)
+                done += 1
+            elif not self._escape(here):
+                return True
+        return False
+
+    def _choice(self, here: int) -> int | None:
+        """Where to go now: along an untried edge if this is where they are looked for, else on to there; None: nothing is left."""
+        draws, roadmap = self._draws.at(self.seed, self.record.transitions), self.roadmap
+        untried = roadmap.unexplored
+        if self._target is None or self._target == here or not self._is_worth_it(here):
+            self._target = here if (untried[:, 0] == here).any() else roadmap.next_target(here, draws)
+        if self._target is None:
+            return None
+        if self._target == here:
+            return roadmap.space.goal(here, int(draws.choice(untried[untried[:, 0] == here, 1])))
+        return roadmap.plan(here, self._target)[1]
+
+    def _is_worth_it(self, here: int) -> bool:
+        return bool(self.roadmap.reachable(here)[self._target]) and bool((self.roadmap.unexplored[:, 0] == self._target).any())
+
+    def _escape(self, here: int) -> bool:
+        """Join this vertex to where something is left to try, by the query; whether it found a way."""
+        left = sorted({*self.roadmap.unexplored[:, 0].tolist()} - self.record.joined - {here})
+        others = [vertex for vertex in left if self._asked_for[vertex] < QUERIES]
+        if self._query is None or not others:
+            return False
+        space = self.roadmap.space
+        way = self._query(self.plant.measure(self.part)[space.columns], space.samples[others])
+        if way is None:
+            self._asked_for.update(QUERIES * others)
+            return False
+        goal = others[int(np.abs(space.samples[others] - way[-1]).max(axis=1).argmin())]
+        self._asked_for[goal] += 1
+        between = way[1:-1] if len(way) > 2 else 0.5 * (way[:1] + way[-1:])
+        self.record.change("join", state=here, samples=between.tolist(), goal=goal)
+        self.repairs += 1
+        return True
+
+    def _door(self, near: list[int]) -> int:
+        try:
+            return super()._door(near)
+        except MobeeError:
+            if self._query is None:
+                raise
+        space = self.roadmap.space
+        way = self._query(self.plant.measure(self.part)[space.columns], space.samples[near])
+        for pose in () if way is None else way[1:]:
+            target = space.target(near[0])
+            target[space.columns] = pose
+            q = self.plant.act(self.part, target).q
+            nearest = self._nearest(q)
+            if self._is_at(q, nearest[0]):
+                return nearest[0]
+        return super()._door(self._nearest(self.plant.measure(self.part)))

@@ -1,0 +1,149 @@
+"""Who walks on an adaptive map: acts through a plant, sees which edges work, and plans anew at once (thesis 4.2, 4.3.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.exploit import target_states
+from mobee.plant import Outcome, Plant
+from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+from mobee.roadmap.adaptive.map_record import MapRecord
+from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.robot.robot import Array
+
+NEAR = 0.15  # rad: within so much of a vertex in every joint the part is there
+DOORS = 5  # nearest vertices that are tried when it is beside the map
+TRAIL = 50  # vertices back the way it came that are tried before
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """How a walk ended: whether in a goal, after how many edges, and how many of them failed."""
+
+    arrived: bool
+    edges: int
+    bumps: int
+
+
+class Walker:
+    """Moves one part along the edges of an adaptive map.
+
+    An edge is whatever motion comes of the command to go to its goal.  It worked if the part comes to rest within `near` of the
+    goal; else the part goes back to where it began (thesis 4.1: the reflex), the map learns of it, and the way is planned anew.
+
+    Args:
+        roadmap: which it changes.
+        plant: through which it acts; its robot must be the map's.
+        near: rad, in every joint of the map.
+        back: whether it always goes back first; False: it goes on at once to the next vertex of the new way, and back only
+            if it does not come there.
+        store: where what is observed goes, and comes from: on a store that holds something the walker goes on.
+
+    Raises:
+        InvalidValue: a plant of another robot.
+        MobeeError: the store is of another map.
+    """
+
+    def __init__(
+        self, roadmap: AdaptiveRoadmap, plant: Plant, near: float = NEAR, back: bool = True, store: MapStore | None = None
+    ) -> None:
+        if plant.robot.motors != roadmap.space.robot.motors:
+            raise InvalidValue(
+                f"the plant moves {plant.robot.name!r}, the map is of {roadmap.space.robot.name!r}: make both from one robot."
+            )
+        self.roadmap, self.plant, self.part = roadmap, plant, roadmap.space.part
+        self.near, self.back = near, back
+        self.here: int | None = None
+        """The vertex where the part is; None: beside the map, or not known."""
+        self._trail: list[int] = []  # the vertices where it was, the last at the end
+        self.record = MapRecord(roadmap, store, self.settings)
+        """What was observed and changed; changes go through it, and set `here` to None where vertices may have got new numbers."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides what it does, but for the plant, as plain JSON values."""
+        return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
+
+    def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
+        """Go to one of the goals, planning anew wherever an edge fails, over at most so many edges.
+
+        Raises MobeeError if no way is left, ActionInterrupted if the plant does.
+        """
+        targets = set(target_states(self.roadmap.space, goals).tolist())
+        edges, bumps = 0, 0
+        here = self.enter()
+        while here not in targets:
+            if most is not None and edges >= most:
+                return Walk(False, edges, bumps)
+            worked = self.follow(here, self.roadmap.plan(here, goals)[1])
+            edges, bumps = edges + 1, bumps + (not worked)
+            here = self.enter() if worked or self.back else self._onward(here, goals)
+        return Walk(True, edges, bumps)
+
+    def follow(self, state: int, goal: int) -> bool:
+        """Go along one edge from where the part is and observe it; whether it worked.  If not, and `back` says so, go back."""
+        action = self.roadmap.action(state, goal)
+        if action is None:
+            raise InvalidValue(f"the map has no edge from {state} to {goal}: valid are {self.roadmap.space.actions(state).tolist()}.")
+        outcome = self._move(goal)
+        worked = self._is_at(outcome.q, goal)
+        self.record.observe(state, action, goal if worked else state, outcome)
+        self._trail = [*self._trail[-TRAIL:], state]
+        if worked:
+            self.here = goal
+        elif self.back and self._comes_to(state):
+            self.here = state
+        return worked
+
+    def enter(self) -> int:
+        """The vertex where the part is; if it is beside the map, the first to which it comes: back the way it came, then of the nearest.
+
+        Raises MobeeError if it comes to none.
+        """
+        if self.here is None:
+            q = self.plant.measure(self.part)
+            near = self._nearest(q)
+            self.here = near[0] if self._is_at(q, near[0]) else self._door(near)
+        return self.here
+
+    def _door(self, near: list[int]) -> int:
+        trail, self._trail = self._trail, []
+        for last in range(len(trail) - 1, -1, -1):
+            if trail[last] < len(self.roadmap) and trail[last] not in trail[last + 1 :] and self._comes_to(trail[last]):
+                self._trail = trail[:last]
+                return trail[last]
+        for vertex in near[:DOORS]:
+            if self._comes_to(vertex):
+                return vertex
+        raise MobeeError(f"{self.part} is beside the map, and comes to none of the vertices {near[:DOORS]}: add samples near it.")
+
+    def _comes_to(self, vertex: int) -> bool:
+        return self._is_at(self._move(vertex).q, vertex)
+
+    def _onward(self, state: int, goals: ArrayLike) -> int:
+        """On to the next vertex of the new way, without going back first; back if that fails."""
+        way = self.roadmap.plan(state, goals)
+        for vertex in (way[1], state):
+            if self._comes_to(vertex):
+                self.here = vertex
+                break
+        return self.enter()
+
+    def _move(self, vertex: int) -> Outcome:
+        self.here = None  # until the action has ended
+        return self.plant.act(self.part, self.roadmap.space.target(vertex))
+
+    def _is_at(self, q: Array, vertex: int) -> bool:
+        space = self.roadmap.space
+        return bool(np.abs(q[space.columns] - space.samples[vertex]).max() <= self.near)
+
+    def _nearest(self, q: Array) -> list[int]:
+        """All vertices, the nearest first."""
+        space = self.roadmap.space
+        away = np.abs(space.samples - q[space.columns]).max(axis=1)
+        return [int(vertex) for vertex in np.argsort(away, kind="stable")]

@@ -1,0 +1,1 @@
+"""Task-relevant roadmaps: task spaces, the advancing front, and the flood (thesis 3.3)."""

@@ -1,0 +1,1 @@
+"""Evolution strategies (thesis 3.2)."""

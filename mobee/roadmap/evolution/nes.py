@@ -1,0 +1,128 @@
+"""Natural evolution strategies: a normal distribution that climbs down a cost by ranks alone (Glasmachers et al. 2010, thesis 3.2)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.roadmap.evolution.rates import default_population, path_rates, published_utilities
+from mobee.roadmap.evolution.shapes import stretched, turned
+from mobee.robot.robot import Array
+
+Method = Literal["full", "separable", "xnes", "snes"]
+METHODS: tuple[str, ...] = get_args(Method)
+
+
+class NES:
+    """A search distribution; `ask` for a generation, `tell` what its samples cost.
+
+    The same seed gives the same samples.  Only the order of the costs counts, so that f and any growing function of f give the
+    same search.
+
+    Args:
+        start: (d,) mean to start from.
+        std: standard deviation, one number or (d,).
+        population: samples a generation; None: 4 + 3 ln(d), at least 5.
+        method: "full": exponential NES with an evolution path and negative weights; "separable": the same with a diagonal shape, for
+            many dimensions; "xnes" and "snes": the published full and diagonal forms with their rates, which need more samples
+            (docs/roadmaps.md).
+        seed: of the samples; or a generator to draw them from.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        std: ArrayLike,
+        population: int | None = None,
+        method: Method = "full",
+        seed: int | np.random.Generator = 0,
+    ) -> None:
+        mean = np.array(start, dtype=np.float64)
+        if mean.ndim != 1 or not len(mean) or not np.isfinite(mean).all():
+            raise InvalidValue(f"start has shape {mean.shape}; it must be (d,) finite numbers, d at least 1.")
+        if method not in METHODS:
+            raise UnknownName("method", method, METHODS)
+        d = len(mean)
+        try:
+            scale = np.broadcast_to(np.asarray(std, dtype=np.float64), (d,)).copy()
+        except ValueError:
+            raise InvalidValue(f"std has shape {np.shape(std)}; it must be one number, or ({d},) like the start.") from None
+        if not (np.isfinite(scale).all() and (scale > 0.0).all()):
+            raise InvalidValue(f"std is {std!r}; it must be finite and above 0.")
+        size = default_population(d) if population is None else population
+        if size < 4:
+            raise InvalidValue(f"population {population}: must be at least 4, or None.")
+        self.mean = mean
+        self.sigma = 1.0  # in units of the std at the start
+        self.shape = np.ones(d) if method in ("separable", "snes") else np.eye(d)
+        self.path = np.zeros(d)
+        self.population = size
+        self.generations = 0
+        self._scale = scale
+        self._published = method in ("xnes", "snes")
+        self._rates = path_rates(d, size, separable=method == "separable")
+        self._utilities = published_utilities(size)
+        self._rng = np.random.default_rng(seed)
+        self._z: Array | None = None
+
+    @property
+    def std(self) -> Array:
+        """The standard deviation along each coordinate, (d,)."""
+        spread = self.shape if self.shape.ndim == 1 else np.sqrt((self.shape**2).sum(axis=1))
+        deviation: Array = self.sigma * self._scale * spread
+        return deviation
+
+    def ask(self) -> Array:
+        """The next generation, (population, d); asked again before `tell`, another one."""
+        self._z = self._rng.standard_normal((self.population, len(self.mean)))
+        samples: Array = self.mean + self.sigma * self._scale * stretched(self.shape, self._z)
+        return samples
+
+    def tell(self, costs: ArrayLike) -> None:
+        """Follow the costs (population,) of the samples that `ask` gave; +inf is worst, NaN raises InvalidValue."""
+        values = np.asarray(costs, dtype=np.float64)
+        if self._z is None:
+            raise InvalidValue("tell without ask: the costs belong to samples; ask first.")
+        if values.shape != (self.population,) or np.isnan(values).any():
+            raise InvalidValue(f"costs have shape {values.shape}; they must be ({self.population},) numbers, none of them NaN.")
+        z = self._z[np.argsort(values, kind="stable")]
+        self._z = None
+        self.generations += 1
+        if self._published:
+            self._follow_published(z)
+        else:
+            self._follow(z)
+
+    def _follow(self, z: Array) -> None:
+        """Step size by the length of the path, shape by the path and all samples; the worse ones at the length of an average one."""
+        rates, d = self._rates, len(self.mean)
+        positive = np.maximum(rates.weights, 0.0)
+        step = positive @ z
+        self.mean = self.mean + self.sigma * self._scale * stretched(self.shape, step)
+        self.path = (1.0 - rates.path) * self.path + math.sqrt(rates.path * (2.0 - rates.path) * rates.effective) * step
+        growth = rates.path / rates.damping * (float(np.linalg.norm(self.path)) / rates.length - 1.0)
+        self.sigma *= math.exp(min(1.0, growth))
+        lengths = (z**2).sum(axis=1)
+        weights = np.where(rates.weights < 0.0, rates.weights * d / lengths, rates.weights)
+        shrink = rates.rank_one + rates.rank_all * rates.weights.sum()
+        directions = np.concatenate([self.path[None], z])
+        self.shape = turned(self.shape, directions, np.concatenate([[rates.rank_one], rates.rank_all * weights]), shrink)
+
+    def _follow_published(self, z: Array) -> None:
+        """The published forms: the trace of the gradient is the step size's, the rest the shape's."""
+        u, d = self._utilities, len(self.mean)
+        self.mean = self.mean + self.sigma * self._scale * stretched(self.shape, u @ z)
+        if self.shape.ndim == 1:
+            self.shape = turned(self.shape, z, (3.0 + math.log(d)) / (5.0 * math.sqrt(d)) * u, 0.0)
+            return
+        rate = 0.6 * (3.0 + math.log(d)) / (d * math.sqrt(d))
+        trace = float(u @ (z**2).sum(axis=1)) / d
+        self.sigma *= math.exp(0.5 * rate * trace)
+        self.shape = turned(self.shape, z, rate * u, rate * trace)

@@ -1,0 +1,156 @@
+"""A search by evolution strategy that stays in a box and begins anew where it is stuck."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.errors import InvalidValue
+from mobee.roadmap.evolution.nes import NES, Method
+from mobee.robot.robot import Array
+
+PENALTY = 100.0  # of a sample that was moved back into the box: times its squared way in box widths
+EVALUATIONS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """When a search begins anew, in turn from a random place of the box and from its start.
+
+    `std`: the largest standard deviation has fallen below this share of the box; `gain`: that many generations (`patience`) have
+    not lowered the best cost by this share.
+    """
+
+    std: float = 1e-3
+    patience: int = 40
+    gain: float = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """The best sample x (d,), its cost, how many were evaluated, and how often the search began (1: no restart)."""
+
+    x: Array
+    cost: float
+    evaluations: int
+    starts: int
+
+
+class Search:
+    """`ask` gives a generation inside the box, `tell` takes its costs; the best sample of all is kept.
+
+    Args:
+        start, std, population, method, seed: as of NES.
+        limits: (d, 2) box that no sample leaves: those outside are moved to its border, and cost more for it.  None: no box.
+        restart: when to begin anew; needs limits.  None: never.
+
+    Raises:
+        InvalidValue, UnknownName: with what is valid.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        std: ArrayLike,
+        limits: ArrayLike | None = None,
+        restart: Restart | None = None,
+        population: int | None = None,
+        method: Method = "full",
+        seed: int | np.random.Generator = 0,
+    ) -> None:
+        first = np.array(start, dtype=np.float64)
+        if limits is None and restart is not None:
+            raise InvalidValue("a restart begins at a random place of the box, so it needs limits (d, 2).")
+        self._low, self._high = np.zeros(first.shape), np.ones(first.shape)
+        if limits is not None:
+            self._low, self._high = _box(limits, first)
+        self._width = self._high - self._low
+        self._boxed = limits is not None
+        self._restart = restart
+        self._rng = np.random.default_rng(seed)
+        self._first = (first - self._low) / self._width
+        self._std = np.asarray(std, dtype=np.float64) / self._width
+        self._how = population, method
+        self._nes = NES(self._first, self._std, population, method, self._rng)
+        self._beyond = np.zeros(self._nes.population)
+        self._asked = np.empty(0)
+        self._known = math.inf  # best cost since the last start, and the one before so many generations
+        self._before, self._since = math.inf, 0
+        self.best = first
+        self.best_cost = math.inf
+        self.evaluations = 0
+        self.starts = 1
+
+    def ask(self) -> Array:
+        """The next generation, (population, d), inside the box."""
+        places = self._nes.ask()
+        if not self._boxed:
+            self._asked = places
+            return places
+        inside = np.minimum(np.maximum(places, 0.0), 1.0)
+        self._beyond = ((places - inside) ** 2).sum(axis=1)
+        self._asked = np.minimum(self._low + inside * self._width, self._high)  # rounding must not leave the box either
+        return self._asked
+
+    def tell(self, costs: ArrayLike) -> None:
+        """Follow the costs (population,) of the samples that `ask` gave; begins anew where the search is stuck."""
+        values = np.asarray(costs, dtype=np.float64)
+        self._nes.tell(values + PENALTY * self._beyond)
+        self.evaluations += len(values)
+        least = int(values.argmin())
+        self._known = min(self._known, float(values[least]))
+        if values[least] < self.best_cost:
+            self.best, self.best_cost = self._asked[least].copy(), float(values[least])
+        if self._restart is not None and self._stuck(self._restart):
+            self.starts += 1
+            start = self._rng.uniform(size=len(self._first)) if self.starts % 2 == 0 else self._first
+            self._nes = NES(start, self._std, *self._how, self._rng)
+            self._known = self._before = math.inf
+            self._since = 0
+
+    def _stuck(self, restart: Restart) -> bool:
+        self._since += 1
+        if self._since >= restart.patience:
+            if not self._known < self._before - restart.gain * abs(self._before) and self._before < math.inf:
+                return True
+            self._before, self._since = self._known, 0
+        return bool(self._nes.std.max() < restart.std)
+
+
+def minimize(
+    cost: Callable[[Array], ArrayLike],
+    start: ArrayLike,
+    std: ArrayLike,
+    limits: ArrayLike | None = None,
+    target: float = -math.inf,
+    evaluations: int = EVALUATIONS,
+    restart: Restart | None = None,
+    population: int | None = None,
+    method: Method = "full",
+    seed: int | np.random.Generator = 0,
+) -> Minimum:
+    """The best sample found when one costs no more than the target, or when another generation would pass the number of evaluations.
+
+    `cost` takes samples (population, d) and returns their costs (population,); the rest is as of Search.
+    """
+    search = Search(start, std, limits, restart, population, method, seed)
+    while search.best_cost > target:
+        samples = search.ask()
+        if search.evaluations + len(samples) > evaluations:
+            break
+        search.tell(cost(samples))
+    return Minimum(search.best, search.best_cost, search.evaluations, search.starts)
+
+
+def _box(limits: ArrayLike, start: Array) -> tuple[Array, Array]:
+    """Its low and its high corner."""
+    box = np.array(limits, dtype=np.float64)
+    if box.shape != (*start.shape, 2) or not np.isfinite(box).all() or not (box[:, 0] < box[:, 1]).all():
+        raise InvalidValue(
+            f"limits have shape {box.shape}; they must be ({len(start)}, 2) finite numbers, the first of a row below the second."
+        )
+    return box[:, 0], box[:, 1]

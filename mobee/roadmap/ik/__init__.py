@@ -1,0 +1,1 @@
+"""Poses from costs: natural gradient inverse kinematics (thesis 3.2)."""

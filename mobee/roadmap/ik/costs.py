@@ -1,0 +1,226 @@
+"""Costs of poses: those of thesis table 3.1, and more; any plain function of pose and contacts is one too.
+
+A term weighs about 1 at ten times its tolerance.  Angles are in rad, places in m in the root frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.collision.contact import ContactTable
+from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
+from mobee.errors import InvalidValue
+from mobee.kinematics.masses import centre_of_mass, centre_of_mass_at_home
+from mobee.pose import Pose
+from mobee.roadmap.ik.costs_between import across, aligned, at_most, plane, relative_orientation, relative_position
+from mobee.roadmap.ik.function import Function
+from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
+from mobee.roadmap.ik.vectors import angle_between, lengths, rotation, turn_between, unit_vector, units, vector
+from mobee.robot.robot import Array, Robot
+
+__all__ = [
+    "across",
+    "aligned",
+    "at_most",
+    "balance",
+    "collision",
+    "comfort",
+    "constraints",
+    "gaze",
+    "hold",
+    "home",
+    "orientation",
+    "palm_to_palm",
+    "plane",
+    "position",
+    "relative_orientation",
+    "relative_position",
+    "term",
+]
+
+PER_DEPTH = 20.0
+_NONE = np.zeros(3)
+
+
+def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE, offset: ArrayLike | None = None) -> Term:
+    """Put a marker, or a point that is `offset` (3,) m from it in its frame, on a place (3,) m (table 3.1)."""
+    goal = vector("place", place)
+    aside = None if offset is None else vector("offset", offset)
+
+    def residual(pose: Pose) -> Array:
+        return lengths(pose.position(marker) - goal if aside is None else pose.position(marker) + pose.rotation(marker) @ aside - goal)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        point = m.position if aside is None else m.position + m.rotation @ aside
+        return (Aim(PLACE, m.link, point, UPRIGHT, 0, goal, UPRIGHT),)
+
+    return checked_term(f"position {marker}", residual, weight, tolerance, aims)
+
+
+def orientation(
+    marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD, direction: ArrayLike | None = None
+) -> Term:
+    """Let a marker's normal point along a goal (3,), or turn the whole marker to a rotation (3, 3) (table 3.1).
+
+    `direction` (3,) in the marker's frame points there instead of the normal.
+    The residual is the angle between them: u.u* + 1, as printed, is that of opposite directions, and flat at both its ends.
+    """
+    wanted = np.array(goal, dtype=np.float64)
+    if wanted.shape == (3, 3):
+        return _rotation(marker, wanted, tolerance, weight)
+    there = unit_vector("goal", wanted)
+    own = None if direction is None else unit_vector("direction", direction)
+
+    def residual(pose: Pose) -> Array:
+        return angle_between(pose.normal(marker) if own is None else pose.rotation(marker) @ own, there)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        here = m.normal if own is None else m.rotation @ own
+        return (Aim(ALONG, m.link, m.position, direction_frame(here), 0, _NONE, direction_frame(there)),)
+
+    return checked_term(f"orientation {marker}", residual, weight, tolerance, aims)
+
+
+def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Hold two markers at a distance [m] from each other (table 3.1)."""
+
+    def residual(pose: Pose) -> Array:
+        found: Array = np.abs(lengths(pose.position(first) - pose.position(second)) - distance)
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        a, b = robot.marker(first), robot.marker(second)
+        return (Aim(HOLD, a.link, a.position, UPRIGHT, b.link, b.position, UPRIGHT, distance),)
+
+    return checked_term(f"hold {first} {second}", residual, weight, tolerance, aims)
+
+
+def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Turn two markers' normals to each other: each points along the line to the other marker; the residual is the larger angle."""
+
+    def residual(pose: Pose) -> Array:
+        way = units(pose.position(second) - pose.position(first))
+        found: Array = np.maximum(angle_between(pose.normal(first), way), angle_between(pose.normal(second), -way))
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        a, b = robot.marker(first), robot.marker(second)
+        return (
+            Aim(FACING, a.link, a.position, direction_frame(a.normal), b.link, b.position, UPRIGHT),
+            Aim(FACING, b.link, b.position, direction_frame(b.normal), a.link, a.position, UPRIGHT),
+        )
+
+    return checked_term(f"palm_to_palm {first} {second}", residual, weight, tolerance, aims)
+
+
+def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Let a marker's normal point to a place (3,) m, or to another marker."""
+    at = goal if isinstance(goal, str) else vector("goal", goal)
+
+    def residual(pose: Pose) -> Array:
+        there = pose.position(at) if isinstance(at, str) else at
+        return angle_between(pose.normal(marker), units(there - pose.position(marker)))
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        link, point = (robot.marker(at).link, robot.marker(at).position) if isinstance(at, str) else (0, at)
+        return (Aim(FACING, m.link, m.position, direction_frame(m.normal), link, point, UPRIGHT),)
+
+    return checked_term(f"gaze {marker}", residual, weight, tolerance, aims)
+
+
+def collision(by: str = "depth", weight: float | None = None) -> Term:
+    """No solid contacts: by their summed depth [m], which tells the way out, or by their number |K| (table 3.1)."""
+    if by not in ("depth", "count"):
+        raise InvalidValue(f"collision by {by!r}: valid are 'depth' and 'count'.")
+
+    def residual(pose: Pose) -> Array:
+        table = pose.table
+        solid = table.kind == 0
+        depths = table.depth[solid] if by == "depth" else None
+        found: Array = np.bincount(table.pose[solid], depths, minlength=len(pose.q)).astype(np.float64)
+        return found
+
+    heavy = (PER_DEPTH if by == "depth" else 1.0) if weight is None else weight
+    return checked_term("collision", residual, heavy, 0.0)
+
+
+def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
+    """Stay near a posture (n,) rad, None: the robot's home; the residual is the distance in ranges of the motors (table 3.1)."""
+    given = None if posture is None else np.array(posture, dtype=np.float64)
+
+    def residual(pose: Pose) -> Array:
+        limits = pose.robot.limits
+        return lengths((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
+
+    return checked_term("home", residual, weight, None)
+
+
+def comfort(weight: float = 0.5) -> Term:
+    """Keep away from the motors' limits: the mean of ((q - middle) / half range)^4, 1 where all motors are at a limit."""
+
+    def residual(pose: Pose) -> Array:
+        low, high = pose.robot.limits.T
+        found: Array = (((2.0 * pose.q - low - high) / (high - low)) ** 4).mean(axis=-1)
+        return found
+
+    return checked_term("comfort", residual, weight, None)
+
+
+def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
+    """Keep the centre of mass above a place (2,) m, None: where it is at home; the residual is horizontal [m]."""
+    above = None if place is None else np.array(place, dtype=np.float64)
+    if above is not None and above.shape != (2,):
+        raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")
+
+    def residual(pose: Pose) -> Array:
+        wanted = centre_of_mass_at_home(pose.robot)[:2] if above is None else above
+        return lengths(centre_of_mass(pose.robot, pose.transforms)[..., :2] - wanted)
+
+    return checked_term("balance", residual, weight, tolerance)
+
+
+def constraints(weight: float = PER_RAD) -> Term:
+    """Keep the robot's own linear constraints (thesis eqs. 5.14-5.17): the sum of what its clauses miss, rad."""
+
+    def residual(pose: Pose) -> Array:
+        missing: Array = np.zeros(pose.q.shape[:-1])
+        for clause in pose.robot.clauses:
+            missing = missing + np.maximum(0.0, -(pose.q @ clause.a.T + clause.b).max(axis=-1))
+        return missing
+
+    return checked_term("constraints", residual, weight, 0.0)
+
+
+def term(
+    function: Callable[[Pose, ContactTable], ArrayLike], tolerance: float | None = METRES, weight: float | None = None, name: str = ""
+) -> Term:
+    """A function of pose and contacts as a term; solved when it is no more than the tolerance, None: only as small as may be.
+
+    `function`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their
+    contacts, and returns N numbers; or it is written for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) and
+    returns one number: then it is called pose by pose, which takes longer.  `weight`: None: 1 at ten times the tolerance.
+    """
+    if not callable(function):
+        raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
+    if weight is None:
+        weight = 0.1 / tolerance if tolerance else 1.0
+    return checked_term(name or getattr(function, "__name__", "term"), Function(function), weight, tolerance)
+
+
+def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Term:
+    rotation(f"goal of {marker!r}", wanted)
+
+    def residual(pose: Pose) -> Array:
+        return turn_between(pose.rotation(marker), wanted)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m = robot.marker(marker)
+        return (Aim(TURNED, m.link, m.position, m.rotation, 0, _NONE, wanted),)
+
+    return checked_term(f"orientation {marker}", residual, weight, tolerance, aims)

@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.roadmap.adaptive.explorer import MapExplorer
+from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.walker import Walker
+from tests.mobee.roadmap.toy_map import SQUARE, BlockedPlant, random_map, square, wall
+
+A, B, C, D = SQUARE
+
+
+def test_where_an_edge_fails_it_goes_back_and_takes_the_other_way():
+    plant = BlockedPlant(A, wall(A, B))
+    walk = Walker(square(), plant).go(1)
+    assert (walk.arrived, walk.edges, walk.bumps) == (True, 4, 1)
+    assert np.array_equal(plant.acted, [B, A, D, C, B])
+
+
+def test_it_can_go_on_at_once_where_it_was_stopped_without_going_back():
+    plant = BlockedPlant(A, wall(A, B))
+    assert Walker(square(), plant, back=False).go(1).arrived
+    assert np.array_equal(plant.acted, [B, D, C, B])
+
+
+def test_going_on_at_once_that_fails_too_ends_where_it_began():
+    way_on = wall(0.5 * (A + B), D)
+    plant = BlockedPlant(A, lambda q, target: wall(A, B)(q, target) or way_on(q, target))
+    assert Walker(square(), plant, back=False).go(1).arrived
+    assert np.array_equal(plant.acted, [B, D, A, D, C, B])
+
+
+def test_a_wall_that_went_away_is_found_out_by_a_map_that_forgets():
+    blocked = [True]
+    plant = BlockedPlant(A, lambda q, target: blocked[0] and wall(A, B)(q, target))
+    walker = Walker(square(mode="reweigh", forgetting=0.7), plant)
+    assert walker.go(1).bumps == 1
+    blocked[0] = False
+    for goal in (2, 1, 2, 1, 3, 0) * 2:
+        walker.go(goal)
+    assert walker.go(1).edges == 1
+
+
+def test_beside_the_map_it_goes_to_the_nearest_vertex_first():
+    plant = BlockedPlant(np.array([0.7, 0.1, 0.0]), lambda q, target: False)
+    walker = Walker(square(), plant)
+    assert walker.enter() == 1 and np.array_equal(plant.acted, [B])
+    assert walker.go(1).edges == 0
+
+
+def test_it_gives_up_after_so_many_edges_and_where_no_way_is_left():
+    walker = Walker(square(), BlockedPlant(A, lambda q, target: False))
+    assert not walker.go(2, most=1).arrived
+    nowhere = Walker(square(), BlockedPlant(A, lambda q, target: np.allclose(q, A)))
+    with pytest.raises(mobee.MobeeError, match="no way is left"):
+        nowhere.go(2)
+
+
+def test_exploring_tells_the_edges_that_work_from_those_that_do_not():
+    roadmap = mobee.AdaptiveRoadmap(random_map(3).space)
+    samples = roadmap.space.samples
+
+    def blocked(q, target):
+        return (q == samples).all(axis=1).any() and np.linalg.norm(q - target) > 2.5
+
+    plant = BlockedPlant(samples[0], blocked)
+    explorer = MapExplorer(roadmap, plant, seed=4)
+    assert explorer.explore()
+    reached = roadmap.reachable(explorer.here)
+    assert 5 < reached.sum() < 25 and (roadmap.beliefs.tried[reached] > roadmap.feasible[reached]).sum() > 5
+    for state, action in np.argwhere(roadmap.space.goals >= 0).tolist():
+        goal = roadmap.space.goal(state, action)
+        if reached[state]:
+            assert roadmap.feasible[state, action] != blocked(samples[state], samples[goal])
+
+
+def test_stuck_it_asks_for_a_single_way_and_joins_it_to_the_map():
+    roadmap = square()
+    plant = BlockedPlant(A, lambda q, target: np.allclose(q, A) and not np.allclose(target, [0.3, 0.3, 0.0]))
+    asked = []
+
+    def query(q, goals):
+        asked.append(goals)
+        return np.array([q, [0.3, 0.3, 0.0], goals[1]])
+
+    explorer = MapExplorer(roadmap, plant, query=query)
+    assert explorer.explore()
+    assert explorer.repairs == 1 and len(roadmap) == 5 and len(asked) == 1
+    assert len(roadmap.unexplored) == 0 and roadmap.stuck.tolist() == []
+
+
+def test_without_a_query_it_stays_where_it_is_stuck():
+    explorer = MapExplorer(square(), BlockedPlant(A, lambda q, target: np.allclose(q, A)))
+    assert explorer.explore() and explorer.here == 0
+
+
+def test_an_explorer_that_is_started_again_goes_on_with_the_map_as_it_was(tmp_path):
+    def started():
+        store = MapStore(tmp_path / "map.sqlite", "arm")
+        return MapExplorer(square(), BlockedPlant(A, wall(A, B)), store=store)
+
+    first = started()
+    first.explore(3)
+    first.record.change("grow", samples=[[0.5, 0.5, 0.0]], neighbours=2)
+    first.explore(3)
+    again = started()
+    assert again.record.transitions == 6 and len(again.roadmap) == 5
+    assert np.array_equal(again.roadmap.beliefs.tried, first.roadmap.beliefs.tried)
+    assert np.array_equal(again.roadmap.beliefs.last, first.roadmap.beliefs.last)
+    again.explore()
+    assert len(again.roadmap.unexplored) == 0
+
+
+def test_a_store_of_another_map_is_refused(tmp_path):
+    plant = BlockedPlant(A, wall(A, B))
+    Walker(square(), plant, store=MapStore(tmp_path / "map.sqlite", "arm")).go(1)
+    with pytest.raises(mobee.MobeeError, match="roadmap"):
+        Walker(square(both_ways=True), plant, store=MapStore(tmp_path / "map.sqlite", "arm"))
+
+
+def test_an_unknown_edge_is_refused():
+    with pytest.raises(mobee.InvalidValue, match=r"no edge from 0 to 2: valid are \[1, 3\]"):
+        Walker(square(), BlockedPlant(A, wall(A, B))).follow(0, 2)
+
+
+def test_pushed_off_the_map_it_goes_back_the_way_it_came_until_a_vertex_holds():
+    state = {"blocked": False}
+
+    def blocked(q, target):
+        if np.allclose(q, C) and np.allclose(target, D):
+            state["blocked"] = True  # from now on neither the goal nor where it set out from can be come to
+        return state["blocked"] and (np.allclose(target, C) or np.allclose(target, D))
+
+    plant = BlockedPlant(A, blocked)
+    walker = Walker(square(), plant, near=0.05)
+    for vertex, goal in ((0, 1), (1, 2), (2, 3)):
+        walker.follow(vertex, goal)
+    plant.acted.clear()
+    assert walker.enter() == 1
+    assert np.array_equal(plant.acted, [C, B])

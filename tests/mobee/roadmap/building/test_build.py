@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.roadmap.building import build, draft, outset
+from mobee.roadmap.building.draft import Progress
+
+MOTORS = ["torso", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow", "r_wrist_prosup", "r_wrist_pitch", "r_wrist_yaw"]
+COSTS = [mobee.costs.orientation("right_palm", [0.0, 0.0, -1.0], tolerance=0.2), mobee.costs.plane("right_palm", [0, 0, 1], 0.0, 0.02)]
+TASK = mobee.tasks.place("right_palm", "xy", [(-0.4, -0.25), (0.1, 0.3)])
+QUICK = mobee.Front(std=0.02, searches=8)
+
+
+@pytest.fixture(scope="module")
+def model(icub: mobee.Robot) -> mobee.Model:
+    return mobee.Model(icub, mobee.load_world("table"))
+
+
+def _build(model: mobee.Model, **others: object) -> mobee.Roadmap:
+    settings = {"costs": COSTS, "task": TASK, "spacing": 0.05, "motors": MOTORS, "method": "nes", "front": QUICK} | others
+    return mobee.build_roadmap(model, **settings)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def whole(model: mobee.Model) -> mobee.Roadmap:
+    return _build(model)
+
+
+class Cut(Exception):
+    """What ends a building before its end."""
+
+
+def _cut_after(vertices: int) -> Callable[[Progress], None]:
+    def told(progress: Progress) -> None:
+        if progress.vertices >= vertices:
+            raise Cut
+
+    return told
+
+
+@pytest.mark.parametrize("method", ["nes", "hybrid", "least_squares"])
+def test_every_pose_is_good_by_the_reference_engine_and_apart_from_the_others(
+    method: str, model: mobee.Model, whole: mobee.Roadmap
+) -> None:
+    trm = whole if method == "nes" else _build(model, method=method)
+    pose = mobee.Model(model.robot, model.world, engine="fcl").evaluate(trm.q)
+    assert len(trm.q) >= 8
+    assert not np.asarray(pose.count).any()
+    for term in COSTS:
+        assert (term.residual(pose) <= term.tolerance + 1e-9).all()
+    y = TASK.of(pose)
+    assert np.allclose(y, trm.y, atol=1e-9)
+    assert ((y >= TASK.box[:, 0] - 1e-9) & (y <= TASK.box[:, 1] + 1e-9)).all()
+    limits = model.robot.limits
+    assert ((trm.q >= limits[:, 0]) & (trm.q <= limits[:, 1])).all()
+    apart = np.linalg.norm((y[:, None] - y) / trm.spacing, axis=-1)
+    assert apart[np.triu_indices(len(y), 1)].min() >= 0.8
+    assert np.abs(trm.q[trm.edges[:, 0]] - trm.q[trm.edges[:, 1]]).max() <= 0.4
+
+
+def test_motors_that_may_not_move_stay_at_the_start(model: mobee.Model) -> None:
+    start = model.robot.home.copy()
+    start[model.robot.motor_index("l_elbow")] = 1.0
+    trm = _build(model, start=start)
+    still = [k for k, name in enumerate(model.robot.motors) if name not in trm.settings["motors"]]
+    assert len(still) == len(model.robot.motors) - 10
+    assert np.array_equal(trm.q[:, still], np.repeat(start[None, still], len(trm.q), axis=0))
+
+
+@pytest.mark.parametrize("method", ["nes", "least_squares"])
+def test_motors_keep_the_margin_from_their_limits(method: str, model: mobee.Model) -> None:
+    margin = 0.2
+    trm = _build(model, method=method, margin=margin)
+    free = [model.robot.motor_index(name) for name in trm.motors]
+    low, high = model.robot.limits[free].T
+    kept = np.minimum(margin, 0.25 * (high - low)) - 1e-9
+    assert len(trm.q) >= 4
+    assert (trm.q[:, free] >= low + kept).all() and (trm.q[:, free] <= high - kept).all()
+    with pytest.raises(mobee.InvalidValue, match="margin"):
+        _build(model, margin=-0.1)
+
+
+def test_the_same_seed_gives_the_same_map_whatever_the_number_of_threads(
+    model: mobee.Model, whole: mobee.Roadmap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "WORKERS", 1)
+    again = _build(model)
+    assert np.array_equal(again.q, whole.q)
+    assert np.array_equal(again.edges, whole.edges)
+
+
+@pytest.mark.parametrize(("method", "vertices"), [("nes", 0), ("nes", 6), ("hybrid", 1), ("hybrid", 13), ("least_squares", 4)])
+def test_a_building_that_was_cut_off_goes_on_to_the_same_map(
+    method: str, vertices: int, model: mobee.Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(draft, "EVERY", 0.0)
+    monkeypatch.setattr(draft, "TELL", 0.0)
+    file = tmp_path / "map.npz"
+    whole = _build(model, method=method)
+    with pytest.raises(Cut):
+        _build(model, method=method, file=file, progress=_cut_after(vertices))
+    part = mobee.load_roadmap(file, model)
+    assert part.settings["finished"] is False
+    assert vertices <= len(part.q) <= len(whole.q)
+    rest = _build(model, method=method, file=file)
+    assert np.array_equal(rest.q, whole.q)
+    assert rest.settings["evaluations"] == whole.settings["evaluations"]
+
+
+def test_a_finished_map_is_not_built_again(model: mobee.Model, whole: mobee.Roadmap, tmp_path: Path) -> None:
+    file = tmp_path / "map.npz"
+    _build(model, file=file)
+    again = _build(model, file=file, progress=_cut_after(0))
+    assert np.array_equal(again.q, whole.q)
+    assert again.settings["finished"] is True
+
+
+@pytest.mark.parametrize(
+    ("others", "name"),
+    [
+        ({"spacing": 0.06}, "spacing"),
+        ({"seed": 1}, "seed"),
+        ({"costs": [*COSTS[:1], mobee.costs.plane("right_palm", [0, 0, 1], 0.01, 0.02)]}, "meaning"),
+        ({"front": dataclasses.replace(QUICK, delta=1.0)}, "front"),
+    ],
+)
+def test_a_file_of_other_settings_is_refused_with_both_digests(
+    others: dict[str, object], name: str, model: mobee.Model, tmp_path: Path
+) -> None:
+    file = tmp_path / "map.npz"
+    _build(model, file=file)
+    with pytest.raises(mobee.MobeeError) as refused:
+        _build(model, file=file, **others)
+    digests = re.findall(r"\b[0-9a-f]{16}\b", str(refused.value))
+    assert len(set(digests)) == 2
+    assert f"differ in {name}" in str(refused.value)
+
+
+def test_a_file_of_another_world_is_refused_with_the_digests_of_both(model: mobee.Model, tmp_path: Path) -> None:
+    file = tmp_path / "map.npz"
+    trm = _build(model, file=file)
+    other = mobee.Model(model.robot, mobee.load_world("table"))
+    other.world.add("cup", mobee.sphere(0.03), position=(-0.3, 0.5, 0.0))
+    with pytest.raises(mobee.MobeeError, match=rf"world_digest {trm.settings['world_digest']}, now [0-9a-f]{{16}}"):
+        _build(other, file=file)
+
+
+def test_a_world_that_changed_meanwhile_is_an_error(icub: mobee.Robot) -> None:
+    model = mobee.Model(icub, mobee.load_world("table"))
+
+    def told(progress: Progress) -> None:
+        if "cup" not in model.world.objects:
+            model.world.add("cup", mobee.sphere(0.03), position=(0.5, 0.5, 0.0))
+
+    with pytest.raises(mobee.MobeeError, match="have changed while the map was built"):
+        _build(model, progress=told)
+
+
+def test_settings_are_plain_json_and_say_what_it_was_made_of(whole: mobee.Roadmap) -> None:
+    settings = json.loads(json.dumps(whole.settings))
+    assert settings["names"] == list(TASK.names)
+    assert settings["units"] == ["m", "m"]
+    assert settings["costs"][-1] == "collision"
+    assert (settings["seed"], settings["method"], settings["finished"]) == (0, "nes", True)
+    assert settings["evaluations"] > len(whole.q)
+    assert settings["versions"].keys() == {"mobee", "numpy"}
+
+
+def test_neighbours_and_longest_choose_the_edges(model: mobee.Model, whole: mobee.Roadmap) -> None:
+    every = _build(model, longest=None)
+    assert len(every.edges) == 2 * len(every.q) - 3
+    assert {tuple(edge) for edge in whole.edges} <= {tuple(edge) for edge in every.edges}
+    many = _build(model, longest=None, neighbours=4)
+    joined = np.bincount(many.edges.ravel(), minlength=len(many.q))
+    assert joined.min() >= 4
+    assert np.array_equal(many.q, whole.q)
+
+
+def test_plain_functions_are_costs_and_coordinates(model: mobee.Model) -> None:
+    def low_elbow(pose: mobee.Pose, contacts: object) -> np.ndarray:
+        return np.maximum(0.0, pose.position("right_elbow")[..., 2])
+
+    along = mobee.tasks.function(lambda pose: pose.position("right_palm")[..., 0], -0.4, -0.2, "forward", "m")
+    trm = _build(model, costs=[*COSTS, low_elbow], task=along, method="hybrid", spacing=0.04)
+    assert len(trm.q) >= 3
+    assert (model.evaluate(trm.q).position("right_elbow")[:, 2] <= 0.005 + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("others", "message"),
+    [
+        ({"spacing": float("nan")}, "finite and above 0"),
+        ({"spacing": 0.0}, "finite and above 0"),
+        ({"spacing": [0.1, 0.1, 0.1]}, "one number, or 2"),
+        ({"method": "ness"}, "Did you mean 'nes'"),
+        ({"neighbours": 0}, "at least 1"),
+        ({"longest": 0.0}, "above 0"),
+        ({"costs": COSTS[0]}, "list of terms"),
+        ({"motors": ["right_harm"]}, "right_arm"),
+        ({"start": [0.0]}, "a position for every motor"),
+    ],
+)
+def test_what_cannot_be_built_is_said(others: dict[str, object], message: str, model: mobee.Model) -> None:
+    with pytest.raises(mobee.MobeeError, match=message):
+        _build(model, **others)
+
+
+def test_a_task_out_of_reach_is_said(model: mobee.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outset, "FIRST_MOST", 2)
+    monkeypatch.setattr(outset, "FIRST_PATIENCE", 1)
+    far = mobee.tasks.place("right_palm", "xy", [(2.0, 2.1), (0.0, 0.1)])
+    with pytest.raises(mobee.MobeeError, match=r"no pose was found .* right_palm x is .*, outside 2 \.\. 2\.1"):
+        _build(model, task=far, front=QUICK)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"delta": 0.0}, {"delta": 1.5}, {"std": 0.0}, {"wide_std": 2.0}, {"population": 3}, {"patience": 0}, {"tries": 0}]
+)
+def test_a_front_that_cannot_advance_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(mobee.InvalidValue, match=next(iter(wrong))):
+        mobee.Front(**wrong)  # type: ignore[arg-type]

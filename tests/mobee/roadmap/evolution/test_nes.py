@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.roadmap.evolution.nes import METHODS, NES
+from mobee.roadmap.evolution.rates import default_population, path_rates, published_utilities
+
+D = 4
+seeds = st.integers(0, 10_000)
+
+
+def rugged(x: np.ndarray) -> np.ndarray:
+    """No optimum at a special place, no symmetry."""
+    return np.abs(x - np.arange(x.shape[1])) @ np.arange(1.0, x.shape[1] + 1.0) + np.sin(3.0 * x[:, 0])
+
+
+def generations(es: NES, cost, count: int = 30) -> np.ndarray:
+    asked = []
+    for _ in range(count):
+        asked.append(es.ask())
+        es.tell(cost(asked[-1]))
+    return np.array(asked)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@given(seed=seeds)
+@settings(max_examples=10, deadline=None)
+def test_a_growing_function_of_the_cost_changes_nothing(method: str, seed: int) -> None:
+    plain = generations(NES(np.zeros(D), 1.0, method=method, seed=seed), rugged)
+    grown = generations(NES(np.zeros(D), 1.0, method=method, seed=seed), lambda x: np.arctan(0.1 * rugged(x)) - 7.0)
+    np.testing.assert_array_equal(plain, grown)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@given(seed=seeds, far=st.floats(-50.0, 50.0), times=st.floats(0.1, 10.0))
+@settings(max_examples=10, deadline=None)
+def test_a_shift_and_another_unit_of_the_coordinates_change_nothing(method: str, seed: int, far: float, times: float) -> None:
+    shift = far * np.ones(D)
+    plain = generations(NES(np.zeros(D), 1.0, method=method, seed=seed), rugged, 15)
+    moved = generations(NES(shift, times, method=method, seed=seed), lambda x: rugged((x - shift) / times), 15)
+    np.testing.assert_allclose((moved - shift) / times, plain, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["full", "xnes"])
+@given(seed=seeds)
+@settings(max_examples=10, deadline=None)
+def test_a_rotation_changes_nothing(method: str, seed: int) -> None:
+    rotation = np.linalg.qr(np.random.default_rng(seed).standard_normal((D, D)))[0]
+    plain = generations(NES(np.ones(D), 1.0, method=method, seed=seed), rugged, 15)
+    turned = NES(rotation @ np.ones(D), 1.0, method=method, seed=seed)
+    turned.shape = rotation
+    np.testing.assert_allclose(generations(turned, lambda x: rugged(x @ rotation), 15) @ rotation, plain, atol=1e-6)
+
+
+@pytest.mark.parametrize(("method", "most"), [("full", 100), ("separable", 100), ("xnes", 400), ("snes", 150)])
+def test_every_method_finds_the_optimum_of_a_sphere(method: str, most: int) -> None:
+    best = np.array([0.3, -2.0, 1.0])
+    es = NES(np.zeros(3), 0.5, method=method, seed=1)
+    generations(es, lambda x: ((x - best) ** 2).sum(axis=1), most)
+    np.testing.assert_allclose(es.mean, best, atol=1e-4)
+
+
+def test_the_full_form_finds_the_optimum_of_a_rotated_valley() -> None:
+    rotation = np.linalg.qr(np.random.default_rng(0).standard_normal((5, 5)))[0]
+    scales = 10.0 ** (6.0 * np.arange(5) / 4.0)
+    es = NES(np.ones(5), 0.5, seed=2)
+    generations(es, lambda x: ((x @ rotation) ** 2) @ scales, 300)
+    assert ((es.mean @ rotation) ** 2) @ scales < 1e-8
+
+
+def test_the_shape_stays_positive_definite_under_absurd_ranks() -> None:
+    rng = np.random.default_rng(3)
+    es = NES(np.zeros(6), 1.0, seed=3)
+    generations(es, lambda x: rng.uniform(size=len(x)), 300)
+    assert np.linalg.eigvalsh(es.shape @ es.shape.T).min() > 0.0
+
+
+def test_the_exponential_is_that_of_the_whole_matrix() -> None:
+    from scipy.linalg import expm
+
+    from mobee.roadmap.evolution.shapes import turned
+
+    rng = np.random.default_rng(0)
+    z, weights, shape = rng.standard_normal((7, 4)), rng.uniform(-0.2, 0.5, 7), rng.standard_normal((4, 4))
+    exponent = 0.5 * ((z.T * weights) @ z - 0.3 * np.eye(4))
+    np.testing.assert_allclose(turned(shape, z, weights, 0.3), shape @ expm(exponent), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(turned(np.ones(4), z, weights, 0.3), np.exp(np.diag(exponent)), rtol=1e-12)
+
+
+def test_a_long_series_ends() -> None:
+    from scipy.linalg import expm
+
+    from mobee.roadmap.evolution.shapes import turned
+
+    z = np.array([[4.0, 0.0], [0.0, 2.0]])
+    np.testing.assert_allclose(turned(np.eye(2), z, np.ones(2), 1.0), expm(np.diag([7.5, 1.5])), rtol=1e-10)
+
+
+@given(d=st.integers(1, 100), population=st.integers(4, 60), separable=st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_the_rates_leave_something_of_the_shape(d: int, population: int, separable: bool) -> None:
+    rates = path_rates(d, population, separable)
+    assert rates.weights[rates.weights > 0].sum() == pytest.approx(1.0)
+    assert (np.diff(rates.weights) <= 0).all()
+    assert rates.rank_one > 0 and rates.rank_all > 0 and rates.rank_one + rates.rank_all <= 1.0
+    assert 0 < rates.path < 1
+    negative = -rates.weights[rates.weights < 0].sum()
+    assert rates.rank_all * negative * d <= 1.0 - rates.rank_one - rates.rank_all + 1e-12  # CMA's bound
+
+
+def test_published_utilities_by_hand() -> None:
+    raw = np.array([np.log(3.0), np.log(3.0) - np.log(2.0), 0.0, 0.0])
+    np.testing.assert_allclose(published_utilities(4), raw / raw.sum() - 0.25)
+
+
+def test_default_population() -> None:
+    assert [default_population(d) for d in (1, 10, 20, 41)] == [4, 10, 12, 15]
+
+
+def test_std_is_that_of_the_samples() -> None:
+    es = NES(np.zeros(3), [0.1, 1.0, 10.0], population=4000, seed=0)
+    np.testing.assert_allclose(es.ask().std(axis=0), es.std, rtol=0.05)
+
+
+def test_an_infinite_cost_is_the_worst() -> None:
+    es = NES(np.zeros(2), 1.0, seed=0)
+    generations(es, lambda x: np.where(x[:, 0] < 0.0, np.inf, (x**2).sum(axis=1)), 60)
+    np.testing.assert_allclose(es.mean, 0.0, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: NES([], 1.0),
+        lambda: NES([np.nan], 1.0),
+        lambda: NES([0.0, 0.0], [1.0, 1.0, 1.0]),
+        lambda: NES([0.0], 0.0),
+        lambda: NES([0.0], 1.0, population=3),
+        lambda: NES([0.0], 1.0).tell([1.0] * 4),
+    ],
+)
+def test_what_is_not_valid_is_refused(make) -> None:
+    with pytest.raises(InvalidValue):
+        make()
+
+
+def test_an_unknown_method_is_refused_with_the_nearest() -> None:
+    with pytest.raises(UnknownName, match="snes"):
+        NES([0.0], 1.0, method="sness")
+
+
+@pytest.mark.parametrize("costs", [[1.0], [1.0, 2.0, np.nan, 3.0]])
+def test_costs_that_do_not_fit_are_refused(costs: list[float]) -> None:
+    es = NES([0.0], 1.0)
+    es.ask()
+    with pytest.raises(InvalidValue, match="costs"):
+        es.tell(costs)

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mobee.errors import InvalidValue
+from mobee.roadmap.evolution.nes import METHODS
+from mobee.roadmap.evolution.search import Restart, Search, minimize
+
+LIMITS = np.array([[-1.0, 2.0], [0.1, 0.3], [-5.0, -4.0]])
+MIDDLE = LIMITS.mean(axis=1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@given(seed=st.integers(0, 10_000), std=st.floats(0.01, 100.0))
+@settings(max_examples=15, deadline=None)
+def test_no_sample_leaves_the_box(method: str, seed: int, std: float) -> None:
+    search = Search(MIDDLE, std, LIMITS, Restart(patience=5), method=method, seed=seed)
+    for _ in range(25):
+        samples = search.ask()
+        assert (samples >= LIMITS[:, 0]).all() and (samples <= LIMITS[:, 1]).all()
+        search.tell(samples.sum(axis=1))
+
+
+def test_an_optimum_on_the_border_is_found() -> None:
+    found = minimize(lambda x: x @ [1.0, -1.0, 1.0], MIDDLE, 0.2, LIMITS, evaluations=2000)
+    np.testing.assert_allclose(found.x, [-1.0, 0.3, -5.0], atol=1e-9)
+
+
+def test_without_a_box_the_optimum_is_found_anywhere() -> None:
+    found = minimize(lambda x: ((x - 1000.0) ** 2).sum(axis=1), np.zeros(3), 1.0, target=1e-8)
+    np.testing.assert_allclose(found.x, 1000.0, atol=1e-4)
+    assert found.starts == 1
+
+
+def two_holes(x: np.ndarray) -> np.ndarray:
+    """A wide hole that costs 1 at the start, and a narrow one that costs 0 far from it."""
+    return np.minimum(1.0 + ((x - 0.2) ** 2).sum(axis=1), 20.0 * np.abs(x - 0.85).max(axis=1))
+
+
+BOX = np.tile([0.0, 1.0], (2, 1))
+
+
+def test_restarts_find_what_one_start_misses() -> None:
+    stuck = minimize(two_holes, [0.2, 0.2], 0.05, BOX, target=0.1, evaluations=20_000)
+    found = minimize(two_holes, [0.2, 0.2], 0.05, BOX, target=0.1, evaluations=20_000, restart=Restart())
+    assert stuck.cost == pytest.approx(1.0) and stuck.starts == 1
+    assert found.cost <= 0.1 and found.starts > 1
+
+
+def test_starts_are_in_turn_the_first_and_random_ones() -> None:
+    search = Search([0.2, 0.2], 1e-9, BOX, Restart(std=1.0))  # stuck at once, each time
+    means = []
+    for _ in range(4):
+        samples = search.ask()
+        means.append(samples.mean(axis=0))
+        search.tell(np.zeros(len(samples)))
+    np.testing.assert_allclose(means[0], 0.2, atol=1e-6)
+    np.testing.assert_allclose(means[2], 0.2, atol=1e-6)
+    assert np.abs(means[1] - 0.2).max() > 1e-3 and np.abs(means[3] - means[1]).max() > 1e-3
+
+
+def test_a_cost_that_no_longer_falls_is_given_up() -> None:
+    search = Search([0.5, 0.5], 0.1, BOX, Restart(std=0.0, patience=3))
+    for _ in range(6):
+        search.tell(np.ones(len(search.ask())))
+    assert search.starts == 2
+
+
+def test_the_same_seed_gives_the_same_search() -> None:
+    one, two, other = (minimize(two_holes, [0.5, 0.5], 0.2, BOX, evaluations=300, restart=Restart(), seed=seed) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(one.x, two.x)
+    assert not np.array_equal(one.x, other.x)
+
+
+def test_never_more_evaluations_than_allowed() -> None:
+    count = 0
+
+    def counted(x: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += len(x)
+        return (x**2).sum(axis=1)
+
+    found = minimize(counted, np.ones(3), 1.0, evaluations=103)
+    assert found.evaluations == count <= 103
+
+
+def test_the_best_sample_is_kept() -> None:
+    seen = []
+
+    def noisy(x: np.ndarray) -> np.ndarray:
+        costs = np.random.default_rng(len(seen)).uniform(size=len(x))
+        seen.extend(zip(costs, x.tolist(), strict=True))
+        return costs
+
+    found = minimize(noisy, np.ones(2), 1.0, evaluations=500)
+    cost, x = min(seen)
+    assert found.cost == cost
+    np.testing.assert_array_equal(found.x, x)
+
+
+@pytest.mark.parametrize("limits", [[[0.0, 1.0]], [[0.0, 1.0], [1.0, 1.0]], [[0.0, 1.0], [0.0, np.inf]]])
+def test_a_box_that_does_not_fit_is_refused(limits: list[list[float]]) -> None:
+    with pytest.raises(InvalidValue, match="limits"):
+        Search([0.0, 0.0], 1.0, limits)
+
+
+def test_a_restart_needs_a_box() -> None:
+    with pytest.raises(InvalidValue, match="limits"):
+        Search([0.0], 1.0, restart=Restart())
