@@ -30,6 +30,7 @@ EXPERIMENTS = {
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",
     "planner": "experiments.planner",
+    "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.reach",

@@ -21,7 +21,12 @@ METHODS: tuple[Method, ...] = ("nes", "least_squares")
 
 
 def build(
-    example: Example, method: Method, seed: int = 0, file: Path | None = None, progress: Callable[[Any], None] | None = None
+    example: Example,
+    method: Method,
+    seed: int = 0,
+    file: Path | None = None,
+    progress: Callable[[Any], None] | None = None,
+    neighbours: int | None = None,
 ) -> Roadmap:
     """The map of an example."""
     return mobee.build_roadmap(
@@ -34,6 +39,7 @@ def build(
         margin=example.margin,
         method=method,
         seed=seed,
+        neighbours=neighbours,
         file=file,
         progress=progress,
     )

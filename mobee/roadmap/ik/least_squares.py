@@ -85,7 +85,9 @@ def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
                 return found
         if left <= 0:
             return None
-        starts = problem.whole(_drawn(problem, rng, min(AT_ONCE, left), descent.drawn))
+        # What no term asks for stays at the start as long as that will do; then it may be what touches, as a thumb above a table.
+        which = descent.drawn if left > RESTARTS // 2 else np.ones_like(descent.drawn)
+        starts = problem.whole(_drawn(problem, rng, min(AT_ONCE, left), which))
         left -= AT_ONCE
 
 

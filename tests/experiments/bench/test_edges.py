@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.bench.edges import Settings, measure, report
-from experiments.bench.edges_workload import palm_map, scene
+from experiments.bench.edges_workload import palm_map
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +24,8 @@ def test_the_report_fits_80_columns(result: dict) -> None:
 
 
 def test_the_map_is_of_free_poses_above_the_table() -> None:
-    model = scene()
-    trm = palm_map(model, 0.12)
-    pose = model.evaluate(trm.q)
+    trm = palm_map(0.12)
+    pose = trm.model.evaluate(trm.q)
     assert (pose.count == 0).all()
     assert abs(pose.position("right_palm")[:, :2] - trm.y).max() < 0.002
     assert (pose.normal("right_palm")[:, 2] < -0.99).all()
