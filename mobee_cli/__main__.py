@@ -38,6 +38,16 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # m
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        code = _main(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has seen enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code
+
+
+def _main(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
         print(_usage())
         return 0
@@ -74,9 +84,6 @@ def _run(verb: str, arguments: list[str]) -> int:
     except KeyboardInterrupt:  # a verb that is meant to end so does not let it come here
         print(f"mobee {verb}: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader has seen enough, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
 
 
 def _usage() -> str:

@@ -1,4 +1,4 @@
-"""The right hand over all of the table that it reaches, palm down, as before a grasp (thesis fig. 4.8): about 5000 poses.
+"""The right hand over all of the table that it reaches, palm down, as before a grasp (thesis fig. 4.8): 4400 poses.
 
 The thesis counts one for every square centimetre of half a square metre, for which both hands are needed; the right palm reaches 0.3 m^2.
 """
