@@ -1,16 +1,13 @@
-"""What the performer is given to do, and what it says of it: files in the folder of a block."""
+"""What the performer is given to do, and what it says of it: see `experiments.jobs`."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
-import msgspec
 from msgspec import Struct
 
 from experiments.live_reach.problems import Problem
 
-JOB, DONE = "job.json", "tries.jsonl"
 Kind = Literal["refine", "learner", "peer", "moving", "first motion"]
 
 
@@ -43,27 +40,3 @@ class Tried(Struct, frozen=True):
     asked: int = 0  # tick of the last request
     there: list[float] | None = None  # m, where a target that moves was at the last of the ends
     first: int = -1  # ticks from the last request to the first command that moves, where that was looked at
-
-
-def write_job(folder: Path, job: Job) -> None:
-    """Into a folder that it makes; what a launch that was broken off has left there goes."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / DONE).unlink(missing_ok=True)
-    (folder / JOB).write_bytes(msgspec.json.encode(job))
-
-
-def read_job(folder: Path) -> Job:
-    """What `write_job` wrote."""
-    return msgspec.json.decode((folder / JOB).read_bytes(), type=Job)
-
-
-def append_try(folder: Path, tried: Tried) -> None:
-    """It is in the file when this returns."""
-    with (folder / DONE).open("ab") as file:
-        file.write(msgspec.json.encode(tried) + b"\n")
-
-
-def read_tries(folder: Path) -> list[Tried]:
-    """All of a block; none if there is no file."""
-    path = folder / DONE
-    return [msgspec.json.decode(line, type=Tried) for line in path.read_bytes().splitlines()] if path.exists() else []

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from experiments.jobs import write_job
 from experiments.launched import summary_of
-from experiments.live_reach.job import Job, write_job
+from experiments.live_reach.job import Job
 from experiments.live_reach.settings import GAINS, RATE, ROBOT, WORLD
 
 WITH_OBSTACLE = Path(__file__).with_name("obstacle.xml")

@@ -10,7 +10,8 @@ from msgspec import Struct
 
 from experiments.babbling.contacts import Touch, read_touches
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.live_reach.job import Job, Tried, read_tries
+from experiments.jobs import read_done
+from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.settings import DEEP, GOOD, MARKER, PART, robot
 from mobee import Model
 from mobee.reach import RADIUS
@@ -55,7 +56,7 @@ def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
     """What a launch has left in its folder."""
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > DEEP]
-    done = read_tries(folder)
+    done = read_done(folder, Tried)
     problems = {(problem.kind, problem.number): problem for problem in job.problems}
     model = Model(robot())
     judged = [judge(tried, np.array(tried.there or problems[tried.kind, tried.number].position), q, deep, model, rate) for tried in done]

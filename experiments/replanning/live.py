@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from experiments.replanning.job import Job, write_job
+from experiments.jobs import write_job
+from experiments.replanning.job import Job
 from experiments.replanning.scene import RATE, SIMULATED, SPEED, WORLD
 from experiments.walking.live import launch
 

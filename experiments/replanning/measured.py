@@ -10,7 +10,8 @@ from msgspec import Struct
 
 from experiments.babbling.contacts import read_touches
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.replanning.job import Crossing, read_crossings
+from experiments.jobs import read_done
+from experiments.replanning.job import Crossing
 from experiments.replanning.scene import BALL, LEFT, PART, RATE, new_map, robot
 from mobee.robot.robot import Array
 
@@ -36,7 +37,7 @@ def measure(folder: Path) -> list[Measured]:
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
     found = []
-    for crossing in read_crossings(folder):
+    for crossing in read_done(folder, Crossing):
         first, last = crossing.motions[0].asked, crossing.motions[-1].ended
         deep = [touch.depth for touch in touches if first <= touch.begin <= last]
         found.append(_measured(crossing, q, max(deep, default=0.0)))
@@ -51,7 +52,7 @@ def read_measured(folder: Path) -> list[Measured]:
 
 def keep_poses(folder: Path) -> None:
     """Of the first crossing, keep poses and times for pictures: `q` (T, n) rad, `times` (T,) s, and those of `solid` and `bump`."""
-    q, crossing = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors)), read_crossings(folder)[0]
+    q, crossing = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors)), read_done(folder, Crossing)[0]
     ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)
     begin, told = ticks[0], {"solid": crossing.solid, "bump": _bump(crossing)}
     np.savez_compressed(folder / POSES, q=q[ticks - 2], times=(ticks - begin) / RATE, **{k: (v - begin) / RATE for k, v in told.items()})

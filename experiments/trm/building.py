@@ -12,6 +12,7 @@ import numpy as np
 import mobee
 from experiments.trm.coverage import valid
 from experiments.trm.example import Example
+from mobee.roadmap.building.build import LONGEST
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.neighbours import nearest_before
 from mobee.roadmap.roadmap import Roadmap
@@ -27,6 +28,7 @@ def build(
     file: Path | None = None,
     progress: Callable[[Any], None] | None = None,
     neighbours: int | None = None,
+    longest: float | None = LONGEST,
 ) -> Roadmap:
     """The map of an example."""
     return mobee.build_roadmap(
@@ -40,6 +42,7 @@ def build(
         method=method,
         seed=seed,
         neighbours=neighbours,
+        longest=longest,
         file=file,
         progress=progress,
     )

@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
-    import mobee
+    from experiments.trm.building import build
 
     known = "nothing"
     with Progress() as bar:
@@ -56,20 +56,8 @@ def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
             bar.show(1.0 - now.open / max(now.vertices, 1), known)
 
         try:
-            return mobee.build_roadmap(
-                example.model,
-                costs=list(example.costs),
-                task=example.task,
-                spacing=example.spacing,
-                start=example.start,
-                motors=list(example.motors),
-                margin=example.margin,
-                method=arguments.method,
-                seed=arguments.seed,
-                neighbours=arguments.neighbours,
-                longest=arguments.longest or None,
-                file=path,
-                progress=show,
+            return build(
+                example, arguments.method, arguments.seed, path, show, neighbours=arguments.neighbours, longest=arguments.longest or None
             )
         except KeyboardInterrupt:
             if not path.exists():

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from experiments.live_reach.job import read_job
+from experiments.jobs import read_job
+from experiments.live_reach.job import Job
 from experiments.live_reach.performer.config import Config
 from experiments.live_reach.performer.mover import Mover
 from experiments.live_reach.performer.node import perform
@@ -25,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         robot = load_robot(config.robot)
         load_planning()  # before the bus hears of it: what is compiled in the first plan would be waited for
         folder = Path(config.run_dir)
-        job = read_job(folder)
+        job = read_job(folder, Job)
         with Service("performer", config, robot) as service, ExitStack() as stack:
             mover = None
             if job.kind == "moving":

@@ -9,7 +9,8 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
-from experiments.live_reach.job import Job, Tried, append_try
+from experiments.jobs import append_done
+from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.performer.contestants import Ended, contestant
 from experiments.live_reach.performer.hand import Hand
 from experiments.live_reach.performer.mover import Mover
@@ -31,7 +32,7 @@ def perform(service: Service, robot: Robot, job: Job, folder: Path, mover: Mover
     if agent is not None:
         agent.learn(grid_targets(), max(0, job.tries - agent.tries))
     for problem in job.problems:
-        append_try(folder, _tried(hand, problem, attempt))
+        append_done(folder, _tried(hand, problem, attempt))
     hand.leave()
     if mover is not None:
         mover.leave()

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
-from experiments.replanning.job import Crossing, append_crossing, read_job
+from experiments.jobs import append_done, read_job
+from experiments.replanning.job import Crossing, Job
 from experiments.replanning.performer.config import Config
 from experiments.replanning.performer.crosser import Crosser
 from experiments.replanning.scene import BALL, LEFT, PART, RIGHT, new_map
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, name)
     with explained(name):
         robot, folder = load_robot(config.robot), Path(config.run_dir)
-        job = read_job(folder)
+        job = read_job(folder, Job)
         new_map().plan(RIGHT, LEFT)  # what is imported for the first plan is imported before the robot moves
         with Service("performer", config, robot) as service, ExitStack() as stack:
             watcher = None
@@ -46,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             service.ready()
             hand.measure(PART)
             for after in job.after:
-                append_crossing(folder, whole(crosser, after))
+                append_done(folder, whole(crosser, after))
             hand.leave()
             service.call(keys.service_rpc("launcher", "shutdown"), Empty, Done, tries=3)
             service.run()

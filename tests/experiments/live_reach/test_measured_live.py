@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.live_reach.job import Job, Tried, append_try, read_job, read_tries, write_job
+from experiments.jobs import append_done, read_done, read_job, write_job
+from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.measured import measure, read_block, write_block
 from experiments.live_reach.problems import FRESH, Problem
 from experiments.live_reach.settings import MARKER, PART, robot
@@ -48,7 +49,7 @@ def problem(number: int, off: float) -> Problem:
 def test_success_is_the_palm_within_two_centimetres_of_the_surface_when_the_force_ended(folder: Path) -> None:
     problems = [problem(0, 0.019), problem(1, 0.021), problem(2, 0.0)]
     for one in (tried(0, [20, END]), tried(1, [END]), tried(2, [], why="held")):
-        append_try(folder, one)
+        append_done(folder, one)
     near, far, none = measure(folder, Job("learner", 0, "", problems), RATE, True).tries
     assert near.success and near.off == pytest.approx(0.019)
     assert near.seconds == pytest.approx((END - 11) / RATE) and near.reaches == 2
@@ -57,25 +58,25 @@ def test_success_is_the_palm_within_two_centimetres_of_the_surface_when_the_forc
 
 
 def test_the_row_before_the_tick_is_what_its_encoders_saw(folder: Path) -> None:
-    append_try(folder, tried(0, [END - 1]))
+    append_done(folder, tried(0, [END - 1]))
     before = measure(folder, Job("learner", 0, "", [problem(0, 0.0)]), RATE, True).tries[0]
     assert before.off > 0.03
 
 
 def test_a_target_that_moved_counts_where_it_was_then(folder: Path) -> None:
-    append_try(folder, tried(0, [END], there=problem(0, 0.005).position))
+    append_done(folder, tried(0, [END], there=problem(0, 0.005).position))
     assert measure(folder, Job("moving", 0, "", [problem(0, 0.2)]), RATE, True).tries[0].off == pytest.approx(0.005)
 
 
 def test_deep_contacts_are_told_of_the_block_and_of_the_try_in_whose_time_they_began(folder: Path) -> None:
-    append_try(folder, tried(0, [END]))
+    append_done(folder, tried(0, [END]))
     block = measure(folder, Job("learner", 0, "", [problem(0, 0.0)]), RATE, True)
     assert [touch.depth for touch in block.deep] == [0.003, 0.004]
     assert [touch.depth for touch in block.tries[0].deep] == [0.003]
 
 
 def test_a_joint_that_truly_moves_is_seen_in_ticks_from_the_request(folder: Path) -> None:
-    append_try(folder, tried(0, [END], asked=50, first=2))
+    append_done(folder, tried(0, [END], asked=50, first=2))
     found = measure(folder, Job("first motion", 0, "", [problem(0, 0.0)]), RATE, True).tries[0]
     assert (found.first, found.first_motion) == (2, END - 1 - 50)
 
@@ -83,8 +84,8 @@ def test_a_joint_that_truly_moves_is_seen_in_ticks_from_the_request(folder: Path
 def test_jobs_tries_and_blocks_come_back_from_disk_as_they_were(folder: Path) -> None:
     job = Job("learner", 3, "run.sqlite", [problem(0, 0.0)], 5)
     write_job(folder, job)
-    assert read_job(folder) == job and read_tries(folder) == []
-    append_try(folder, tried(0, [END]))
+    assert read_job(folder, Job) == job and read_done(folder, Tried) == []
+    append_done(folder, tried(0, [END]))
     block = measure(folder, job, RATE, True)
     write_block(folder, block)
     assert read_block(folder) == block

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from experiments.babbling.measured import CONTACTS, POSITIONS
+from experiments.jobs import append_done, read_job, write_job
 from experiments.replanning.figure import draw
 from experiments.replanning.findings import CLAIMS, findings
-from experiments.replanning.job import Acted, Crossing, Job, append_crossing, read_job, write_job
+from experiments.replanning.job import Acted, Crossing, Job
 from experiments.replanning.measured import keep_poses, measure, read_measured
 from experiments.replanning.scene import ABOVE, LEFT, PART, RIGHT, ball, model, new_map, robot
 
@@ -36,8 +37,8 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / CONTACTS).write_text("k,pair,depth\n30,r_hand ball,0.001\n31,r_hand table,0.004\n")
     write_job(tmp_path, Job([0.1]))
     motions = [acted(LEFT, 10, BUMP, 41), acted(ABOVE, 41, -1, 80), acted(LEFT, 80, -1, END)]
-    append_crossing(tmp_path, Crossing(20, motions))
-    append_crossing(tmp_path, Crossing(20, [acted(LEFT, 10, -1, 50)]))
+    append_done(tmp_path, Crossing(20, motions))
+    append_done(tmp_path, Crossing(20, [acted(LEFT, 10, -1, 50)]))
     return tmp_path
 
 
@@ -48,7 +49,7 @@ def test_bump_command_turn_and_contacts(folder: Path) -> None:
     assert first.deepest == pytest.approx(1e-3) and first.seconds == pytest.approx(1.1)
     assert not through.bumped and through.arrived
     assert read_measured(folder) == [first, through]
-    assert read_job(folder) == Job([0.1])
+    assert read_job(folder, Job) == Job([0.1])
 
 
 def test_few_crossings_leave_the_claims_open_and_slow_ones_refute_them(folder: Path) -> None:
