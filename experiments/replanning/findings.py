@@ -41,7 +41,7 @@ def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[C
     arrived = sum(one.arrived for one in bumped)
     straight = sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)
     seconds = float(np.median([one.seconds for one in bumped]))
-    deepest = 1e3 * max(one.deepest for one in crossings)
+    deepest, clear = 1e3 * max(one.deepest for one in crossings), sum(one.deepest == 0.0 for one in crossings)
     return [
         CLAIMS[0].measured(
             f"{arrived} of {len(bumped)} arrive, {straight} of them straight on; {seconds:.1f} s in all",
@@ -52,5 +52,9 @@ def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[C
             f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
             bool(command.max() <= SOON) if enough else None,
         ),
-        CLAIMS[2].measured(f"{deepest:.1f} mm in {len(crossings)} crossings", bool(deepest <= 1e3 * DEEP) if enough else None),
+        CLAIMS[2].measured(
+            f"{deepest:.1f} mm; none at all in {clear} of {len(crossings)} crossings: the ball turns solid at any time, also about a hand"
+            " that is in it",
+            bool(deepest <= 1e3 * DEEP) if enough else None,
+        ),
     ]
