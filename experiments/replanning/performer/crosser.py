@@ -27,6 +27,7 @@ class Crosser:
         self.robot, self.motions = hand.robot, list[Acted]()
         self._service, self._hand = service, hand
         self._map = new_map()
+        self._place = ball().tolist()  # now: it takes half a second to find out, in which the hand would be on its way
         self._solid_at = self._solid = -1  # ticks
         self._after = -1.0  # s
         self._ended = 0.0  # s of processor time
@@ -58,7 +59,7 @@ class Crosser:
 
     def turn(self, solid: bool) -> None:
         """Make the ball solid, in the model and in the simulator, or a ghost; in free mode nobody waits until that is done."""
-        role, place = "obstacle" if solid else "ghost", ball().tolist() if solid else AWAY
+        role, place = "obstacle" if solid else "ghost", self._place if solid else AWAY
         if self._service.locked:
             self._service.call(keys.world_rpc("role"), SetRole, Done, name=BALL, role=role)
             self._service.call(keys.sim("place"), Place, Done, name=BALL, position=place, tries=3)
