@@ -27,6 +27,7 @@ TORSO = ROBOT.part("torso")
 YAW, PITCH = TORSO.motors.index("torso_yaw"), TORSO.motors.index("torso_pitch")
 FAST = float(np.deg2rad(25.0))  # rad/s
 NEAR = np.deg2rad(1.5)  # rad: backlash, noise of the encoders and of the recorded poses
+TRIES = 5  # on a busy machine commands may come too late, and the gate holds
 ROBOT_ITSELF, FILTERED = "icub", "icub_filtered"
 
 
@@ -77,9 +78,19 @@ class Client:
         return rpc.call(self.session, self.name, key, request, reply, timeout=10.0, **fields)
 
     def arm(self) -> None:
-        self.epoch = self.call(keys.drive("torso", "take"), Take, Taken, instance="c1").epoch
+        wait_for(self._took, "the drive")
         assert self.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch).gate == "armed"
         self.until(lambda: self.gate == "armed", "the armed state")
+
+    def _took(self) -> bool:
+        """Whether the drive was given; not while the reflex takes the robot back, which a busy machine may have called."""
+        try:
+            self.epoch = self.call(keys.drive("torso", "take"), Take, Taken, instance="c1").epoch
+        except CallFailed as failed:
+            if "wait, then arm again" not in str(failed):
+                raise
+            return False
+        return True
 
     def until(self, condition: Callable[[], bool], what: str, timeout: float = 10.0) -> None:
         wait_for(lambda: self.tick() and condition(), what, timeout)
@@ -197,9 +208,12 @@ def test_a_robot_in_contact_that_nobody_brought_there_moves_when_somebody_answer
     mine = client(FILTERED)
     with pytest.raises(CallFailed, match="table .* no way back.* rpc/waypoint"):
         mine.arm()
-    mine.call(keys.waypoint("torso"), Empty, Done)
-    mine.arm()
-    mine.go(PITCH, 0.0)
+    for _ in range(TRIES):
+        mine.call(keys.waypoint("torso"), Empty, Done)
+        mine.arm()
+        mine.go(PITCH, 0.0)
+        if mine.gate == "armed":
+            break
     assert mine.gate == "armed"
     assert abs(mine.q[PITCH]) < NEAR
 
