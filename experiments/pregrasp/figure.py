@@ -39,6 +39,8 @@ def draw(found: Mapping[str, CellResult], path: Path) -> Path:
         axes.legend(fontsize=8)
     for axes in (first, *others):
         axes.set(xlabel="vertices of the map", xscale="log")
+        axes.set_xticks(vertices, labels=[str(count) for count in vertices])
+        axes.minorticks_off()
         axes.grid(alpha=0.2)
     drawing.savefig(path, dpi=110)
     return path
