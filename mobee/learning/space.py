@@ -42,7 +42,10 @@ class Space:
         part, indices = checked_joints(robot, joints)
         rests = np.asarray(rest, dtype=np.float64)
         if rests.shape not in ((), (len(part),)) or not ((rests >= 0.0) & (rests <= 1.0)).all():
-            raise InvalidValue(f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay.")
+            raise InvalidValue(
+                f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay, or one for each of its "
+                f"{len(part)} motors."
+            )
         self.robot, self.part, self.joints = robot, part.name, tuple(joints)
         self.rest: float | list[float] = rests.tolist()
         self.columns: Ints = indices - part.start

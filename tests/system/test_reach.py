@@ -29,6 +29,7 @@ pytestmark = pytest.mark.system
 SCENARIO = Path(__file__).with_name("reaching.toml")
 SEED, TICK = 3, 0.02
 TICKS = 1200  # the script is over before
+ATTEMPTS = 3  # a busy machine may let the robot hold in mid-motion, which the verb reports
 STILL = 0.02  # rad in a second, eight times the noise of encoders; their differences are as noisy at rest as a slow motion is fast
 
 
@@ -88,7 +89,10 @@ def play_a_map(path: Path, endpoint: str) -> dict[str, Any]:
     q[:, [robot.motor_index(name) for name in moves]] = [(-0.5, 0.8, 0.9), (-0.6, 0.9, 1.1)]
     Roadmap(Model(robot, world), q, np.array([[0.0], [1.0]]), np.array([[0, 1]]), np.ones(1), {"motors": moves}).save(path)
     argv = [sys.executable, "-m", "mobee_cli", "roadmap", "play", str(path), "--to", "1", "--live", "--endpoint", endpoint, "--json"]
-    done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
+    for _ in range(ATTEMPTS):
+        done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
+        if "the motion was broken off" not in done.stderr:
+            break
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))
 
