@@ -20,6 +20,7 @@ from mobee.robot.robot import Robot
 from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml_file import is_folder
 from mobee.robot.xml_node import read_xml
+from mobee.robot.xml_versions import WORLD_TAGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +53,16 @@ def check_file(
             content = load_robot(name_or_path, field=field, meshes=meshes, srdf=srdf)
         found = check_robot(content, world)
         file = find_file(name_or_path, ROBOTS, "robot")
-        found += source(read_xml(file)) if file.suffix.lower() != ".urdf" else []
+        found += source(read_xml(file, repair=True)) if file.suffix.lower() != ".urdf" else []
     elif world is not None or (field, meshes, srdf) != (None, None, None):
         raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it, fields, meshes or an SRDF.")
     else:
         with _listening(said):
             content = load_world(path)
-        root = read_xml(path)
+        root = read_xml(path, repair=True)
+        said_of_form = list(source(root))
         lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in root}
-        found = check_world(content, lines) + list(source(root))
+        found = check_world(content, lines) + said_of_form
     return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
 
 
@@ -83,7 +85,7 @@ def world_file(name_or_path: str | Path) -> Path | None:
         return WORLDS / f"{given}.xml"
     if path.suffix.lower() != ".xml" or not path.is_file():
         return None
-    return path if read_xml(path).tag == "world" else None
+    return path if read_xml(path, repair=True).tag in WORLD_TAGS else None
 
 
 @contextmanager

@@ -24,16 +24,16 @@ def test_a_convex_keeps_its_points_in_its_own_axes() -> None:
     np.testing.assert_allclose(volume.vertices, [[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])
     np.testing.assert_allclose(volume.centre, [1, 0, 0])
     np.testing.assert_allclose(volume.rotation @ [0, 1, 0], [0, 0, 1], atol=1e-12)  # turned as a box with these attributes is
-    np.testing.assert_allclose(volume.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(volume.rotation @ [0, 0, 1], [0, 1, 0], atol=1e-12)
 
 
 def test_a_robot_carries_a_convex_solid_and_a_convex_field(tmp_path: Path) -> None:
     robot = read_robot(
         robot_file(
             tmp_path,
-            '<bodypart name="arm"><motor name="m" minPos="0" maxPos="1"><joint z="1"><link x="2">',
+            '<bodypart name="arm"><motor name="m" minPos="0" maxPos="1"><joint z="1"><link x="2"><link>',
             f'<convex name="a" points="{TETRAHEDRON}" py="1"/><CONVEX points="{TETRAHEDRON}" field="true"/>',
-            "</link></joint></motor></bodypart>",
+            "</link></link></joint></motor></bodypart>",
         )
     )
     solid, field = robot.shapes
