@@ -45,7 +45,8 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
         node.fail("name", f"a second shape {name!r}", "Rename one of the two")
     role = "field" if node.flag("field") else "solid"
     centre = place.start + volume.centre
-    shape = Shape(name, place.link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
+    link = place.link if node.flag("turns", default=True) else place.carrier
+    shape = Shape(name, link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
     place = replace(place, base=node.flag("base", default=place.base))
     add_shape(node, draft, replace(shape, role="field") if role == "field" else shape, place)
 
@@ -87,4 +88,5 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
         rotation = left @ right
         normal = normal if given else rotation[:, 2]
     draft.note("marker", name, node)
-    draft.markers[name] = Marker(name, place.link, place.start + node.vector(PLACE), rotation, normal)
+    link = place.link if node.flag("turns", default=True) else place.carrier
+    draft.markers[name] = Marker(name, link, place.start + node.vector(PLACE), rotation, normal)

@@ -46,6 +46,7 @@ class Place:
     point: Array  # (3,) m, where links and joints go on: the end of a link
     start: Array  # (3,) m, where shapes and markers stand: the start of a link
     link: int = 0
+    carrier: int = 0  # in a joint the link that carries it, else the same link: what has turns="false" is on it
     part: str = ""
     motor: str = ""
     subtree: int = -1

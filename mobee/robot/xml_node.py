@@ -128,9 +128,9 @@ class Node:
             if name not in known:
                 self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
-    def warn(self, problem: str) -> None:
+    def warn(self, problem: str, category: type[Warning] = UserWarning) -> None:
         """Warn with file, line and tag."""
-        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", stacklevel=2)
+        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", category, stacklevel=2)
 
 
 @dataclass(frozen=True, slots=True)

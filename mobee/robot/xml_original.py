@@ -5,6 +5,7 @@ The rules are those of the published program (kailfrank/MoBeE, 2014):
 - a <motor> whose name was defined before means that motor, and its other attributes do not count;
 - a motor without limits has -1 to 1, a joint without limits -180 to 180 deg; a home outside the limits is the nearest limit;
 - what stands inside a <link> or <joint> stands relative to its start, a marker exactly there; a marker without a normal has +x;
+- what stands inside a <joint> does not turn with it: it stays with the link that carries the joint;
 - a radius of 0 or less draws nothing, and an unknown tag is skipped, but not what stands inside;
 - a <constraint> outside a <constraintList> is ignored, and so is one that cannot be read;
 - pairs of shapes are tested by the rule of pairs_2014.py; shapes near the root of the tree are never tested against the world.
@@ -31,6 +32,7 @@ PROGRAMS = "the programs of 2010 to 2014"
 VOLUMES = ("sphere", "cylinder", "box")
 TAGS = frozenset({"zeropositionkinematictree", "bodypart", "constraintlist", "constraint", "motor", "link", "joint", "marker", *VOLUMES})
 LIMITS: dict[str, dict[str, str]] = {"motor": {"minPos": "-1", "maxPos": "1"}, "joint": {"minPos": "-180", "maxPos": "180"}}
+UNSEEN = {"sphere": (*AXIS, "angle"), "cylinder": ("angle",)}  # turns that do not show
 DRAWN = ("tracer", "detail", "r")  # how a thing was drawn
 BRANCH_VOLUME = {"vx": "hx", "vy": "hy", "vz": "hz"}
 BRANCH_BOX = {"x": "width", "y": "height", "z": "depth"}
@@ -288,18 +290,28 @@ def _has_row(node: Node) -> bool:
 
 
 def _rewrite_bodies(root: Node) -> list[Remark]:
-    """Radii that draw nothing, flags that are not set, and markers without a name, with one that is taken, or with a place."""
+    """Radii that draw nothing, flags that are not set, what stands in a joint, and markers without a name or with one that is taken."""
     remarks: list[Remark] = []
     taken: Counter[str] = Counter()
-    for node in descendants(root):
+    waiting = [(root, False)]
+    while waiting:
+        node, in_joint = waiting.pop()
+        if node.tag in ("joint", "link"):
+            in_joint = node.tag == "joint"
+        elif in_joint and node.tag in (*VOLUMES, "marker"):
+            node.attributes["turns"] = "false"
+        waiting += [(child, in_joint) for child in reversed(node.children)]
         if node.tag in ("link", "joint"):
             for name in ("radius", "field"):
                 if name in node.attributes and node.number(name) <= 0:
                     del node.attributes[name]
             if node.attributes.get("noSelfCollision") != "true":
                 node.attributes.pop("noSelfCollision", None)
-        elif node.tag in VOLUMES and node.attributes.get("field", "").lower() != "true":
-            node.attributes.pop("field", None)
+        elif node.tag in VOLUMES:
+            if node.attributes.get("field", "").lower() != "true":
+                node.attributes.pop("field", None)
+            for name in UNSEEN.get(node.tag, ()):
+                node.attributes.pop(name, None)
         elif node.tag == "marker":
             remarks += _rewrite_marker(node, taken)
     return remarks

@@ -19,6 +19,7 @@ from typing import Literal
 
 import numpy as np
 
+from mobee.errors import OlderVersion
 from mobee.robot.number_text import degrees, number, numbers
 from mobee.robot.robot import Array
 from mobee.robot.xml_node import Node, Remark, descendants, shown
@@ -184,7 +185,7 @@ def _turned(node: Node) -> Iterator[_Change]:
 
 
 def report(remarks: list[Remark]) -> None:
-    """Warn of everything in a file that was not read as it stands there."""
+    """Warn, with OlderVersion, of everything in a file that was not read as it stands there."""
     for remark in remarks:
         if remark.severity == "warning":
-            remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what)
+            remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)

@@ -33,13 +33,13 @@ KNOWN = {
         {"name", "moves", "motor", "type", *STEP, "minPos", "maxPos", "length", "radius", "field", "noSelfCollision", "base"}
     ),
     "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque"}),
-    "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
+    "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation", "turns"}),
     "mass": MASS_ATTRIBUTES,
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
     "robot": INCLUDE_ATTRIBUTES,
     "ignore": IGNORE_ATTRIBUTES,
-} | {tag: known | {"name", "field", "base"} for tag, known in BODY_TAGS.items()}
+} | {tag: known | {"name", "field", "base", "turns"} for tag, known in BODY_TAGS.items()}
 
 
 def read_robot(path: Path) -> Robot:
@@ -142,7 +142,10 @@ def _read_motor(node: Node, draft: Draft, place: Place) -> Place:
 
 def _read_link(node: Node, draft: Draft, place: Place) -> Place:
     here = enter(
-        node, draft, replace(place, start=place.point, base=node.flag("base", default=place.base)), f"the link in line {node.line}"
+        node,
+        draft,
+        replace(place, start=place.point, carrier=place.link, base=node.flag("base", default=place.base)),
+        f"the link in line {node.line}",
     )
     step, length = link_step(node)
     if place.link == 0 and "name" in node.attributes:
@@ -173,7 +176,12 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
     draft.links.append(link)
     draft.note("joint", name, node)
     draft.note("link", link, node)
-    here = enter(node, draft, replace(place, start=place.point, link=index + 1, motor=motor, base=node.flag("base")), f"joint {name}")
+    here = enter(
+        node,
+        draft,
+        replace(place, start=place.point, link=index + 1, carrier=place.link, motor=motor, base=node.flag("base")),
+        f"joint {name}",
+    )
     draft.subtree.append(here.subtree)
     length = node.positive("length", float(np.linalg.norm(node.vector(STEP))))
     read_skeleton(node, draft, here, place.point, axis, length)
