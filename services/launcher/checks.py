@@ -12,6 +12,7 @@ from typing import Any
 
 from mobee.errors import MobeeError, UnknownName
 from services.common.config import ConfigError, nearest
+from services.common.worlds import NO_WORLD
 from services.launcher.scenario import Part, Scenario
 
 
@@ -111,7 +112,7 @@ def check_robots(scenario: Scenario) -> None:
     read_robot, read_world = cache(load_robot), cache(load_world)
     for part in scenario.parts:
         robot = _read(scenario, part, "robot", read_robot)
-        if getattr(part.config, "world", ""):
+        if getattr(part.config, "world", NO_WORLD) != NO_WORLD:
             _read(scenario, part, "world", read_world)
         name = getattr(part.config, "part", None)
         if name is not None and name not in robot.parts:

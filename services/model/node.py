@@ -11,7 +11,7 @@ from bus_schema import VERSION, keys
 from bus_schema.chain import Tick
 from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
 from bus_schema.rpc import JacobianAt, JacobianReply
-from mobee import Gains, Model, load_world
+from mobee import Gains, Model
 from mobee.collision.contact import Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
@@ -33,7 +33,7 @@ class ModelNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
-        self._model = Model(robot, load_world(config.world))
+        self._model = Model(robot, config.load_world())
         for name, item in list(self._model.world.objects.items()):
             if item.role == "target":
                 self._model.world.remove(name)

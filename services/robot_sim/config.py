@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from services.common.config import ServiceConfig
+from services.common.worlds import WorldConfig
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
+class Config(WorldConfig, frozen=True, kw_only=True):
     """The simulated robot's settings."""
 
     backend: Literal["pybullet", "kinematic"] = "pybullet"
@@ -21,8 +21,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Ticks a second."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
     """Simulated seconds a second; a command's ttl stays in real time, its age is counted in ticks."""
-    world: str = "table"
-    """Shipped world, or path to a world file."""
     motors: Literal["published", "identified"] = "published"
     """The motors' numbers: those below, or those that were fitted to this robot, with which they do not count (docs/plant.md)."""
     lag: NotNegative = 0.05

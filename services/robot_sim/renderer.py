@@ -13,7 +13,7 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
-from mobee import load_robot, load_world
+from mobee import load_robot
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.config import load_config
@@ -31,7 +31,7 @@ class RendererNode:
     def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
         self._service = service
         self._period = round(1e9 / config.frame_rate)  # ns
-        self._scene = Scene(robot, load_world(config.world), config.width, config.height, config.view_deg)
+        self._scene = Scene(robot, config.load_world(), config.width, config.height, config.view_deg)
         self._body = Body(service.bus, robot)
         self._truth = service.bus.latest(keys.SIM_TRUTH, Truth)
         self._images = {eye: service.bus.publisher(keys.image(eye), Image, BULK) for eye in keys.EYES}

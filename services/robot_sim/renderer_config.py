@@ -6,14 +6,12 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from services.common.config import ServiceConfig
+from services.common.worlds import WorldConfig
 
 
-class RendererConfig(ServiceConfig, frozen=True, kw_only=True):
+class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """The renderer's settings."""
 
-    world: str = "table"
-    """Shipped world, or path to a world file."""
     frame_rate: Annotated[float, Meta(gt=0, le=30)] = 5.0
     """Pictures of each eye a second of simulated time."""
     width: Annotated[int, Meta(ge=16, le=1280)] = 320

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mobee.robot import load
 from services.common.config import ConfigError
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
+from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import read_scenario, shipped
 from services.launcher.toml import to_toml
 from tests.services.launched import mobee, toys
@@ -31,6 +32,17 @@ world = "table"
 gains = "published_2014"
 
 [services.agent_torso]
+"""
+
+
+ARM = """\
+<ZeroPositionKinematicTree version="1.0" robotName="arm">
+ <bodypart name="arm">
+  <motor name="pan" minPos="-90" maxPos="90" home="0">
+   <joint z="1"><link x="-0.2" radius="0.02"><marker name="tip" nx="-1"/></link></joint>
+  </motor>
+ </bodypart>
+</ZeroPositionKinematicTree>
 """
 
 
@@ -81,6 +93,29 @@ def test_an_agent_is_told_its_part_and_shared_settings_reach_whom_they_concern(s
     assert parts["agent_torso"].part == "torso"
     assert parts["model"].gains == "published_2014"
     assert not hasattr(parts["robot_sim"], "gains")
+
+
+def test_a_robot_of_ones_own_has_no_table_and_the_run_s_record_shows_it(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(ARM)
+    path = tmp_path / "arm.toml"
+    path.write_text(f'[shared]\nrobot = "{tmp_path}/arm.xml"\n[services.robot_sim]\nbackend = "kinematic"\n[services.model]\n')
+    scenario = read_scenario(str(path))
+    assert {part.who: part.config.world for part in scenario.parts} == {"robot_sim": "none", "model": "none"}
+    check_robots(scenario)
+    run = make_run_directory(tmp_path / "runs", scenario, "tcp/127.0.0.1:1")
+    assert tomllib.loads((run / "model.toml").read_text())["world"] == "none"
+    empty = read_scenario("kinematic", ["shared.world=none"])
+    assert {part.config.world for part in empty.parts if hasattr(part.config, "world")} == {"none"}
+    assert {part.config.world for part in read_scenario(str(path), ["shared.robot=icub"]).parts} == {"table"}
+
+
+def test_the_run_s_record_names_files_so_that_they_are_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.xml").write_text(ARM)
+    Path("arm.toml").write_text('[services.model]\nrobot = "arm.xml"\nworld = "table"\n')
+    run = make_run_directory(tmp_path / "runs", read_scenario("arm.toml"), "tcp/127.0.0.1:1")
+    written = tomllib.loads((run / "model.toml").read_text())
+    assert (written["robot"], written["world"]) == (str(tmp_path / "arm.xml"), "table")
 
 
 def test_settings_of_the_command_line_win(scenario: Path) -> None:
