@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.monitor.blueprint import blueprint
 from services.monitor.config import Config
@@ -18,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the monitor until it is told to end."""
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with open_output(config, blueprint(config.page), recording_of(config)) as output, Service("monitor", config, robot) as service:
             MonitorNode(service, config, robot, output)
             service.ready()

@@ -7,7 +7,10 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.robot.robot import Robot
+from mobee.simulation.motors import MotorParameters
 from services.common.worlds import WorldConfig
+from services.robot_sim.backend import require_simulated
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
@@ -45,3 +48,11 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Lockstep: stop after so many ticks; 0: go on for ever."""
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.record); empty: none."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: PyBullet moves the iCub only, and only some robots' motors were identified."""
+        super().check_robot(robot)
+        if self.backend == "pybullet":
+            require_simulated(robot)
+        if self.motors == "identified":
+            MotorParameters.identified(robot.name)

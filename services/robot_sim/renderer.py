@@ -13,12 +13,11 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
-from mobee import load_robot
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.config import load_config
 from services.common.delivery import BULK
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.figures import Percentiles
 from services.common.service import Service
 from services.robot_sim.renderer_config import RendererConfig
@@ -104,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the renderer until it is told to end."""
     config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
     with explained("services.robot_sim.renderer"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with Service("renderer", config, robot) as service:
             RendererNode(service, config, robot)
             service.ready()

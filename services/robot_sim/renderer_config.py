@@ -6,6 +6,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from mobee.robot.robot import Robot
+from services.common.eyes import require_eyes
 from services.common.worlds import WorldConfig
 
 
@@ -20,3 +22,8 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """Rows of a picture."""
     view_deg: Annotated[float, Meta(gt=5, lt=120)] = 50.0
     """Vertical field of view, in degrees."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: a robot needs eyes."""
+        super().check_robot(robot)
+        require_eyes(robot)

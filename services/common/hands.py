@@ -1,0 +1,84 @@
+"""Which marker a part reaches with: a palm where there are palms, else the end of its chain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.collision.touch import links_moved
+from mobee.errors import InvalidValue
+from mobee.kinematics import link_transforms
+from mobee.robot.robot import Array, Robot
+
+PALMS = ("left_palm", "right_palm")
+AS_NEAR = 1e-3  # m, palms whose distances differ by less are as near
+
+
+def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
+    """The markers that a part moves, in the order of the file; raises UnknownName for a part that the robot does not have."""
+    robot.part(part)
+    moved = links_moved(robot)[part]
+    return tuple(name for name, marker in robot.markers.items() if marker.link in moved)
+
+
+def hand_of(robot: Robot, part: str) -> str:
+    """The marker that a part reaches with: the palm on its side (the right one for a torso), else the first end marker that it moves.
+
+    Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
+    """
+    found = moved_markers(robot, part)
+    palm = PALMS[0] if part.startswith("left") else PALMS[1]
+    if palm in found:
+        return palm
+    if not found:
+        raise InvalidValue(f"{part} of {robot.name!r} moves no marker to reach with: {_without_markers(robot)}")
+    return next((name for name in end_markers(robot) if name in found), found[0])
+
+
+def end_markers(robot: Robot) -> tuple[str, ...]:
+    """The markers that a motor moves and that lie on links at the ends of the tree; where there are none, all that a motor moves."""
+    inner = {joint.parent for joint in robot.joints}
+    moved = [name for name in robot.markers if any(name in moved_markers(robot, part) for part in robot.parts)]
+    return tuple(name for name in moved if robot.markers[name].link not in inner) or tuple(moved)
+
+
+def part_of(robot: Robot, marker: str) -> str:
+    """The part with the most motors that move a marker, of several the one nearest to it.
+
+    Raises UnknownName for a marker that the robot does not have, InvalidValue for one that no motor moves.
+    """
+    link = robot.marker(marker).link
+    chain: list[int] = []  # motors, the nearest to the marker first
+    while link > 0:
+        chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()
+        link = robot.joints[link - 1].parent
+    owners = [robot.motor_table[motor].part for motor in dict.fromkeys(chain)]
+    if not owners:
+        valid = ", ".join(end_markers(robot))
+        raise InvalidValue(f"no motor moves the marker {marker!r}. Valid: {valid or 'none'}.")
+    return max(dict.fromkeys(owners), key=owners.count)
+
+
+def hand_for(robot: Robot, place: Array) -> str:
+    """The marker to put on `place` (3,) m when nobody chose one: of two palms the nearer at home, the right one where both are as near.
+
+    A robot without both palms reaches with its first end marker. Raises InvalidValue for a robot without a marker that a motor moves.
+    """
+    if all(palm in robot.markers for palm in PALMS):
+        left, right = (float(np.linalg.norm(_at_home(robot, palm) - place)) for palm in PALMS)
+        return PALMS[0] if left < right - AS_NEAR else PALMS[1]
+    ends = end_markers(robot)
+    if not ends:
+        raise InvalidValue(f"no motor of {robot.name!r} moves a marker to reach with: {_without_markers(robot)}")
+    return ends[0]
+
+
+def _at_home(robot: Robot, name: str) -> Array:
+    marker = robot.marker(name)
+    link = link_transforms(robot, robot.home)[marker.link]
+    place: Array = link[:3, :3] @ marker.position + link[:3, 3]
+    return place
+
+
+def _without_markers(robot: Robot) -> str:
+    known = f"its markers are {', '.join(robot.markers)}" if robot.markers else "it has none"
+    return f'{known}. Add <marker name="tip"/> at the end of its chain in zero-position XML, or a link on a fixed joint in a URDF.'
