@@ -58,12 +58,15 @@ def part_of(robot: Robot, marker: str) -> str:
     return max(dict.fromkeys(owners), key=owners.count)
 
 
-def hand_for(robot: Robot, place: Array) -> str:
-    """The marker to put on `place` (3,) m when nobody chose one: of two palms the nearer at home, the right one where both are as near.
+def hand_for(robot: Robot, place: Array | None) -> str:
+    """The marker to put on a place when none was chosen: of two palms the nearer at home, the right one where both are as near.
 
-    A robot without both palms reaches with its first end marker. Raises InvalidValue for a robot without a marker that a motor moves.
+    `place`: (3,) m, None where it is not known; then it is the right palm. A robot without both palms reaches with its first end
+    marker. Raises InvalidValue for a robot without a marker that a motor moves.
     """
     if all(palm in robot.markers for palm in PALMS):
+        if place is None:
+            return PALMS[1]
         left, right = (float(np.linalg.norm(_at_home(robot, palm) - place)) for palm in PALMS)
         return PALMS[0] if left < right - AS_NEAR else PALMS[1]
     ends = end_markers(robot)

@@ -1,0 +1,63 @@
+"""The robot and the world of a command that needs no running system: options, and what they stand for."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from pathlib import Path
+
+from mobee.collision.world import World
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from services.common.worlds import NO_WORLD, world_around
+
+DEFAULT = "icub"
+_RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
+
+
+def add_robot(parser: argparse.ArgumentParser, text: str) -> None:
+    """The robot; `text` says which it is when it is left out."""
+    parser.add_argument("--robot", metavar="FILE", help=f"shipped robot, or path of a .xml or .urdf file ({text})")
+    add_urdf_options(parser)
+
+
+def add_world(parser: argparse.ArgumentParser) -> None:
+    """The world around the robot."""
+    text = f"shipped world, path of a .xml file, or {NO_WORLD} (default: the table for the shipped iCubs, {NO_WORLD} for other robots)"
+    parser.add_argument("--world", metavar="FILE", help=text)
+
+
+def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
+    """The robot that the options name, or the default; raises MobeeError."""
+    return load_robot(arguments.robot or default, **urdf_options(arguments))
+
+
+def world_given(arguments: argparse.Namespace, default: str = DEFAULT) -> World:
+    """The world around the robot of `robot_given`; raises MobeeError."""
+    return world_around(arguments.world, arguments.robot or default)
+
+
+def robot_of_run(run: Path) -> str | None:
+    """The name or path of the robot by the settings of a run, None where the run has none; raises UserError.
+
+    `run`: the folder of a run of `mobee launch`, or a file in it.
+    """
+    file = (run if run.is_dir() else run.parent) / _RUN_SETTINGS
+    try:
+        services = tomllib.loads(file.read_text()).get("services", {}).values()
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UserError(f"{file}: the settings of the run cannot be read ({error}): name its robot with --robot FILE", BAD_INPUT) from None
+    named = [table["robot"] for table in services if isinstance(table, dict) and isinstance(table.get("robot"), str)]
+    return named[0] if named else None
+
+
+def require_no_robot(arguments: argparse.Namespace, why: str) -> None:
+    """Raise UserError where an option names a robot or a world that the command does not use."""
+    given = urdf_options(arguments) | {name: getattr(arguments, name, None) for name in ("robot", "world")}
+    for name, value in given.items():
+        if value is not None:
+            raise UserError(f"--{name} {value}: {why}", BAD_INPUT)
