@@ -26,8 +26,8 @@ from mobee_cli.reach_result import ON, Result, lines
 from mobee_cli.reach_stage import Stage, offline
 from mobee_cli.robot_options import add_robot, add_world, require_no_robot, robot_given, robot_of_run, world_given
 
-_NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right, z up,
-from the waist.
+_NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,
+z up, from the waist.
 Without --run the hand is drawn there from where the robot is; with it, what the
 agent of that run has learned says from which posture, and the way there.
 Reached is a hand within {100 * ON:g} cm of the target's surface, when its force ends.

@@ -80,7 +80,7 @@ def lines(result: Result) -> list[str]:
     """For a person, at most 80 columns wide."""
     outcome, aim = result.outcome, result.target.aim
     verdict = "is on" if result.reached else "did not come to"
-    chosen = [f"Reaching with {result.marker}, moved by {result.part}: {result.why}."] if result.why else []
+    chosen = [f"Reaching with {result.marker}, moved by part {result.part}: {result.why}."] if result.why else []
     told = [
         *chosen,
         f"{result.marker} {verdict} the target at {_place(result.target.position)}: {1e3 * outcome.missing:.0f} mm from its {aim}, "
@@ -105,9 +105,9 @@ def lines(result: Result) -> list[str]:
 def _why(result: Result) -> str:
     if result.beyond == 0.0:
         learn = "" if result.path else ", as one that has learned to reach knows (--run)"
-        return f"{result.part} is long enough: from another posture, or past what it touched, it may come there{learn}."
+        return f"Part {result.part} is long enough: from another posture, or past what it touched, it may come there{learn}."
     far = f"{1e3 * result.beyond:.0f} mm from the target's surface"
-    return f"The nearest that {result.part} can bring it is {_place(result.nearest.position)}, {far}, if nothing is in the way."
+    return f"The nearest that part {result.part} can bring it is {_place(result.nearest.position)}, {far}, if nothing is in the way."
 
 
 def _place(position: Array) -> str:

@@ -11,7 +11,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.errors import BAD_INPUT, UserError
 from mobee_cli.urdf_options import add_urdf_options, urdf_options
-from services.common.worlds import NO_WORLD, world_around
+from services.common.worlds import NO_WORLD, is_path, world_around
 
 DEFAULT = "icub"
 _RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
@@ -52,6 +52,11 @@ def robot_of_run(run: Path) -> str | None:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UserError(f"{file}: the settings of the run cannot be read ({error}): name its robot with --robot FILE", BAD_INPUT) from None
     named = [table["robot"] for table in services if isinstance(table, dict) and isinstance(table.get("robot"), str)]
+    if named and is_path(named[0]) and not Path(named[0]).is_file():
+        raise UserError(
+            f"{named[0]}: the robot of the run by its settings, and there is no such file: name it with --robot FILE",
+            BAD_INPUT,
+        )
     return named[0] if named else None
 
 

@@ -51,7 +51,7 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest
     assert main(["reach", "--offline", "--target", "-3", "0.2", "0.1"]) == 1
     said = capsys.readouterr().out
     assert "right_palm did not come to the target at (-3.000, 0.200, 0.100)" in said
-    assert "The nearest that right_arm can bring it is (" in said
+    assert "The nearest that part right_arm can bring it is (" in said
     assert max(map(len, said.splitlines())) <= 80
 
 
@@ -137,7 +137,7 @@ def test_what_reaches_is_chosen_and_the_choice_is_printed(
 ) -> None:
     main(["reach", "--offline", "--target", "-0.3", "0.2", "0.1", *words])
     said = capsys.readouterr().out
-    assert " ".join(said.split()).startswith(f"Reaching with {marker}, moved by {part}: {why}" if why else f"{marker} ")
+    assert " ".join(said.split()).startswith(f"Reaching with {marker}, moved by part {part}: {why}" if why else f"{marker} ")
     assert max(map(len, said.splitlines())) <= 80
 
 
