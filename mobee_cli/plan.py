@@ -15,7 +15,7 @@ from mobee.learning.space import Space
 from mobee.robot.robot import Robot
 from mobee.store import STORE
 from mobee_cli.errors import BAD_INPUT, UserError
-from mobee_cli.robot_options import add_robot, require_no_robot, robot_given, robot_of_run
+from mobee_cli.robot_options import add_robot, require_none, robot_given, robot_of_run
 
 SLACK = 0.01  # rad beyond the limits: poses are given rounded, and encoders are noisy
 _NOTES = """A place is the number of a state, or the angles in rad of the joints that the
@@ -61,7 +61,7 @@ def _robot(arguments: argparse.Namespace) -> Robot | None:
     """The robot that is given, or that of the settings of the run; None for the one that comes with mobee under the name on record."""
     arguments.robot = arguments.robot or robot_of_run(arguments.run)
     if arguments.robot is None:
-        require_no_robot(arguments, "it is for the robot of --robot FILE")
+        require_none(arguments, "it is for the robot of --robot FILE")
         return None
     return robot_given(arguments)
 

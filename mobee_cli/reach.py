@@ -24,7 +24,7 @@ from mobee_cli.reach_hand import Choose, Hand, hand_chosen
 from mobee_cli.reach_learned import go_to_pre_reach
 from mobee_cli.reach_result import ON, Result, lines
 from mobee_cli.reach_stage import Stage, offline
-from mobee_cli.robot_options import add_robot, add_world, require_no_robot, robot_given, robot_of_run, world_given
+from mobee_cli.robot_options import add_robot, add_world, require_none, robot_given, robot_of_run, world_given
 
 _NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,
 z up, from the waist.
@@ -78,7 +78,7 @@ def _stage(arguments: argparse.Namespace) -> AbstractContextManager[Stage]:
         if arguments.robot is None and arguments.run is not None:
             arguments.robot = robot_of_run(arguments.run)
         return offline(robot_given(arguments), world_given(arguments), _chooser(arguments), target)
-    require_no_robot(arguments, "it is for --offline; without that the robot and the world are those of the system that runs")
+    require_none(arguments, "it is for --offline; without that the robot and the world are those of the system that runs")
     from mobee_cli.reach_live import live
 
     return live(arguments.endpoint, _chooser(arguments), target)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 from mobee.collision.world import World
@@ -60,9 +61,13 @@ def robot_of_run(run: Path) -> str | None:
     return named[0] if named else None
 
 
-def require_no_robot(arguments: argparse.Namespace, why: str) -> None:
-    """Raise UserError where an option names a robot or a world that the command does not use."""
-    given = urdf_options(arguments) | {name: getattr(arguments, name, None) for name in ("robot", "world")}
-    for name, value in given.items():
-        if value is not None:
-            raise UserError(f"--{name} {value}: {why}", BAD_INPUT)
+def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot", "world")) -> list[str]:
+    """The options of robot and world that were given, as on the command line: those of `names`, and all of a URDF."""
+    options = {name: getattr(arguments, name, None) for name in names} | urdf_options(arguments)
+    return [f"--{name} {value}" for name, value in options.items() if value is not None]
+
+
+def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
+    """Raise UserError for the first of the given options, which the command does not use here."""
+    for option in given_options(arguments, names):
+        raise UserError(f"{option}: {why}", BAD_INPUT)
