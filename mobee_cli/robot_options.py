@@ -47,12 +47,13 @@ def robot_of_run(run: Path) -> str | None:
     """
     file = (run if run.is_dir() else run.parent) / _RUN_SETTINGS
     try:
-        services = tomllib.loads(file.read_text()).get("services", {}).values()
+        services = tomllib.loads(file.read_text()).get("services")
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UserError(f"{file}: the settings of the run cannot be read ({error}): name its robot with --robot FILE", BAD_INPUT) from None
-    named = [table["robot"] for table in services if isinstance(table, dict) and isinstance(table.get("robot"), str)]
+    tables = services.values() if isinstance(services, dict) else ()
+    named = [table["robot"] for table in tables if isinstance(table, dict) and isinstance(table.get("robot"), str)]
     if named and is_path(named[0]) and not Path(named[0]).is_file():
         raise UserError(
             f"{named[0]}: the robot of the run by its settings, and there is no such file: name it with --robot FILE",

@@ -37,7 +37,8 @@ def hand_of(robot: Robot, part: str) -> str:
 def end_markers(robot: Robot) -> tuple[str, ...]:
     """The markers that a motor moves and that lie on links at the ends of the tree; where there are none, all that a motor moves."""
     inner = {joint.parent for joint in robot.joints}
-    moved = [name for name in robot.markers if any(name in moved_markers(robot, part) for part in robot.parts)]
+    links = frozenset[int]().union(*links_moved(robot).values())
+    moved = [name for name, marker in robot.markers.items() if marker.link in links]
     return tuple(name for name in moved if robot.markers[name].link not in inner) or tuple(moved)
 
 

@@ -119,7 +119,7 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
     robots: dict[str, Robot] = {}
     for part in scenario.parts:
         robot = robots[part.config.robot] = _read(scenario, part, "robot", read_robot)
-        if getattr(part.config, "world", NO_WORLD) != NO_WORLD:
+        if getattr(part.config, "world", "") not in ("", NO_WORLD):
             _read(scenario, part, "world", read_world)
         name = getattr(part.config, "part", None)
         if name is not None and name not in robot.parts:

@@ -9,6 +9,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from mobee.robot.robot import Array, Robot
+from services.common.worlds import AT_TABLE
 from services.monitor.extent import eye_of
 from services.monitor.palette import colors_of
 
@@ -17,7 +18,6 @@ ROOT = "root_link"  # frame of everything in the scene
 BACKGROUND = (24, 27, 33)
 WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
-ICUBS = ("icub", "icub_2014", "icub_katana")
 TABS = ("robot", "learning")
 
 
@@ -37,7 +37,7 @@ class Shown:
 def shown_of(robot: Robot) -> Shown:
     """The page of a robot; the iCub is seen together with its table."""
     parts = tuple(colors_of(robot.parts))
-    if robot.name in ICUBS:
+    if robot.name in AT_TABLE:
         return Shown("iCub", parts, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
     return Shown(robot.name, parts, *eye_of(robot))
 
