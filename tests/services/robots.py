@@ -9,7 +9,7 @@ ARM = """\
    <joint z="1">
     <link x="-0.2" radius="0.02">
      <motor name="bend" minPos="-90" maxPos="90" home="30">
-      <joint y="-1"><link x="-0.2" radius="0.02"><marker name="tip" nx="-1"/></link></joint>
+      <joint y="-1"><marker name="tip" px="-0.2" nx="-1"/><link x="-0.2" radius="0.02"/></joint>
      </motor>
     </link>
    </joint>

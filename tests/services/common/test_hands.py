@@ -41,7 +41,7 @@ def test_another_robot_reaches_with_the_end_of_its_chain(tmp_path: Path) -> None
 
 
 def test_a_robot_without_markers_is_told_how_to_get_one(tmp_path: Path) -> None:
-    (tmp_path / "arm.xml").write_text(ARM.replace('<marker name="tip" nx="-1"/>', ""))
+    (tmp_path / "arm.xml").write_text(ARM.replace('<marker name="tip" px="-0.2" nx="-1"/>', ""))
     robot = load_robot(tmp_path / "arm.xml")
     for attempt in (lambda: hand_for(robot, np.zeros(3)), lambda: hand_of(robot, "arm")):
         with pytest.raises(InvalidValue, match='Add <marker name="tip"/>'):
@@ -49,7 +49,7 @@ def test_a_robot_without_markers_is_told_how_to_get_one(tmp_path: Path) -> None:
 
 
 def test_a_marker_that_nothing_moves_is_no_hand(tmp_path: Path) -> None:
-    still = '<bodypart name="torso"><marker name="stand"/>'
+    still = '<bodypart name="torso"><marker name="stand" nx="1"/>'
     (tmp_path / "seer.xml").write_text(seer().replace('<bodypart name="torso">', still))
     robot = load_robot(tmp_path / "seer.xml")
     assert "stand" in robot.markers and "stand" not in moved_markers(robot, "torso")
