@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the place [m]")
     what.add_argument("--object", metavar="NAME", help="a target of the model's world, wherever it goes; as vision's ball")
-    text = "what is put there (default: the palm nearer to the target at home; of a robot without palms the first marker at an end)"
+    text = "what is put there (default: the palm nearer to the target at home; of a robot without palms its end with most motors)"
     parser.add_argument("--marker", metavar="NAME", help=text)
     parser.add_argument("--part", help="what reaches (default: the part with most motors that move the marker)")
     parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="of the target [m] (default: %(default)g)")

@@ -33,5 +33,5 @@ def hand_chosen(robot: Robot, place: Array | None, part: str | None, marker: str
     if marker is not None:
         return Hand(marker, part_of(robot, marker), "the part with most motors that move it; --part names another")
     marker = hand_for(robot, place)
-    why = "the palm nearer to the target at home" if marker in PALMS else "the first marker at an end of the robot"
+    why = "the palm nearer to the target at home" if marker in PALMS else "the end of the robot with most motors before it"
     return Hand(marker, part_of(robot, marker), f"{why}; --marker and --part name others")

@@ -60,7 +60,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
     """Of what is presented there, m."""
     marker: str = ""
-    """What is to come there; empty: the palm of its part, or the first marker at the end of what the part moves."""
+    """What is to come there; empty: the palm of its part, or the marker at an end of the part that most motors move."""
     predictor: str = "weighted"
     """Of the rewards of reaching."""
     strategy: str = "intrinsic"

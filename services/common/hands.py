@@ -21,7 +21,7 @@ def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
 
 
 def hand_of(robot: Robot, part: str) -> str:
-    """The marker that a part reaches with: the palm on its side (the right one for a torso), else the first end marker that it moves.
+    """The marker that a part reaches with: the palm on its side (the right one for a torso), else the first of its end markers.
 
     Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
     """
@@ -35,11 +35,15 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """The markers that a motor moves and that lie on links at the ends of the tree; where there are none, all that a motor moves."""
+    """The markers that a motor moves on links at the ends of the tree, or anywhere if no end has one.
+
+    Those with most motors before them come first, so a hand is before a wheel.
+    """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
     moved = [name for name, marker in robot.markers.items() if marker.link in links]
-    return tuple(name for name in moved if robot.markers[name].link not in inner) or tuple(moved)
+    ends = [name for name in moved if robot.markers[name].link not in inner] or moved
+    return tuple(sorted(ends, key=lambda name: -len(_motors_before(robot, name))))
 
 
 def part_of(robot: Robot, marker: str) -> str:
@@ -47,12 +51,7 @@ def part_of(robot: Robot, marker: str) -> str:
 
     Raises UnknownName for a marker that the robot does not have, InvalidValue for one that no motor moves.
     """
-    link = robot.marker(marker).link
-    chain: list[int] = []  # motors, the nearest to the marker first
-    while link > 0:
-        chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()
-        link = robot.joints[link - 1].parent
-    owners = [robot.motor_table[motor].part for motor in dict.fromkeys(chain)]
+    owners = [robot.motor_table[motor].part for motor in _motors_before(robot, marker)]
     if not owners:
         valid = ", ".join(end_markers(robot))
         raise InvalidValue(f"no motor moves the marker {marker!r}. Valid: {valid or 'none'}.")
@@ -60,20 +59,33 @@ def part_of(robot: Robot, marker: str) -> str:
 
 
 def hand_for(robot: Robot, place: Array | None) -> str:
-    """The marker to put on a place when none was chosen: of two palms the nearer at home, the right one where both are as near.
+    """The marker to put on a place when none was chosen: the one that is nearest at home of the palms, or of the ends with most motors.
 
-    `place`: (3,) m, None where it is not known; then it is the right palm. A robot without both palms reaches with its first end
-    marker. Raises InvalidValue for a robot without a marker that a motor moves.
+    `place`: (3,) m, None where it is not known. Where several are as near, or nothing is known, it is the right palm, or the first end.
+    Raises InvalidValue for a robot without a marker that a motor moves.
     """
-    if all(palm in robot.markers for palm in PALMS):
-        if place is None:
-            return PALMS[1]
-        left, right = (float(np.linalg.norm(_at_home(robot, palm) - place)) for palm in PALMS)
-        return PALMS[0] if left < right - AS_NEAR else PALMS[1]
     ends = end_markers(robot)
     if not ends:
         raise InvalidValue(f"no motor of {robot.name!r} moves a marker to reach with: {_without_markers(robot)}")
-    return ends[0]
+    if all(palm in robot.markers for palm in PALMS):
+        hands = list(reversed(PALMS))
+    else:
+        most = len(_motors_before(robot, ends[0]))
+        hands = [name for name in ends if len(_motors_before(robot, name)) == most]
+    if place is None:
+        return hands[0]
+    far = [float(np.linalg.norm(_at_home(robot, name) - place)) for name in hands]
+    return next(name for name, distance in zip(hands, far, strict=True) if distance < min(far) + AS_NEAR)
+
+
+def _motors_before(robot: Robot, marker: str) -> list[int]:
+    """The motors that move a marker, the nearest to it first."""
+    link = robot.marker(marker).link
+    chain: list[int] = []
+    while link > 0:
+        chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()
+        link = robot.joints[link - 1].parent
+    return list(dict.fromkeys(chain))
 
 
 def _at_home(robot: Robot, name: str) -> Array:

@@ -40,6 +40,15 @@ def test_another_robot_reaches_with_the_end_of_its_chain(tmp_path: Path) -> None
         assert part_of(robot, marker) == part
 
 
+def test_a_hand_is_taken_and_not_a_wheel(tmp_path: Path) -> None:
+    wheel = "<link name='wheel'/><joint name='roll' type='continuous'><parent link='base'/><child link='wheel'/><axis xyz='0 1 0'/></joint>"
+    (tmp_path / "mobile.urdf").write_text(chain(3).replace("<link name='link_0'>", f"{wheel}<link name='link_0'>"))
+    robot = load_robot(tmp_path / "mobile.urdf")
+    assert list(robot.markers) == ["wheel", "link_2"]
+    assert end_markers(robot) == ("link_2", "wheel")
+    assert hand_of(robot, "all") == hand_for(robot, None) == hand_for(robot, np.array([0.0, 0.0, -1.0])) == "link_2"
+
+
 def test_a_robot_without_markers_is_told_how_to_get_one(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(ARM.replace('<marker name="tip" px="-0.2" nx="-1"/>', ""))
     robot = load_robot(tmp_path / "arm.xml")
