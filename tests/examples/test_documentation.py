@@ -86,8 +86,8 @@ def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
 def test_the_readers_own_robot_gets_a_map_of_its_own_task(tmp_path: Path) -> None:
     blocks("docs/robots.md", tmp_path)
     robot = ("--robot", "pointer.xml")
-    told = run(tmp_path, "-m", "mobee_cli", "roadmap", "build", "sweep.py", *robot, "--world", "desk.xml")
-    assert re.match(r"sweep\.npz: [1-9]\d+ poses", told) and "(desk, ball)" in told
+    summary = run(tmp_path, "-m", "mobee_cli", "roadmap", "build", "sweep.py", *robot, "--world", "desk.xml")
+    assert re.match(r"sweep\.npz: [1-9]\d+ poses", summary) and "(desk, ball)" in summary
     assert "tip" in run(tmp_path, "-m", "mobee_cli", "roadmap", "show", "sweep.npz", *robot)
     run(tmp_path, "-m", "mobee_cli", "reach", "--offline", *robot, "--world", "desk.xml", "--object", "ball")
 

@@ -49,7 +49,7 @@ def test_a_hand_is_taken_and_not_a_wheel(tmp_path: Path) -> None:
     assert hand_of(robot, "all") == hand_for(robot, None) == hand_for(robot, np.array([0.0, 0.0, -1.0])) == "link_2"
 
 
-def test_a_robot_without_markers_is_told_how_to_get_one(tmp_path: Path) -> None:
+def test_the_message_for_a_robot_without_markers_says_how_to_add_one(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(ARM.replace('<marker name="tip" px="-0.2" nx="-1"/>', ""))
     robot = load_robot(tmp_path / "arm.xml")
     for attempt in (lambda: hand_for(robot, np.zeros(3)), lambda: hand_of(robot, "arm")):
