@@ -197,7 +197,10 @@ def digests(model: Model) -> dict[str, str]:
 def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any, robot: Robot | None) -> Model:
     name = settings["robot"]
     if robot is None and name not in shipped_robots():
-        raise MobeeError(f"{path}: made for the robot {name!r}, which does not come with mobee: its file must be named too.")
+        raise MobeeError(
+            f"{path}: made for the robot {name!r}, which does not come with mobee: name its file, as robot=load_robot(FILE), or on the "
+            "command line as --robot FILE."
+        )
     model = Model(load_robot(name) if robot is None else robot, told_world(made_in))
     model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
     return model
