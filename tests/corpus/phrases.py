@@ -133,7 +133,6 @@ PHRASES = {
     "urdf/joint_without_name.urdf": "<joint> name: is required and missing",
     "urdf/joint_without_parent.urdf": "<joint> parent: is required and missing",
     "urdf/limit_a_word.urdf": "<limit> lower: 'low' is not a number",
-    "urdf/limits_swapped.urdf": "<limit> lower: 1 is above upper -1",
     "urdf/link_twice.urdf": "<link> name: a second link 'arm'",
     "urdf/link_without_name.urdf": "<link> name: is required and missing",
     "urdf/loop.urdf": "<robot> joint: every link is moved by a joint, so the joints form a loop",
