@@ -66,15 +66,13 @@ def test_groups_may_name_links_and_hold_themselves(tmp_path: Path) -> None:
     assert read(tmp_path, *lines).parts["a"].motors == ("shoulder", "elbow")
 
 
-def test_home_comes_from_the_group_state_of_that_name(tmp_path: Path) -> None:
-    home = '<group_state name="Home" group="arm"><joint name="elbow" value="0.5"/><joint name="shoulder" value="-1"/></group_state>'
-    other = '<group_state name="ready" group="arm"><joint name="elbow" value="0.9"/></group_state>'
-    assert read(tmp_path, home, other).home.tolist() == [-1, 0.5, 0]
-
-
-def test_a_home_outside_of_the_limits_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RobotFileError, match=r"toy.srdf:2: <joint> value: 3 puts 'elbow' outside of -1 .. 1"):
-        read(tmp_path, '<group_state name="home" group="arm"><joint name="elbow" value="3"/></group_state>')
+def test_a_chain_leads_from_one_branch_to_another_through_what_carries_both(tmp_path: Path) -> None:
+    lines = (
+        '<group name="hands"><chain base_link="left" tip_link="right"/></group>',
+        '<group name="arm"><chain base_link="palm" tip_link="base"/></group>',
+    )
+    robot = read(tmp_path, *lines)
+    assert {part.name: part.motors for part in robot.parts.values()} == {"hands": ("l",), "arm": ("elbow", "shoulder")}
 
 
 def test_without_an_srdf_only_adjacent_links_are_left_out(tmp_path: Path) -> None:
@@ -157,7 +155,11 @@ MALFORMED = {
         ":2: <joint> value: is required and missing",
     ),
     "no link": (('<disable_collisions link1="left"/>',), ":2: <disable_collisions> link2: is required and missing"),
-    "no chain": (('<group name="a"><chain base_link="left" tip_link="right"/></group>',), ":2: <chain> base_link: 'left' does not carry"),
+    "not a number": (
+        ('<group_state name="home" group="arm"><joint name="elbow" value="1 0"/></group_state>',),
+        ":2: <joint> value: '1 0' is not a number",
+    ),
+    "unknown base": (('<group name="a"><chain base_link="bse" tip_link="right"/></group>',), "unknown link 'bse'. Did you mean 'base'"),
     "unknown tip": (('<group name="a"><chain base_link="base" tip_link="rigt"/></group>',), "unknown link 'rigt'. Did you mean 'right'"),
 }
 
