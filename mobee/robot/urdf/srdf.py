@@ -106,7 +106,10 @@ def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree, virtual: Col
 
 def _chain(node: Node, tree: Tree) -> list[str]:
     """The joints between two links, in order; from one branch to another the way leads through the link that carries both."""
-    base, tip = (node.choice(end, node.text(end), tree.links, "link") for end in ("base_link", "tip_link"))
+    ends = [name for end in ("base_link", "tip_link") for name in _known(node, end, tree.links)]
+    if len(ends) != 2:
+        return []
+    base, tip = ends
     up, down = _to_root(base, tree), _to_root(tip, tree)
     while up and down and up[-1] is down[-1]:
         up.pop()

@@ -32,13 +32,13 @@ class Home:
 
 
 def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Collection[str]) -> State:
-    """The joints of a <group_state> that the robot has; `elsewhere`: virtual joints, which place the robot in the world."""
+    """The joints of a <group_state> that the robot has and that move; `elsewhere`: virtual joints, which place the robot in the world."""
     found: State = {}
     for node in group_state:
         name = node.text("name")
-        if name in joints:
+        if name in joints and joints[name].kind != "fixed":
             found[name] = node, _value(node, joints[name])
-        elif name not in elsewhere:
+        elif name not in joints and name not in elsewhere:
             node.warn(f"the robot has no joint {name!r}, so this is ignored")
     return found
 

@@ -91,6 +91,12 @@ def test_where_a_free_base_stands_is_passed_over(tmp_path: Path) -> None:
     assert robot.home.tolist() == [0, 1, 0]
 
 
+def test_where_a_joint_is_that_does_not_move_is_passed_over(tmp_path: Path) -> None:
+    srdf_file(tmp_path, state("home", tip="0 0 1 0 0 0 1", elbow=1))
+    tip = '<link name="end"/><joint name="tip" type="fixed"><parent link="lower"/><child link="end"/></joint>'
+    assert read_urdf(urdf_file(tmp_path, *ARM, tip)).home.tolist() == [0, 1]
+
+
 def test_joints_that_the_robot_does_not_have_are_warned_of(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="toy.srdf:2: <joint>: the robot has no joint 'finger'"):
         read(tmp_path, state("home", finger=1))
