@@ -25,7 +25,7 @@ PHRASES = {
     "robots/constraint_without_b.xml": "<constraint> b: is required and missing",
     "robots/control_character.xml": "not well-formed",
     "robots/convex_flat.xml": "all lie in one plane",
-    "robots/convex_of_three_points.xml": "has 9 numbers. Write x y z of 4 to 1000 points",
+    "robots/convex_of_three_points.xml": "has 9 numbers. Write x y z of 4 to 10000 points",
     "robots/convex_with_a_number_too_few.xml": "has 11 numbers",
     "robots/cylinder_axis_zero.xml": "<cylinder> hx hy hz: the direction has no length",
     "robots/cylinder_without_height.xml": "<cylinder> height: is required and missing",
