@@ -21,7 +21,7 @@ def draw(found: Sequence[LookedAt], path: Path) -> Path:
     errors = np.sort([one.frame_error for one in loaded if not np.isnan(one.frame_error)])
     left.semilogy(np.maximum(errors, 1e-17), ".", color="C0")
     left.axhline(ALLOWED, color="0.5", linestyle="--", label="allowed")
-    left.set(xlabel="files", ylabel="greatest difference of a frame from Pinocchio's")
+    left.set(xlabel="files", ylabel="frames off Pinocchio's, at most")
     left.legend()
     for label, counts in (("without an SRDF", [one.at_home_without for one in loaded]), ("as loaded", [one.at_home for one in loaded])):
         right.plot(-np.sort(-np.array(counts, dtype=int)), ".-", label=label)

@@ -67,16 +67,24 @@ def look_at(name: str, path: Path, poses: int, seed: int, scratch: Path) -> Look
             robot = load_robot(path)
             seconds = time.perf_counter() - start
         except MobeeError as error:
-            message = str(error).replace(f"{path.parent}/", "")
-            return LookedAt(name, "thing" if THING in message else "refused", " ".join(message.split()))
+            message = _plain(error, path)
+            return LookedAt(name, "thing" if THING in message else "refused", message)
         except Exception as error:  # to be counted: a file must never do this
-            return LookedAt(name, "crash", f"{type(error).__name__}: {error}")
+            return LookedAt(name, "crash", f"{type(error).__name__}: {_plain(error, path)}")
         empty = scratch / "empty.srdf"
         empty.write_text(EMPTY_SRDF)
         bare = load_robot(path, srdf=empty)
         rounded = any(shape.vertices is not None and len(shape.vertices) <= CORNERS for shape in robot.shapes)
         exact = load_robot(path, corners="all") if rounded else robot
     return _compared(LookedAt(name, "loads", seconds=seconds, **_described(robot, bare)), path, exact, poses, seed)
+
+
+def _plain(error: Exception, path: Path) -> str:
+    """What it says in one line, without the folders in which this machine keeps the file."""
+    text = " ".join(str(error).split())
+    for folder in (*path.absolute().parents, *path.resolve().parents):
+        text = text.replace(f"{folder}/", "") if folder.parts[1:] else text
+    return text
 
 
 def _described(robot: Robot, bare: Robot) -> dict[str, object]:
@@ -108,7 +116,7 @@ def _compared(found: LookedAt, path: Path, robot: Robot, poses: int, seed: int) 
         owners = [subject.urdf_link(shape.name) or "" for shape in robot.shapes]
         peer.read_shapes({frozenset((owners[i], owners[j])) for i, j in robot.solid_pairs.tolist()})
     except PeerFailed as error:
-        return LookedAt(**known | {"message": str(error)})
+        return LookedAt(**known | {"message": _plain(error, path)})
     ours = _contacts(robot, owners, q)
     known |= {"contacts": 0, "other": 0, "deepest_other": 0.0}
     for mine, place in zip(ours, angles, strict=True):

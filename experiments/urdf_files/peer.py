@@ -125,4 +125,4 @@ def _hull(geometry: Any) -> Any:
 
 
 def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:120]
+    return " ".join(str(error).split())[:300]
