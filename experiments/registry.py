@@ -49,6 +49,7 @@ EXPERIMENTS = {
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
     "unmodelled": "experiments.unmodelled",
+    "urdf-files": "experiments.urdf_files",
     "wall": "experiments.wall",
 }
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model import Model
+from mobee.real_array import real_array
 from mobee.roadmap.archive import read, write
 from mobee.roadmap.fingerprint import robot_digest, world_digest
 from mobee.roadmap.free_way import free_way
@@ -118,7 +119,7 @@ class Roadmap:
         return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
     def _posture(self, given: ArrayLike) -> Array:
-        q, n = np.array(given, dtype=np.float64), len(self.model.robot.motors)
+        q, n = real_array("q_from", given), len(self.model.robot.motors)
         if q.shape != (n,) or not np.isfinite(q).all():
             raise InvalidValue(f"q_from has shape {q.shape}; it must be ({n},) rad, finite, a position for every motor.")
         self._require_vertices()
@@ -134,7 +135,7 @@ class Roadmap:
 
     def _to(self, y_goal: ArrayLike) -> Array:
         """How far every vertex is from task coordinates (m,), (V,) spacings, infinite beyond NEAR of them."""
-        goal, m = np.atleast_1d(np.array(y_goal, dtype=np.float64)), len(self.spacing)
+        goal, m = np.atleast_1d(real_array("y_goal", y_goal)), len(self.spacing)
         if goal.shape != (m,) or not np.isfinite(goal).all():
             raise InvalidValue(f"y_goal has shape {goal.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
         self._require_vertices()
