@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mobee.collision.geometry import Geometry
 from mobee.collision.world import Role, World
+from mobee.errors import InvalidValue
 from mobee.robot.xml_node import Node, nearest, read_xml
 from mobee.robot.xml_versions import WORLD_TAGS, report, upgrade_world
 from mobee.robot.xml_volume import VOLUME_TAGS, read_volume
@@ -45,14 +46,12 @@ def _add(world: World, node: Node) -> None:
     volume, name = read_volume(node), node.text("name")
     if name in world.objects:
         node.fail("name", f"a second object {name!r}", "Rename one of the two")
-    world.add(
-        name,
-        Geometry(volume.kind, volume.size),
-        position=volume.centre,
-        rotation=volume.rotation,
-        role=ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")],
-        color=_color(node),
-    )
+    role = ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")]
+    geometry, color = Geometry(volume.kind, volume.size), _color(node)
+    try:
+        world.add(name, geometry, position=volume.centre, rotation=volume.rotation, role=role, color=color)
+    except InvalidValue as error:
+        node.fail("size or place", str(error).rstrip("."), "Lengths are in metres")
 
 
 def _color(node: Node) -> list[float] | None:

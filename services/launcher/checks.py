@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from mobee.errors import MobeeError, UnknownName
+from mobee.errors import MobeeError, OlderVersion, UnknownName
 from mobee.robot.robot import Robot
 from services.common.config import ConfigError, nearest
 from services.common.worlds import NO_WORLD
@@ -148,6 +148,7 @@ def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)  # a misspelt table would be no table
+            warnings.simplefilter("default", OlderVersion)  # nothing is lost of it
             return read(getattr(part.config, field))
     except UserWarning as warning:
         raise ConfigError(f"{warning}. The launcher ignores nothing: correct it or take it out.") from None

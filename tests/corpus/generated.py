@@ -5,7 +5,8 @@ from __future__ import annotations
 import codecs
 from collections.abc import Callable
 
-HEAD = '<ZeroPositionKinematicTree version="2.0" robotName="toy">\n<bodypart name="arm"><motor name="pan" minPos="-90" maxPos="90"><joint z="1">\n'
+ROOT = '<ZeroPositionKinematicTree version="2.0" robotName="toy">\n'
+HEAD = f'{ROOT}<bodypart name="arm"><motor name="pan" minPos="-90" maxPos="90"><joint z="1">\n'
 TAIL = "\n</joint></motor></bodypart></ZeroPositionKinematicTree>\n"
 PLAIN = f'{HEAD}<link x="0.2" radius="0.01"/>{TAIL}'
 
