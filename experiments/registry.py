@@ -29,6 +29,7 @@ EXPERIMENTS = {
     "live-table": "experiments.live_table",
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",
+    "own-robots": "experiments.own_robots",
     "planner": "experiments.planner",
     "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
