@@ -30,6 +30,7 @@ EXPERIMENTS = {
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",
     "originals": "experiments.originals",
+    "own-robots": "experiments.own_robots",
     "planner": "experiments.planner",
     "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",

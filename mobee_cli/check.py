@@ -17,6 +17,7 @@ from mobee.robot.check.finding import SEVERITIES
 from mobee.robot.check.words import count
 from mobee.robot.load import load_world
 from mobee.robot.robot import Robot
+from mobee_cli import check_srdf
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
 from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", help="shipped robot or world, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="also what the robot touches at home in this world")
     add_urdf_options(parser)
+    check_srdf.add_arguments(parser)
     parser.add_argument("--pairs", action="store_true", help="list every pair of links that is never tested, and why")
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -37,15 +39,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Check and print."""
     try:
         world = load_world(arguments.world) if arguments.world else None
-        checked = check_file(arguments.file, world, **urdf_options(arguments))
+        written = check_srdf.write(arguments) if arguments.write_srdf is not None else None
+        options = urdf_options(arguments)
+        if written is not None and written[2] is not None:
+            options["srdf"] = written[2]
+        checked = check_file(arguments.file, world, **options)
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     content = checked.content
     groups = untested_groups(content) if isinstance(content, Robot) else []
     if arguments.json:
-        print(json.dumps(_as_json(content, checked.findings, groups), indent=2))
+        told = {"srdf": written[1]} if written is not None else {}
+        print(json.dumps(told | _as_json(content, checked.findings, groups), indent=2))
     else:
-        lines = _findings(checked.findings)
+        said = written[0] if written is not None else []
+        lines = [part for line in said for part in ([line] if not line or line.startswith(" ") else _wrapped(line, ""))]
+        lines += _findings(checked.findings)
         if isinstance(content, Robot):
             lines += [*_pairs(content, groups, arguments.pairs), *_srdf(content), *_masses(content)]
         print("\n".join([*lines, _summary(content, checked.findings)]))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, FELT, I_FELT, I_PART, MAX_CLIENT, MOTOR, PARTS
-from mobee.control.squash import norm, squash
+import math
+
+from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, FELT, I_FELT, I_PART, MAX_CLIENT, MOTOR, PARTS, UNIT
+from mobee.control.squash import squash
 from mobee.engine.compiled import inner_exact
 from mobee.robot.robot import Array, Ints
 
@@ -19,19 +21,23 @@ def add_client_force(integers: Ints, floats: Array, f: Array, total: Array) -> N
         return
     for part in range(integers[PARTS]):
         first, stop = integers[integers[I_PART] + 2 * part], integers[integers[I_PART] + 2 * part + 1]
-        length = norm(f, first, stop)
-        narrowest = first
+        squares = 0.0
+        for i in range(first, stop):
+            angle = f[i] / floats[F_MOTOR + i * MOTOR + UNIT]
+            squares += angle * angle
+        length, narrowest = math.sqrt(squares), first
         for i in range(first, stop):
             if share(floats, i, length) < share(floats, narrowest, length):
                 narrowest = i
         o = F_MOTOR + narrowest * MOTOR
-        maximum, slope = floats[o + MAX_CLIENT], floats[o + CLIENT_SLOPE]
+        maximum, slope = floats[o + MAX_CLIENT] / floats[o + UNIT], floats[o + CLIENT_SLOPE]
         for i in range(first, stop):
             total[i] += maximum * f[i] / (maximum / slope + length)
 
 
 @inner_exact
 def share(floats: Array, motor: int, length: float) -> float:
-    """What a motor's maximum and slope leave of a force of that norm: the smallest of a part's counts for all of it."""
+    """What a motor's maximum and slope leave of a force of that norm [rad/s^2]: the smallest of a part's counts for all of it."""
     o = F_MOTOR + motor * MOTOR
-    return floats[o + MAX_CLIENT] / (floats[o + MAX_CLIENT] / floats[o + CLIENT_SLOPE] + length)
+    maximum = floats[o + MAX_CLIENT] / floats[o + UNIT]
+    return maximum / (maximum / floats[o + CLIENT_SLOPE] + length)

@@ -25,6 +25,7 @@ from mobee.control.layout import (
     OFFSET,
     PUBLISHED,
     ROW,
+    UNIT,
     ZONE,
 )
 from mobee.engine.compiled import inner_exact
@@ -33,7 +34,7 @@ from mobee.robot.robot import Array, Ints
 
 @inner_exact
 def clause_forces(integers: Ints, floats: Array, q: Array, force: Array) -> None:
-    """Add the pushes of all clauses to `force` (n,), which is zero before; rad/s^2."""
+    """Add the pushes of all clauses to `force` (n,), which is zero before; in rad/s^2, and of a motor that slides in its UNIT."""
     maximum, published, pushed = floats[MAX_CONSTRAINT], integers[PUBLISHED] == 1, False
     for clause in range(integers[CLAUSES]):
         first, stop = integers[integers[I_CLAUSE] + clause], integers[integers[I_CLAUSE] + clause + 1]
@@ -45,10 +46,15 @@ def clause_forces(integers: Ints, floats: Array, q: Array, force: Array) -> None
             for row in range(first, stop):
                 push(integers, floats, row, lack(integers, floats, q, row), force)
         elif not published and least > 0.0:
+            pushed = True
             for row in range(first, stop):
                 push(integers, floats, row, maximum * least, force)
-    if pushed:
+    if pushed and published:
         clip_2014(integers, maximum, force)
+    if pushed:
+        for k in range(integers[FELT]):
+            i = integers[integers[I_FELT] + k]
+            force[i] *= floats[F_MOTOR + i * MOTOR + UNIT]
 
 
 @inner_exact

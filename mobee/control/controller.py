@@ -18,6 +18,7 @@ from mobee.control.packed_reaches import Arrays, PackedReaches
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class Controller:
         self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
 
     def force(self, f: Array) -> None:
-        """Apply a force in configuration space, (n,) rad/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
+        """Apply a force in configuration space, (n,) rad/s^2 or m/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
         self._client = checked_force("force", f, len(self.robot.motors))
 
     def push(self, marker: str, f: Array) -> None:
@@ -225,9 +226,9 @@ class Controller:
         return state
 
     def _add_client(self, q: Array, total: Array) -> None:
-        """Add f_config and f_work (thesis eqs. 5.9-5.10)."""
+        """Add f_config and f_work (thesis eqs. 5.9-5.10); of a motor that slides f_work too counts in its unit, as a contact does."""
         integers, floats = self._packed.integers, self._packed.floats
         self._compiled.add_client(integers, floats, self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
-            self._compiled.add_client(integers, floats, projected, total)
+            self._compiled.add_client(integers, floats, projected * motor_units(self.robot) ** 2, total)

@@ -11,11 +11,13 @@ import numpy as np
 
 from mobee.control.settle import Settle
 from mobee.errors import InvalidValue, UnknownName
-from mobee.robot.robot import Array
+from mobee.robot.motor_units import LIMIT_WIDTH, motor_units
+from mobee.robot.robot import Array, Robot
 
 Law = Literal["default", "published_2014"]
 ClientSquash = Literal["each", "direction"]
 
+_ANGLES = ("max_spring", "limit_width", "max_limit", "max_client")  # gains that count in rad
 _OF_MOTORS = ("damping", "stiffness", "max_spring", "limit_width", "max_limit", "client_slope", "max_client", "weight")
 _NO_NUMBERS = ("law", "settle", "client_squash", "weights", "motors", "groups")
 Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor names; value)
@@ -24,6 +26,9 @@ Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
     """A variant of the law of eq. 5.7 with its numbers; the mass is 1, so a force is an acceleration in rad/s^2.
+
+    All numbers are those of motors that turn.  For a motor that slides 1 rad is a share of its range (`mobee.robot.motor_units`), so
+    that the law is the same in that unit: `limit_width` of 10 degrees is 5 % of its range, a `max_` of 12 rad/s^2 3.4 ranges/s^2.
 
     `law`: how constraints and contacts become forces (see `constraints`, `collision`).  `damping` C in 1/s,
     `stiffness` K in 1/s^2, each of the `max_` in rad/s^2.  `limit_width` in rad; `constraint_width` in rad along the
@@ -92,7 +97,7 @@ class Gains:
             damping=40.0,
             stiffness=125.0,
             max_spring=12.0,
-            limit_width=np.deg2rad(10.0),
+            limit_width=LIMIT_WIDTH,
             max_limit=40.0,
             constraint_width=np.deg2rad(12.0),
             max_constraint=80.0,
@@ -116,7 +121,7 @@ class Gains:
             damping=50.0,
             stiffness=50.0,
             max_spring=np.deg2rad(1000.0),
-            limit_width=np.deg2rad(10.0),
+            limit_width=LIMIT_WIDTH,
             max_limit=np.deg2rad(1000.0),
             constraint_width=np.deg2rad(40.0),
             max_constraint=np.deg2rad(1500.0),
@@ -141,18 +146,27 @@ class Gains:
     def with_motors(self, pattern: str, **gains: float) -> Gains:
         """Give the motors that match a pattern gains of their own, as `gains.with_motors("*_elbow", stiffness=50.0)`.
 
-        What is set last counts first.  Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
+        What is set last counts first.  Values are in the unit of the motor: of one that slides limit_width in m, each `max_` in m/s^2
+        (others of its gains keep following its range).  Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
         client_slope, max_client and weight; clauses and contacts bind several motors and have one set of gains.
         """
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """A gain of each of the motors, shape (n,); raises UnknownName for a pattern of `with_motors` that matches none."""
+        """A gain of each of the motors, all of which turn, shape (n,); raises UnknownName for a pattern of `motors` that matches none."""
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
                 raise UnknownName("motor pattern", pattern, motors)
         common: float = getattr(self, name)
         return _first_match(self._changed(name), motors, common)
+
+    def of_robot(self, name: str, robot: Robot) -> Array:
+        """A gain of each motor of a robot, in the unit of the motor, shape (n,); raises UnknownName as `of_motors` does."""
+        values = self.of_motors(name, robot.motors)
+        if name not in _ANGLES:
+            return values
+        own = [pattern for pattern, changes in self.motors if name in dict(changes)]  # given in the unit of the motor
+        return values * np.where([any(fnmatchcase(m, p) for p in own) for m in robot.motors], 1.0, motor_units(robot))
 
     def weight(self, motors: tuple[str, ...]) -> Array:
         """The weight of each of the motors, shape (n,)."""

@@ -21,6 +21,7 @@ from mobee.control.layout import (
     F_MOTOR,
     FEEDFORWARD,
     FELT,
+    FINE,
     HIGH,
     I_ACTIVE,
     I_FELT,
@@ -121,17 +122,37 @@ def torque_of(floats: Array, motor: int, state: Array) -> float:
 
 
 @inner_exact
-def settle_look(settle: Array, test: Array, t: float, state: Array, first: int, stop: int) -> int:
+def is_time(settle: Array, test: Array, t: float) -> bool:
+    """Whether the motion is looked at, at time t [s]; then the time of the next look is noted."""
+    if t < test[NEXT_LOOK] - _ROUNDING:
+        return False
+    missed = math.floor((t - test[NEXT_LOOK] + _ROUNDING) / settle[INTERVAL])
+    test[NEXT_LOOK] += (missed + 1) * settle[INTERVAL]
+    return True
+
+
+@inner_exact
+def is_slow(settle: Array, velocity: float, change: float, unit: float) -> bool:
+    """Whether a motor that is commanded so counts as at rest; `unit`: what 1 rad of the thresholds is for it."""
+    return abs(velocity) <= settle[SPEED] * unit and abs(change) <= settle[ACCELERATION] * unit
+
+
+@inner_exact
+def unsettled(settle: Array, test: Array, t: float) -> int:
+    """What a part is that has not settled by time t [s]: MOVING or TIMED_OUT."""
+    return TIMED_OUT if t - test[BEGUN] >= settle[TIMEOUT] - _ROUNDING else MOVING
+
+
+@inner_exact
+def settle_look(floats: Array, settle: Array, test: Array, t: float, state: Array, first: int, stop: int) -> int:
     """Judge the motion of the motors first to stop at time t [s]: MOVING, SETTLED or TIMED_OUT; between two looks always moving."""
-    if t >= test[NEXT_LOOK] - _ROUNDING:
-        missed = math.floor((t - test[NEXT_LOOK] + _ROUNDING) / settle[INTERVAL])
-        test[NEXT_LOOK] += (missed + 1) * settle[INTERVAL]
+    if is_time(settle, test, t):
         slow = True
         for i in range(first, stop):
-            slow = slow and abs(state[OWN_VELOCITY, i]) <= settle[SPEED] and abs(state[OWN_ACCELERATION, i]) <= settle[ACCELERATION]
+            slow = slow and is_slow(settle, state[OWN_VELOCITY, i], state[OWN_ACCELERATION, i], floats[F_MOTOR + i * MOTOR + FINE])
         if slow:
             return SETTLED
-    return TIMED_OUT if t - test[BEGUN] >= settle[TIMEOUT] - _ROUNDING else MOVING
+    return unsettled(settle, test, t)
 
 
 @entry_exact("Tuple((float64[::1], float64[::1], float64[::1]))(int64[::1], float64[::1], float64[::1], float64[::1])")
@@ -170,5 +191,11 @@ def add_client(integers: Ints, floats: Array, f: Array, total: Array) -> None:
 
 @entry_exact("int64(float64[::1], float64[::1], float64, float64[:,::1])")
 def look(settle: Array, test: Array, t: float, motion: Array) -> int:
-    """`settle_look` at commanded velocities and accelerations, (2, k)."""
-    return settle_look(settle, test, t, motion, 0, motion.shape[1])
+    """`settle_look` at commanded velocities and accelerations, (2, k), divided by FINE of the motors."""
+    if is_time(settle, test, t):
+        slow = True
+        for i in range(motion.shape[1]):
+            slow = slow and is_slow(settle, motion[0, i], motion[1, i], 1.0)
+        if slow:
+            return SETTLED
+    return unsettled(settle, test, t)

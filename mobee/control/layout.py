@@ -18,7 +18,9 @@ POSITION, VELOCITY, TORQUE = range(3)  # values of MODALITY
 # Floats, header: what all motors share; then a row for each motor, each row of a clause, each entry of such a row.
 MAX_CONSTRAINT, CONTACT_GAIN, CONTACT_SLOPE, MAX_CONTACT = range(4)
 F_MOTOR = 4
-# A motor's row.  Reach: how far its position reference may run ahead.
+# A motor's row, in its own unit, rad or m.  Below, above: how far from its lower and upper limit the limit force begins, by which
+# it grows to MAX_LIMIT over LIMIT_WIDTH.  Reach: how far its position reference may run ahead.  Unit: what 1 rad of the gains is in
+# the motor's unit, 1 where it turns; fine: the same of the thresholds of the settle test.
 (
     LOW,
     HIGH,
@@ -26,6 +28,8 @@ F_MOTOR = 4
     MAX_SPRING,
     DAMPING,
     LIMIT_WIDTH,
+    BELOW,
+    ABOVE,
     MAX_LIMIT,
     CLIENT_SLOPE,
     MAX_CLIENT,
@@ -33,11 +37,13 @@ F_MOTOR = 4
     MAX_ACCELERATION,
     MAX_TORQUE,
     REACH,
-) = range(13)
-MOTOR = 13
+    UNIT,
+    FINE,
+) = range(17)
+MOTOR = 17
 OFFSET, ZONE = 0, 1  # a clause's row: b [rad], and the value of a.q + b at which it begins to push
 ROW = 2
-FACTOR, NORMAL = 0, 1  # an entry: of a, and of a / |a|
+FACTOR, NORMAL = 0, 1  # an entry: of a, and of a / |a| with each motor in its UNIT
 ENTRY = 2
 
 # The state of a law that runs, (5, n): own velocity [rad/s], acceleration [rad/s^2], velocity commanded last [rad/s], position

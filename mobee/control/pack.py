@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mobee.control import layout
 from mobee.control.gains import Gains
 from mobee.control.modality import Modality
+from mobee.robot.motor_units import fine_units, limit_zones, motor_units
 from mobee.robot.robot import Array, Clause, Robot
 
 INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
@@ -46,7 +47,7 @@ def pack(
     active, felt = np.flatnonzero(live & (gains.weight(robot.motors) > 0)), np.flatnonzero(live)
     parts = [(p.start, p.start + len(p)) for p in robot.parts.values() if live[p.slice].any()]
     clauses = [clause for clause in robot.clauses if clause.a[:, live].any()]
-    firsts, starts, motors, rows, entries = _clauses(clauses, gains)
+    firsts, starts, motors, rows, entries = _clauses(clauses, gains, motor_units(robot))
     header[: layout.I_ACTIVE] = (
         len(live),
         len(active),
@@ -80,26 +81,29 @@ def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Array:
         (layout.CLIENT_SLOPE, "client_slope"),
         (layout.MAX_CLIENT, "max_client"),
     ):
-        table[:, column] = gains.of_motors(name, robot.motors)
+        table[:, column] = gains.of_robot(name, robot)
+    table[:, [layout.BELOW, layout.ABOVE]] = limit_zones(robot, table[:, layout.LIMIT_WIDTH])
     table[:, layout.MAX_SPEED] = INSIDE * speed_scale * np.array([m.max_velocity for m in robot.motor_table])
     table[:, layout.MAX_ACCELERATION] = INSIDE * np.array([m.max_acceleration for m in robot.motor_table])
     table[:, layout.MAX_TORQUE] = [m.max_torque for m in robot.motor_table]
     table[:, layout.REACH] = LEASH * table[:, layout.MAX_SPEED]
+    table[:, layout.UNIT] = motor_units(robot)
+    table[:, layout.FINE] = fine_units(robot)
     return table
 
 
-def _clauses(clauses: Sequence[Clause], gains: Gains) -> tuple[list[int], list[int], list[int], list[float], list[float]]:
+def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[list[int], list[int], list[int], list[float], list[float]]:
     """Where clauses, their rows and the rows' entries begin, the entries' motors; and the floats of rows and entries."""
     firsts, starts, motors = [0], [0], list[int]()
     rows, entries = list[float](), list[float]()
     for clause in clauses:
         firsts.append(firsts[-1] + len(clause.b))
         for a, b in zip(clause.a, clause.b, strict=True):
-            length = float(np.linalg.norm(a))
+            length = float(np.linalg.norm(a * units))
             # The published law's rows are not normalised: its width is in units of a.q + b.
             rows += [float(b), gains.constraint_width * (1.0 if gains.law == "published_2014" else length)]
             for motor in np.flatnonzero(a):
                 motors.append(int(motor))
-                entries += [float(a[motor]), float(a[motor] / length)]
+                entries += [float(a[motor]), float(a[motor] * units[motor] / length)]
             starts.append(len(motors))
     return firsts, starts, motors, rows, entries

@@ -11,6 +11,7 @@ from mobee.control import reach_layout as at
 from mobee.control.layout import ACTIVE, I_ACTIVE
 from mobee.errors import InvalidValue
 from mobee.kinematics.tables import tables
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array, Ints, Marker, Robot
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def _packed(robot: Robot, part: str, marker: Marker, motors: Ints) -> Arrays:
         driven[k, at.DRIVEN_BY : at.DRIVEN_BY + len(by)] = by
         chain[k, at.AXIS : at.AXIS + 3], chain[k, at.PIVOT : at.PIVOT + 3], chain[k, at.OFFSET] = joint.axis, joint.point, offset[j]
         chain[k, at.LINK : at.LINK + len(by)] = matrix[j, by]
-        chain[k, at.LINK + drives : at.LINK + drives + len(by)] = matrix[j, by] * pulled
+        chain[k, at.LINK + drives : at.LINK + drives + len(by)] = matrix[j, by] * motor_units(robot)[by] * pulled
     chain[:1, at.FRAME : at.FRAME + 9] = np.eye(3).ravel()
     used = 1 + int(np.flatnonzero(driven[:, at.PULLED])[-1])
     whole = np.array([own.start, own.stop, len(motors), len(links), used, 0, 0], dtype=np.int64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mobee.control.client import share
-from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, MAX_CLIENT, MOTOR, PUBLISHED
+from mobee.control.layout import CLIENT_SLOPE, DIRECTION, F_MOTOR, MAX_CLIENT, MOTOR, PUBLISHED, UNIT
 from mobee.control.marker import PackedReach, miss, place_marker
 from mobee.control.reach_layout import (
     COLUMN,
@@ -55,7 +55,7 @@ def add_bounded(integers: Ints, floats: Array, reach: PackedReach, total: Array)
         for k in range(count):
             i = reach.pulled[k]
             o = F_MOTOR + i * MOTOR
-            total[i] += squash(force[i], floats[o + MAX_CLIENT], floats[o + CLIENT_SLOPE])
+            total[i] += squash(force[i] * floats[o + UNIT], floats[o + MAX_CLIENT], floats[o + CLIENT_SLOPE])
         return
     squares = 0.0
     for k in range(count):
@@ -64,7 +64,8 @@ def add_bounded(integers: Ints, floats: Array, reach: PackedReach, total: Array)
     for k in range(count):
         most = min(most, share(floats, reach.pulled[k], length))
     for k in range(count):
-        total[reach.pulled[k]] += most * force[reach.pulled[k]]
+        i = reach.pulled[k]
+        total[i] += most * force[i] * floats[F_MOTOR + i * MOTOR + UNIT]
 
 
 @inner_exact

@@ -27,8 +27,8 @@ SLIDES, PULLED, DRIVEN_BY = range(3)
 AXIS, PIVOT, OFFSET, ANGLE, SINE, COSINE, SEEN_FROM, FRAME, MOTION = 0, 3, 6, 7, 8, 9, 10, 13, 22
 LINK = 28
 
-# Floats (reaches, ROWS + moved, n): the marker's Jacobian of the last tick (6,), 0 for motors that are not pulled; J^T error; how much
-# each motor gives way; the force; the way out of a singular pose, and the one before; the way along which the path bends most; which
+# Floats (reaches, ROWS + moved, n): the marker's Jacobian of the last tick (6,), each motor in its UNIT, 0 if not pulled; J^T error; how
+# much each motor gives way; the force; the way out of a singular pose, and the one before; the way along which the path bends most; which
 # of those pulled it is; how strongly its limit holds it back, and what else does; and a matrix (moved, n): how J^T of the error, or of
 # the force, changes with each motor.
 COLUMN, SLOPE, EASE, FORCE, WAY, BEFORE, BENT, SPARE, LIMITED, HELD, CURVE = 0, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mobee.control.layout import F_MOTOR, MAX_SPRING, MOTOR, STIFFNESS
+from mobee.control.layout import F_MOTOR, MAX_SPRING, MOTOR, STIFFNESS, UNIT
 from mobee.control.marker import PackedReach
 from mobee.control.reach_layout import BEGUN, BEST, EASE, ERROR, LEFT, MOVED, SEEN, SINCE, SLOPE, TURNED, WAY
 from mobee.control.reach_push import ease_motors, force_motors, give, push_marker, slopes, weight
@@ -86,7 +86,7 @@ def add_release(floats: Array, reach: PackedReach, nudged: bool, q: Array, attra
         o = F_MOTOR + i * MOTOR
         total[i] -= squash(attractor[i] - q[i], floats[o + MAX_SPRING], floats[o + STIFFNESS])
         if nudged:
-            total[i] += squash(NUDGE * reach.motors[WAY, i], floats[o + MAX_SPRING], floats[o + STIFFNESS])
+            total[i] += squash(NUDGE * reach.motors[WAY, i] * floats[o + UNIT], floats[o + MAX_SPRING], floats[o + STIFFNESS])
 
 
 @inner_exact

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mobee.control.layout import CLIENT_SLOPE, DAMPING, F_MOTOR, HIGH, LIMIT_WIDTH, LOW, MOTOR
+from mobee.control.layout import ABOVE, BELOW, CLIENT_SLOPE, DAMPING, F_MOTOR, HIGH, LOW, MOTOR
 from mobee.control.marker import PackedReach
 from mobee.control.reach_bend import ARM, bend, bend_at_most
 from mobee.control.reach_layout import COLUMN, EASE, ERROR, FORCE, GIVE, MOVED, PUSH, SLOPE, SOLVED, TURNED
@@ -42,8 +42,7 @@ def ease_motors(floats: Array, reach: PackedReach, q: Array) -> None:
     for k in range(reach.whole[MOVED]):
         i = reach.pulled[k]
         o = F_MOTOR + i * MOTOR
-        room = 0.5 * floats[o + LIMIT_WIDTH]
-        low, high, way = floats[o + LOW] + room, floats[o + HIGH] - room, motors[SLOPE, i]
+        low, high, way = floats[o + LOW] + 0.5 * floats[o + BELOW], floats[o + HIGH] - 0.5 * floats[o + ABOVE], motors[SLOPE, i]
         kept = (q[i] < low and way < 0.0) or (q[i] > high and way > 0.0)
         motors[EASE, i] = 0.0 if kept else floats[o + CLIENT_SLOPE] / floats[o + DAMPING]
 

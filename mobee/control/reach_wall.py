@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from mobee.control.layout import F_MOTOR, HIGH, LIMIT_WIDTH, LOW, MAX_LIMIT, MOTOR
-from mobee.control.limits import limit_force
+from mobee.control.layout import F_MOTOR, MOTOR, UNIT
+from mobee.control.limits import limit_force_of
 from mobee.control.marker import PackedReach
 from mobee.control.reach_layout import AWAY, COLUMN, EASE, FORCE, GIVE, HELD, LIMITED, MOVED, TURNED
 from mobee.control.reach_push import force_motors, give, push_marker, weight
@@ -22,10 +22,9 @@ def held_back(floats: Array, reach: PackedReach, q: Array, against: Array) -> bo
     speed, limited = 0.0, False
     for k in range(reach.whole[MOVED]):
         i = reach.pulled[k]
-        o = F_MOTOR + i * MOTOR
-        limit = limit_force(q[i], floats[o + LOW], floats[o + HIGH], floats[o + LIMIT_WIDTH], floats[o + MAX_LIMIT])
-        motors[LIMITED, i] = abs(limit) if limit * motors[FORCE, i] < 0.0 else 0.0
-        motors[HELD, i] = against[i] - limit
+        limit, unit = limit_force_of(floats, i, q[i]), floats[F_MOTOR + i * MOTOR + UNIT]
+        motors[LIMITED, i] = abs(limit) / unit if limit * motors[FORCE, i] < 0.0 else 0.0
+        motors[HELD, i] = (against[i] - limit) / unit
         limited = limited or motors[LIMITED, i] > 0.0
         speed -= motors[HELD, i] * motors[EASE, i] * motors[FORCE, i]
     return limited or speed > 0.0

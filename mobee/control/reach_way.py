@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mobee.control.layout import F_MOTOR, HIGH, LOW, MOTOR
+from mobee.control.layout import F_MOTOR, HIGH, LOW, MOTOR, UNIT
 from mobee.control.marker import PackedReach, miss, place_marker
 from mobee.control.reach_bend import largest
 from mobee.control.reach_layout import BEFORE, CURVE, EASE, MOVED, SLOPE, WAY
@@ -18,14 +18,14 @@ TURNS = 60  # of the power iteration
 
 
 @inner_exact
-def curve(reach: PackedReach, q: Array) -> float:
+def curve(floats: Array, reach: PackedReach, q: Array) -> float:
     """Fill how half the square of the error curves along pairs of motors, as they give way; its size."""
     motors, moved = reach.motors, reach.whole[MOVED]
     for k in range(moved):
         i = reach.pulled[k]
-        here = q[i]
+        here, probe = q[i], PROBE * floats[F_MOTOR + i * MOTOR + UNIT]
         for side in range(2):
-            q[i] = here + (PROBE if side == 0 else -PROBE)
+            q[i] = here + (probe if side == 0 else -probe)
             place_marker(reach, q)
             miss(reach)
             slopes(reach)
@@ -51,7 +51,7 @@ def curve(reach: PackedReach, q: Array) -> float:
 def find_way(floats: Array, reach: PackedReach, q: Array, size: float) -> bool:
     """From a pose that the pull does not move: the way (WAY) along which the error falls on both sides; False if there is none."""
     motors, moved = reach.motors, reach.whole[MOVED]
-    shift = curve(reach, q)
+    shift = curve(floats, reach, q)
     for k in range(moved):
         i = reach.pulled[k]
         motors[BEFORE, i] = motors[WAY, i]

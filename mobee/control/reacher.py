@@ -19,6 +19,7 @@ import numpy as np
 from mobee.control.pull import ARM, Pull, checked_target, pull
 from mobee.errors import InvalidValue
 from mobee.real_array import real_array
+from mobee.robot.motor_units import limit_zones, motor_units
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
@@ -100,10 +101,10 @@ class Reacher:
     def _ease(self, q: Array, torque: Array) -> Array:
         """How fast each motor goes for a torque of 1, (n,): slope of the squash over damping; 0 for one that a limit keeps."""
         c = self._controller
-        of = {name: c.gains.of_motors(name, c.robot.motors) for name in ("client_slope", "damping", "limit_width")}
-        low, high = c.robot.limits.T + 0.5 * np.array([[1.0], [-1.0]]) * of["limit_width"]
+        of = {name: c.gains.of_robot(name, c.robot) for name in ("client_slope", "damping", "limit_width")}
+        low, high = c.robot.limits.T + 0.5 * np.array([[1.0], [-1.0]]) * limit_zones(c.robot, of["limit_width"]).T
         kept = (q < low) & (torque < 0) | (q > high) & (torque > 0)
-        ease: Array = np.where(kept | (c.weight == 0), 0.0, of["client_slope"] / of["damping"])
+        ease: Array = np.where(kept | (c.weight == 0), 0.0, of["client_slope"] / of["damping"] * motor_units(c.robot) ** 2)
         return ease
 
     def _force(self, q: Array, found: Pull, ease: Array, give: Array, wanted: Array) -> Array:
@@ -132,7 +133,7 @@ class Reacher:
         if not len(free) or values[0] > -BEND * most:
             return np.zeros(len(q))
         way = np.zeros(len(q))
-        way[free] = ways[:, 0]
+        way[free] = ways[:, 0] * motor_units(self._controller.robot)[free]
         before = float(way @ self._way)
         middle = self._controller.robot.limits.mean(axis=1) - q
         self._way = way * np.sign(before if before else float(way @ middle) or 1.0)

@@ -20,7 +20,8 @@ _VERDICTS: dict[int, Verdict] = {MOVING: "moving", SETTLED: "settled", TIMED_OUT
 class Settle:
     """The thresholds of the settle test: physics, not bookkeeping (they set which states are hard to reach).
 
-    A part is settled when every motor is commanded at most `speed` and accelerated at most `acceleration`.
+    A part is settled when every motor is commanded at most `speed` and accelerated at most `acceleration`; of a motor that slides
+    both count in its fine unit (`mobee.robot.motor_units`): 3 deg/s are 0.4 % of its range a second.
     """
 
     speed: float  # rad/s
@@ -54,6 +55,7 @@ class SettleTest:
     def look(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
         """Judge the part's motion at time t [s]; between two looks the answer is always "moving".
 
-        `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,).
+        `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,); of motors that
+        slide divided by their `fine_units`.
         """
         return _VERDICTS[law().look(self._numbers, self._memory, t, np.array([speeds, accelerations], dtype=np.float64))]

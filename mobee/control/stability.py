@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from mobee.control.clauses import stack_clauses
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array, Robot
 
 
@@ -58,7 +59,7 @@ def stability_bound(robot: Robot, gains: Gains) -> Bound:
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):
         return Bound(np.inf, "no motor", 0.0, 0.0)
-    damping = gains.of_motors("damping", robot.motors)[moved]
+    damping = gains.of_robot("damping", robot)[moved]
     stiffness = _stiffness(robot, gains)[np.ix_(moved, moved)]
     one = np.eye(len(moved))
     values, vectors = np.linalg.eig(np.block([[np.diag(damping) / 2.0, stiffness / 4.0], [one, 0.0 * one]]))
@@ -70,11 +71,9 @@ def stability_bound(robot: Robot, gains: Gains) -> Bound:
 
 
 def _stiffness(robot: Robot, gains: Gains) -> Array:
-    """The steepest springs of all motors, symmetric, (n, n) in 1/s^2."""
-    width = gains.of_motors("limit_width", robot.motors)
-    ramps = np.where(robot.limits[:, 1] - robot.limits[:, 0] < 2.0 * width, 2.0, 1.0)  # in a narrow range both act
-    single = gains.of_motors("stiffness", robot.motors) + ramps * gains.of_motors("max_limit", robot.motors) / width
-    rows = stack_clauses(robot.clauses, len(robot.motors))
+    """The steepest springs of all motors, each motor in its unit of `motor_units`, symmetric, (n, n) in 1/s^2."""
+    single = gains.of_robot("stiffness", robot) + gains.of_robot("max_limit", robot) / gains.of_robot("limit_width", robot)
+    rows = stack_clauses([replace(clause, a=clause.a * motor_units(robot)) for clause in robot.clauses], len(robot.motors))
     slope = gains.max_constraint / gains.constraint_width
     if gains.law == "published_2014":
         steep = slope * rows.norms

@@ -11,6 +11,7 @@ import numpy as np
 from mobee.control.clauses import stack_clauses
 from mobee.errors import InvalidValue
 from mobee.pose import Pose
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 
 ContactKind = Literal["solid", "field"]
@@ -24,20 +25,23 @@ class Violation:
 
     kind: Literal["contact", "limit", "clause"]
     what: str  # "first - second", the motor, or the part and number of the clause
-    depth: float  # m of a contact, rad beyond a limit or along the normal of the clause's nearest row
+    depth: float  # m of a contact, rad (m of a slide) beyond a limit, rad along the normal of the clause's nearest row
 
 
 class Watch:
     """Says what is wrong with a pose."""
 
     def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
-        """`kinds`: of contacts that count; `tolerance` rad by which a limit or a clause may be exceeded: encoders are noisy."""
+        """`kinds`: of contacts that count; `tolerance` rad by which a limit or a clause may be exceeded: encoders are noisy.
+
+        Of a motor that slides the tolerance counts in its fine unit (`mobee.robot.motor_units`).
+        """
         if unknown := set(kinds) - set(KINDS):
             raise InvalidValue(f"kinds {sorted(unknown)}: contacts are of the kinds {', '.join(KINDS)}")
         if not 0.0 <= tolerance < np.inf:
             raise InvalidValue(f"tolerance {tolerance} rad: must be a finite angle, not negative")
         self._kinds, self._tolerance = frozenset(kinds), tolerance
-        self._motors, self._limits = robot.motors, robot.limits
+        self._motors, self._limits, self._units = robot.motors, robot.limits, fine_units(robot)
         self._rows = stack_clauses(robot.clauses, len(robot.motors))
         self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
 
@@ -46,7 +50,8 @@ class Watch:
         contacts = [Violation("contact", f"{c.first} - {c.second}", float(c.depth)) for c in pose.contacts if c.kind in self._kinds]
         contacts.sort(key=lambda violation: -violation.depth)
         beyond = np.maximum(self._limits[:, 0] - pose.q, pose.q - self._limits[:, 1])
-        limits = [Violation("limit", self._motors[i], float(beyond[i])) for i in np.flatnonzero(beyond > self._tolerance)]
+        past = np.flatnonzero(beyond > self._tolerance * self._units)
+        limits = [Violation("limit", self._motors[i], float(beyond[i])) for i in past]
         return (*contacts, *limits, *self._broken(pose))
 
     def _broken(self, pose: Pose) -> list[Violation]:

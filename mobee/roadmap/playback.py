@@ -131,7 +131,7 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
     """The reference along a path (K, n) rad that the springs of the attractor can follow, at a share of their speed."""
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
-    strength, damping = (gains.of_motors(name, robot.motors) for name in ("max_spring", "damping"))
+    strength, damping = (gains.of_robot(name, robot) for name in ("max_spring", "damping"))
     fastest = np.minimum(strength / damping, [motor.max_velocity for motor in robot.motor_table])
     hardest = np.minimum(0.5 * strength, [motor.max_acceleration for motor in robot.motor_table])
     return reference(path, speed * _HARD * fastest, speed * _HARD * hardest, rounding, dt)
@@ -142,7 +142,7 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains) -> Iterator[Array]
 
     The last is the reference's end.  A motor that has not to move keeps its place.
     """
-    strength, stiffness, damping = (gains.of_motors(name, robot.motors) for name in ("max_spring", "stiffness", "damping"))
+    strength, stiffness, damping = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness", "damping"))
     held = np.arange(0.0, wanted.times[-1] + PERIOD, PERIOD) + 0.5 * PERIOD  # each is in force for a period: meant for its middle
     for row in np.minimum(np.searchsorted(wanted.times, held), len(wanted.times) - 1):
         force = np.clip(wanted.acceleration[row] + damping * wanted.velocity[row], -_HARD * strength, _HARD * strength)

@@ -38,6 +38,8 @@ class Motor:
     """What is commanded: drives one or more joints affinely, joint = scale * motor + offset.
 
     A motor counts in rad. That of a prismatic joint counts in m where the scale is 1, as from a URDF: read m for rad and N for N m then.
+    `zone_ends_at_home`: where home lies so near to a limit that the limit zone of the control law reaches over it, the zone ends at
+    home instead, so that the robot rests there; a motor of a URDF does this, one of a zero-position file is pushed away from home.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Motor:
     max_velocity: float = np.deg2rad(60.0)  # rad/s, the last resort that the gate enforces
     max_acceleration: float = np.deg2rad(600.0)  # rad/s^2
     max_torque: float = 40.0  # N m
+    zone_ends_at_home: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

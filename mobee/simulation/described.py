@@ -14,6 +14,7 @@ from mobee.robot.robot import Robot
 
 _UNFELT = ("where", "untested")  # of a robot: where it was read from, and why
 _SHOWN = ("name", "color")  # of a world object: the name is its key
+_LATER = ("zone_ends_at_home",)  # of a motor: left out where False, so that robots keep the digest they had before there was such a field
 DIGITS = 9  # of lengths and angles: a file that is read on another machine is the same robot
 
 
@@ -35,7 +36,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return (np.round(value, DIGITS) + 0.0).tolist()  # no -0.0
     if is_dataclass(value):
-        return [_plain(getattr(value, entry.name)) for entry in fields(value)]
+        held = {entry.name: getattr(value, entry.name) for entry in fields(value)}
+        return [_plain(one) for name, one in held.items() if name not in _LATER or one]
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

@@ -25,7 +25,8 @@ LIMIT, ENDED, LOST = range(3)  # why a run is over: so many ticks, an action has
     # the reaches under way
     "int64[:,::1], int64[:,::1], int64[:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1], "
     # Body
-    "int64[::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1], int64, int64, uint64, float64, "
+    "int64[::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1], int64, int64, uint64, "
+    "float64[::1], boolean, "
     # the rest
     "int64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], int64, float64, int64)"
 )
@@ -72,7 +73,8 @@ def run(
     mode: int,
     substeps: int,
     seed: int,
-    noise: float,
+    noise: Array,
+    noisy: bool,
     parts: Ints,
     tests: Array,
     q: Array,
@@ -92,7 +94,7 @@ def run(
     memory = memory_of(integers, world, reals_memory, pairs_memory, ints, flags)
     law = Law(law_integers, law_floats, settle, law_state, attractor, client, forces, np.empty(len(q)))
     reaches = PackedReach(reach_whole, reach_pulled, reach_driven, reach_real, reach_chain, reach_motors)
-    body = Body(living, whole, fixed, state, line, at, commands, mode, substeps, np.uint64(seed), noise)
+    body = Body(living, whole, fixed, state, line, at, commands, mode, substeps, np.uint64(seed), noise, noisy)
     count = np.uint64(0)
     for done in range(most):
         k = ticks + done + 1

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mobee.errors import InvalidValue
 from mobee.kinematics.gravity import gravity_torque
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Ints, Robot
 from mobee.simulation import layout
 from mobee.simulation.layout import SERVO_GAIN as SERVO_GAIN
@@ -60,9 +61,9 @@ class Motors:
             (layout.MAX_TORQUE, "max_torque"),
         ):
             self.fixed[row] = [getattr(motor, name) for motor in robot.motor_table]
-        self.fixed[layout.PLAY] = parameters.of_motors("backlash", n) / 2.0
-        self.fixed[layout.FRICTION] = parameters.of_motors("friction", n)
-        self._lag, self._delay = parameters.of_motors("lag", n), parameters.of_motors("delay", n)
+        self.fixed[layout.PLAY] = parameters.of_robot("backlash", robot) / 2.0
+        self.fixed[layout.FRICTION] = parameters.of_robot("friction", robot)
+        self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self.line, self.at = np.zeros((1, n)), np.zeros(1, dtype=np.int64)
         self._dt = 0.0
         self.begin_substeps(parameters.substep)
@@ -161,9 +162,10 @@ class Motors:
         copied: Array = self.state[row].copy()
         return copied
 
-    def noise(self, dt: float) -> float:
-        """The standard deviation [rad] of the encoders at ticks of dt [s]."""
-        return float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt))
+    def noise(self, dt: float) -> Array:
+        """The standard deviations of the encoders at ticks of dt [s], (n,) [rad], or [m] of motors that slide."""
+        common = float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt))
+        return common * fine_units(self._robot)
 
     def begin_substeps(self, dt: float) -> None:
         """Let substeps last dt [s] from now on; what is on its way to the motors stays in order, the newest last."""

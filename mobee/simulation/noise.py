@@ -43,8 +43,8 @@ def normal_pair(key: np.uint64, pair: np.uint64) -> tuple[float, float]:
 
 
 @inner_exact
-def add_noise(seed: np.uint64, k: int, strength: float, motors: Ints, q: Array, noisy: Array) -> None:
-    """Fill `noisy` (n,) for the motors given (m,), ascending: q (n,) plus noise of that standard deviation [rad]."""
+def add_noise(seed: np.uint64, k: int, strength: Array, motors: Ints, q: Array, noisy: Array) -> None:
+    """Fill `noisy` (n,) for the motors given (m,), ascending: q (n,) plus noise of these standard deviations (n,) [rad or m]."""
     key = tick_key(seed, k)
     last, even, odd = -1, 0.0, 0.0
     for at in range(len(motors)):
@@ -52,7 +52,7 @@ def add_noise(seed: np.uint64, k: int, strength: float, motors: Ints, q: Array, 
         if motor // 2 != last:
             last = motor // 2
             even, odd = normal_pair(key, np.uint64(last))
-        noisy[motor] = q[motor] + strength * (odd if motor % 2 else even)
+        noisy[motor] = q[motor] + strength[motor] * (odd if motor % 2 else even)
 
 
 @entry_exact("float64[::1](uint64, int64, int64[::1])")
@@ -66,7 +66,7 @@ def encoder_noise(seed: int, k: int, motors: Ints) -> Array:
     return out
 
 
-@entry_exact("void(uint64, int64, float64, int64[::1], float64[::1], float64[::1])")
-def read(seed: int, k: int, strength: float, motors: Ints, q: Array, noisy: Array) -> None:
+@entry_exact("void(uint64, int64, float64[::1], int64[::1], float64[::1], float64[::1])")
+def read(seed: int, k: int, strength: Array, motors: Ints, q: Array, noisy: Array) -> None:
     """`add_noise`, for Python."""
     add_noise(np.uint64(seed), k, strength, motors, q, noisy)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Array, Robot
 from mobee.simulation.identified import load_identified
 
 PerMotor = float | Sequence[float]  # one number for all, or one for each motor of the robot
@@ -20,6 +21,8 @@ class MotorParameters:
 
     `lag`, `delay`, `backlash` and `friction`: one number, or one for each motor in the order of `robot.motors`.  `friction` is
     Coulomb's, as the velocity that it costs: a motor sticks while it is told less, and turns slower by it when it is told more.
+    One number for all is that of motors that turn, and follows the range of those that slide (`mobee.robot.motor_units`); numbers for
+    each motor are in its own unit, rad or m.
     """
 
     lag: PerMotor = 0.05  # s, time constant of the first-order response to a velocity
@@ -58,3 +61,9 @@ class MotorParameters:
         if value.ndim == 1 and len(value) != count:
             raise InvalidValue(f"motor {name} of {len(value)} motors: the robot has {count}; give one number, or one for each motor.")
         return np.array(np.broadcast_to(value, (count,)))
+
+    def of_robot(self, name: str, robot: Robot) -> Array:
+        """One of the four for each motor of a robot, in the unit of the motor, (n,); raises InvalidValue as `of_motors` does."""
+        values = self.of_motors(name, len(robot.motors))
+        common = name in ("backlash", "friction") and np.ndim(getattr(self, name)) == 0
+        return values * fine_units(robot) if common else values

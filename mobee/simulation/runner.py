@@ -40,6 +40,7 @@ class Runner:
         if self._mode == POSITION:
             self._commands[:] = controller.state[REFERENCE]
         self._seed, self._noise = np.uint64(motors.seed), motors.noise(dt)
+        self._noisy = bool(self._noise.any())
         self.q: Array = robot.home.copy()
         self._torque = np.zeros(n)
         self._forces = np.zeros((3, n))
@@ -63,7 +64,7 @@ class Runner:
             controller.law.integers, controller.law.floats, controller.law.settle, controller.state, controller.goal, client, self._forces,
             *controller.reaches,
             motors.living, motors.whole, motors.fixed, motors.state, motors.line, motors.at, self._commands, self._mode,
-            self._substeps, self._seed, self._noise, parts, tests, self.q, self._torque, record, ticks, self._dt, most,
+            self._substeps, self._seed, self._noise, self._noisy, parts, tests, self.q, self._torque, record, ticks, self._dt, most,
         )  # fmt: skip
         if done:
             controller.last_forces = Forces(*self._forces.copy())

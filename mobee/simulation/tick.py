@@ -40,7 +40,7 @@ class Law(NamedTuple):
 
 
 class Body(NamedTuple):
-    """The motors: `commands` (age, n) are those on their way, `noise` [rad] and `seed` those of the encoders."""
+    """The motors: `commands` (age, n) are those on their way, `noise` (n,) [rad or m] and `seed` those of the encoders."""
 
     living: Ints
     whole: Ints
@@ -52,7 +52,8 @@ class Body(NamedTuple):
     mode: int
     substeps: int
     seed: np.uint64
-    noise: float
+    noise: Array
+    noisy: bool
 
 
 @inner_exact
@@ -72,11 +73,11 @@ def tell(body: Body, k: int) -> None:
 def measure(body: Body, k: int, q: Array) -> bool:
     """Read the encoders into q (n,); False if they are not finite."""
     total = 0.0
-    if body.noise > 0.0:
+    if body.noisy:
         add_noise(body.seed, k, body.noise, body.living, body.state[Q], q)
     for index in range(len(body.living)):
         i = body.living[index]
-        if body.noise == 0.0:
+        if not body.noisy:
             q[i] = body.state[Q, i]
         total += abs(q[i])
     return total < math.inf
@@ -125,7 +126,7 @@ def judge(law: Law, reaches: PackedReach, parts: Ints, tests: Array, sampled: fl
     for p in range(len(parts)):
         if parts[p, ACTING] == 0:
             continue
-        verdict = settle_look(law.settle, tests[p], sampled, law.state, parts[p, FIRST], parts[p, STOP])
+        verdict = settle_look(law.floats, law.settle, tests[p], sampled, law.state, parts[p, FIRST], parts[p, STOP])
         if verdict == SETTLED and goes_on(law.integers, reaches, parts[p, FIRST]):
             continue
         if verdict != MOVING:

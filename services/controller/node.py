@@ -16,6 +16,7 @@ from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
 from mobee.control.checked import LARGEST_FORCE
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
 from services.common.fingerprint import robot_hash
 from services.common.inbox import CROWDED_WITH_STOPS
@@ -49,6 +50,7 @@ class ControllerNode:
         self._acting: Forces  # the same as vectors
         self._q: Array = robot.home  # measured, at the newest tick
         self._where = {name: part.slice for name, part in robot.parts.items()}
+        self._units = fine_units(robot)
         self._tick: Tick | None = None  # that still waits for its forces
         self._last_k = -1
         self._last: tuple[Tick, dict[str, Order], Array] | None = None  # step that commanded: its orders, and the law's state before
@@ -167,7 +169,8 @@ class ControllerNode:
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
-                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where], partial(self._law.still_nears, part))
+                speeds, changes = velocity[where] / self._units[where], acceleration[where] / self._units[where]
+                action.look(tick.k, tick.t * 1e-9, speeds, changes, partial(self._law.still_nears, part))
                 self._reaches.look(part, tick, touched.get(part, []))
         self._last = tick, orders, before
         return orders, getattr(command, modality)

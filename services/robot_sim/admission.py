@@ -27,7 +27,8 @@ class Admission:
         """`max_ticks`: how many ticks ago the one may be that an order answers; None: as many as begin in MAX_AGE."""
         self._part, self._dt, self._max_ticks = part, dt, max_ticks
         self._velocity, self._torque = limits.velocity * _EXACT, limits.torque * _EXACT
-        self._lower, self._upper = limits.lower - MARGIN, limits.upper + MARGIN
+        self._margin, self._start = MARGIN * limits.fine, START * limits.fine
+        self._lower, self._upper = limits.lower - self._margin, limits.upper + self._margin
         self._stride = STEP * limits.velocity * dt  # rad a tick
         self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
 
@@ -47,7 +48,7 @@ class Admission:
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
         """The way from the position ordered `ticks` ago; None: from the measured q.  All (n,) rad."""
         if before is None:
-            before, allowed = q, np.full(len(q), START)
+            before, allowed = q, self._start
         else:
             allowed = self._stride * min(max(ticks, 1), self._most_strides)
         step = np.abs(reference - before)
@@ -75,7 +76,7 @@ class Admission:
         if not np.isfinite(reference).all():
             raise Refused("value", f"{self._part}: NaN or infinity")
         if mode == "position":
-            beyond, unit = np.maximum(reference - self._upper, self._lower - reference).max() + MARGIN, "rad beyond a limit"
+            beyond, unit = (np.maximum(reference - self._upper, self._lower - reference) + self._margin).max(), "rad beyond a limit"
         elif mode == "velocity":
             beyond, unit = (np.abs(reference) - self._velocity / _EXACT).max(), "rad/s beyond the limit"
         else:

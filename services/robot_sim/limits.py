@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
 
 
@@ -18,6 +19,7 @@ class Limits:
     velocity: Array  # rad/s
     acceleration: Array  # rad/s^2
     torque: Array  # N m
+    fine: Array  # what 1 rad of a threshold is in the unit of the motor, see mobee.robot.motor_units
 
     @classmethod
     def of(cls, robot: Robot, part: str) -> Limits:
@@ -29,4 +31,5 @@ class Limits:
             velocity=np.array([m.max_velocity for m in motors]),
             acceleration=np.array([m.max_acceleration for m in motors]),
             torque=np.array([m.max_torque for m in motors]),
+            fine=fine_units(robot)[robot.part(part).slice],
         )

@@ -74,6 +74,7 @@ def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
     assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [
         ["error", "slips.xml:3"],
         ["warning", "slips.xml:5"],
+        ["note", "slips.xml:8"],
         ["note", "slips.xml:1"],
     ]
     printed = re.search(r"^\$ mobee check slips\.xml\n(.*?)^\.\.\.$", (ROOT / "docs/robots.md").read_text(), re.DOTALL | re.MULTILINE)

@@ -8,6 +8,7 @@ import pytest
 from mobee.robot.load import shipped_robots, shipped_worlds
 from mobee_cli.__main__ import main
 from tests.mobee.robot.check.arm import ARM
+from tests.mobee.robot.check.test_urdf import URDF
 from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.urdf_files import arm_with, foreign, srdf_file
 
@@ -110,3 +111,41 @@ def test_corners_are_a_number_or_all(tmp_path: Path, capsys: pytest.CaptureFixtu
     with pytest.raises(SystemExit):
         main(["check", str(foreign("kuka_iiwa/model.urdf")), "--corners", "some"])
     assert "'some' is neither a whole number nor 'all'" in capsys.readouterr().err
+
+
+@pytest.fixture
+def touching(tmp_path: Path) -> Path:
+    path = tmp_path / "toy.urdf"
+    path.write_text(URDF.format("").replace('radius="0.06"', 'radius="0.12"').replace('"-90" upper="90"', '"-1" upper="1"'))
+    return path
+
+
+def test_write_srdf_says_what_it_wrote_and_how_it_is_found(touching: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(touching), "--write-srdf"]) == 0
+    said = capsys.readouterr().out
+    words = " ".join(said.split())
+    assert "toy.srdf: wrote 1 pair of links that touch at home or in all of 10000 random poses." in words
+    assert "base fore Always" in words and "100 %" in words
+    assert "With it toy.urdf does not touch itself at home; load_robot finds toy.srdf by itself." in words
+    assert "overlap in every pose" not in said  # checked as it is read now
+    main(["check", str(touching), "--write-srdf"])
+    assert "nothing to add" in " ".join(capsys.readouterr().out.split())
+
+
+def test_write_srdf_to_a_file_of_ones_own_and_as_json(touching: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "own.srdf"
+    assert main(["check", str(touching), "--json", "--write-srdf", str(out)]) == 0
+    told = json.loads(capsys.readouterr().out)["srdf"]
+    assert (told["path"], told["touching"], told["found"]) == (str(out), 0, False)
+    assert [(pair["first"], pair["second"], pair["reason"]) for pair in told["pairs"]] == [("base", "fore", "Always")]
+
+
+def test_write_srdf_that_cannot_is_one_line(touching: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(touching), "--write-srdf", str(tmp_path / "no" / "toy.srdf")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_write_srdf_of_a_zero_position_file_prints_the_lines_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ball = ARM.replace("<marker", '<sphere name="ball" radius="0.35"/><marker')
+    assert main(["check", str(robot_file(tmp_path, *ball.splitlines())), "--write-srdf"]) == 1
+    assert ' <ignore first="base" second="bend"/>\n' in capsys.readouterr().out

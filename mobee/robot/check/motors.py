@@ -9,8 +9,9 @@ import numpy as np
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
 from mobee.robot.check.words import motor_interval
+from mobee.robot.motor_units import motor_units
 
-LEAST = np.deg2rad(1.0)  # rad, or about 2 cm of a slide: less is no range
+LEAST = np.deg2rad(1.0)  # rad: less is no range; any range of a slide is one
 
 
 def home_limits(subject: Subject) -> Iterator[Finding]:
@@ -48,7 +49,8 @@ def idle_motors(subject: Subject) -> Iterator[Finding]:
 
 def idle_parts(subject: Subject) -> Iterator[Finding]:
     """Parts without a motor that an agent could use."""
-    ranges = {motor.name: float(motor.limits[1] - motor.limits[0]) for motor in subject.robot.motor_table}
+    units = motor_units(subject.robot)
+    ranges = {motor.name: float(np.ptp(motor.limits)) / unit for motor, unit in zip(subject.robot.motor_table, units, strict=True)}
     for part in subject.robot.parts.values():
         if any(ranges[name] >= LEAST for name in part.motors):
             continue

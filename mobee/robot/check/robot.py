@@ -10,6 +10,7 @@ from mobee.collision.world import World
 from mobee.robot.check.constraints import constraints
 from mobee.robot.check.fields import fields
 from mobee.robot.check.finding import SEVERITIES, Finding
+from mobee.robot.check.home_zones import home_zones
 from mobee.robot.check.joints import coupling, joint_limits
 from mobee.robot.check.markers import unreachable_markers
 from mobee.robot.check.masses import masses
@@ -25,6 +26,7 @@ Check = Callable[[Subject], Iterator[Finding]]
 CHECKS: tuple[Check, ...] = (
     joint_limits,
     home_limits,
+    home_zones,
     coupling,
     idle_motors,
     idle_parts,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -38,7 +39,10 @@ class Subject:
         return any(".urdf:" in line for line in self.robot.where.values())
 
     def urdf_link(self, shape: str) -> str | None:
-        """The link of the URDF that a shape is on, which a fixed joint may hold on the robot's link; None for another file."""
+        """The link of the URDF that a shape is on, which a fixed joint may hold on the robot's link.
+
+        None for another file, and where shapes of several links begin in one line.
+        """
         return self._urdf_links.get(self.where("shape", shape))
 
     @cached_property
@@ -47,7 +51,11 @@ class Subject:
         lines = (line.rpartition(":")[0] for (kind, _), line in self.robot.where.items() if kind == "shape")
         files = {Path(file) for file in lines if file.lower().endswith(".urdf")}
         links = (node for file in files for node in read_xml(file) if node.tag == "link")
-        return {f"{inner.file}:{inner.line}": link.optional("name") for link in links for inner in link}
+        found: dict[str, set[str]] = defaultdict(set)
+        for link in links:
+            for inner in link:
+                found[f"{inner.file}:{inner.line}"].add(link.optional("name") or "")
+        return {line: names.pop() for line, names in found.items() if len(names) == 1}
 
     @cached_property
     def range(self) -> Array:

@@ -30,7 +30,7 @@ def _ignoring(subject: Subject, first: str, second: str) -> str:
     """What leaves out the pair of links of two shapes."""
     link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
     if link1 and link2:
-        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
+        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it (--write-srdf writes it)'
     links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
     return f'<ignore first="{links[first]}" second="{links[second]}"/>'
 

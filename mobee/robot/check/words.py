@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sized
 
 import numpy as np
 
+from mobee.robot.motor_units import slides
 from mobee.robot.robot import Array, Motor, Robot
 
 
@@ -16,9 +17,18 @@ def interval(limits: Array, kind: str) -> str:
 
 
 def motor_interval(robot: Robot, motor: Motor) -> str:
-    """The interval of a motor in its own unit: m where it is a slide that is not geared."""
-    slides = motor.joints and all(robot.joints[joint].kind == "prismatic" and scale == 1.0 for joint, scale, _ in motor.joints)
-    return interval(motor.limits, "prismatic" if slides else "revolute")
+    """The interval of a motor in its own unit."""
+    return interval(motor.limits, "prismatic" if _in_metres(robot, motor) else "revolute")
+
+
+def position(robot: Robot, motor: Motor, value: float) -> str:
+    """A position of a motor in its own unit, or how far two are apart."""
+    return f"{1e3 * value:.3g} mm" if _in_metres(robot, motor) else f"{np.rad2deg(value):.3g} deg"
+
+
+def _in_metres(robot: Robot, motor: Motor) -> bool:
+    """Whether a motor counts in m: a slide, one joint of which is not geared."""
+    return slides(robot, motor) and any(scale == 1.0 for _, scale, _ in motor.joints)
 
 
 def length(metres: float) -> str:

@@ -8,6 +8,7 @@ from math import copysign, inf, isinf, pi
 
 import numpy as np
 
+from mobee.robot.motor_units import angle_unit, outside_zones
 from mobee.robot.robot import Array, Motor
 from mobee.robot.urdf.frames import FARTHEST, bounded, child
 from mobee.robot.urdf.tree import UrdfJoint, read_name
@@ -125,7 +126,7 @@ def _warn_of_free(joint: UrdfJoint) -> None:
 def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
     """The motor of a joint and of all that mimic it: its limits are those that keep every one of them within its own.
 
-    In units of the joint: [rad], or [m] if it is prismatic. Home is 0, or the limit nearest to it.
+    In units of the joint: [rad], or [m] if it is prismatic. Home is 0, or what is nearest to it outside the limit zones.
     """
     limits = joint_limits(master)
     _warn_of_free(master)
@@ -139,8 +140,10 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
         elif np.abs(narrowed - limits).max() > 1e-9:  # not by the last digit of a file
             limits = narrowed
     joints = tuple((index, drive.scale, drive.offset) for index, _, drive in driven)
-    motor = Motor(master.name, part, limits, float(np.clip(0.0, *limits)), joints)
-    return _extended(master, _limited(master, motor))
+    motor = Motor(master.name, part, limits, float(np.clip(0.0, *limits)), joints, zone_ends_at_home=True)
+    motor = _extended(master, _limited(master, motor))
+    unit = angle_unit(motor.limits, all(joint.kind == "prismatic" for _, joint, _ in driven))
+    return replace(motor, home=outside_zones(motor.home, motor.limits, unit))
 
 
 def _limited(master: UrdfJoint, motor: Motor) -> Motor:

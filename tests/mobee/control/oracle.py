@@ -22,9 +22,10 @@ def squash_norm(v: Array, maximum: float, slope: float) -> Array:
 
 def limit_forces(robot: Robot, gains: Gains, q: Array) -> Array:
     """Eqs. 5.12-5.13."""
-    width, maximum = gains.of_motors("limit_width", robot.motors), gains.of_motors("max_limit", robot.motors)
-    below = np.maximum(robot.limits[:, 0] + width - q, 0.0)
-    above = np.maximum(q - robot.limits[:, 1] + width, 0.0)
+    width, maximum = gains.of_robot("limit_width", robot), gains.of_robot("max_limit", robot)
+    zone = np.minimum(width, np.ptp(robot.limits, axis=1) / 4.0)
+    below = np.maximum(robot.limits[:, 0] + zone - q, 0.0)
+    above = np.maximum(q - robot.limits[:, 1] + zone, 0.0)
     return maximum / width * (below - above)
 
 
@@ -77,7 +78,7 @@ class Law:
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array) -> None:
         """One step; `force` the right-hand side."""
-        own = {name: self.gains.of_motors(name, self.robot.motors) for name in ("stiffness", "max_spring", "damping")}
+        own = {name: self.gains.of_robot(name, self.robot) for name in ("stiffness", "max_spring", "damping")}
         a = squash(attractor - q, own["max_spring"], own["stiffness"]) + force - own["damping"] * self.velocity
         wanted = self.gains.weight(self.robot.motors) * (self.velocity + a * dt)
         change = (np.clip(wanted, -self.speed, self.speed) - self.sent).clip(-self.change * dt, self.change * dt)

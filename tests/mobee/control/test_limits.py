@@ -8,7 +8,7 @@ from mobee.control.limits import limit_force
 
 
 def at(q: float, width: float = 1.0, maximum: float = 1.0) -> float:
-    return limit_force(q, -3.0, 3.0, width, maximum)
+    return limit_force(q, -3.0, 3.0, width, width, maximum / width)
 
 
 @given(st.floats(-2.0, 2.0))
@@ -34,6 +34,6 @@ def test_the_ramp_goes_on_beyond_the_limit(beyond: float) -> None:
     assert at(-3.0 - beyond) == pytest.approx(1.0 + beyond)
 
 
-def test_a_range_narrower_than_the_ramps_is_pushed_to_its_middle() -> None:
-    force = [limit_force(q, 0.0, 0.5, 1.0, 1.0) for q in (0.1, 0.25, 0.4)]
-    assert force[0] > 0 and force[1] == pytest.approx(0.0) and force[2] < 0
+def test_each_side_has_a_zone_of_its_own() -> None:
+    force = [limit_force(q, 0.0, 1.0, 0.0, 0.5, 2.0) for q in (-0.1, 0.0, 0.25, 0.5, 1.0)]
+    assert force == pytest.approx([0.2, 0.0, 0.0, 0.0, -1.0])

@@ -17,6 +17,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.reach import ReachTarget
 from mobee.robot.load import load_robot
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array, Part, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from tests.mobee.control.two_parts import two_part_arm
@@ -92,7 +93,7 @@ def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> No
             pose = model.evaluate(q)
             assert real[at.AT : at.AT + 3] == pytest.approx(pose.position(marker), abs=1e-12)
             assert real[at.FACING : at.FACING + 3] == pytest.approx(pose.normal(marker), abs=1e-12)
-            assert motors[at.COLUMN : at.COLUMN + 6] == pytest.approx(model.jacobian(q, marker), abs=1e-12)
+            assert motors[at.COLUMN : at.COLUMN + 6] == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
 
 
 @BOTH

@@ -20,6 +20,14 @@ def test_a_home_at_a_limit_is_none(tmp_path: Path) -> None:
     assert named(with_motor(robot, "bend", home=float(robot.motor_table[1].limits[1])), "home-limits") == []
 
 
+def test_a_part_of_one_short_slide_can_be_used(tmp_path: Path) -> None:
+    limits = np.array([0.0, 0.01])
+    robot = arm(tmp_path)
+    for name in ("pan", "bend"):
+        robot = with_joint(with_motor(robot, name, limits=limits, home=0.005), name, limits=limits, kind="prismatic")
+    assert [finding for finding in check_robot(robot) if finding.check == "idle-part"] == []
+
+
 def test_a_motor_beyond_which_nothing_hangs_is_found(tmp_path: Path) -> None:
     tool = '<motor name="roll" minPos="-90" maxPos="90"><joint x="1"/></motor>'
     (finding,) = named(arm(tmp_path, ("<marker", f"{tool}<marker")), "idle-motor")

@@ -21,8 +21,7 @@ def test_shipped_robots_have_nothing_but_notes(name: str) -> None:
 
 
 def test_katana_feels_nothing_and_says_so() -> None:
-    (finding,) = check_robot(load_robot("katana"))
-    assert finding.what == "the robot has no field"
+    assert [finding.what for finding in check_robot(load_robot("katana")) if finding.check != "home-zone"] == ["the robot has no field"]
 
 
 def test_the_icubs_pelvis_is_known_to_stand_out_of_its_fields() -> None:

@@ -33,8 +33,17 @@ def test_a_joint_is_a_motor_with_its_limits_and_home_at_zero(tmp_path: Path) -> 
     assert (robot.motor_table[0].max_velocity, robot.motor_table[0].max_torque) == (3, 4)
 
 
-def test_home_is_the_limit_nearest_to_zero(tmp_path: Path) -> None:
-    assert fingers(tmp_path, '<limit lower="0.5" upper="1"/>', '<limit lower="-2" upper="-1"/>').home.tolist() == [0.5, -1]
+def test_home_is_zero_or_the_nearest_place_outside_the_limit_zones(tmp_path: Path) -> None:
+    width = np.deg2rad(10.0)
+    inside, beyond = fingers(tmp_path, '<limit lower="-1" upper="2"/>', '<limit lower="-2" upper="-1"/>').home
+    assert (inside, beyond) == (0.0, pytest.approx(-1.0 - width))
+    at_limit, narrow = fingers(tmp_path, '<limit lower="0" upper="2"/>', '<limit lower="0" upper="0.2"/>').home
+    assert (at_limit, narrow) == (pytest.approx(width), pytest.approx(0.05))
+
+
+def test_a_sliding_motor_has_its_home_outside_five_percent_of_its_range(tmp_path: Path) -> None:
+    robot = fingers(tmp_path, '<limit lower="0" upper="0.04"/>', '<limit lower="-0.3" upper="0"/>', kind="prismatic")
+    assert robot.home == pytest.approx([0.002, -0.015])
 
 
 def test_a_continuous_joint_turns_once_around(tmp_path: Path) -> None:

@@ -1,0 +1,87 @@
+"""The robots that are made and the one of PyBullet; those of example-robot-data are not among what the tests install."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments.own_robots import failures, figure, read, results, run, table
+from experiments.own_robots.measure import Measured, arm_of
+from experiments.own_robots.robots import BULLET, EXAMPLES, MADE, ROBOTS, examples_folder, robot_file
+from mobee import Lattice, load_robot
+from mobee.errors import InvalidValue
+
+
+def test_there_are_28() -> None:
+    assert len(set(ROBOTS)) == len(EXAMPLES) + len(BULLET) + len(MADE) == 28
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_the_robots_that_are_made_load_and_touch_nothing(name: str, tmp_path: Path) -> None:
+    robot = load_robot(robot_file(name, tmp_path, tmp_path))
+    assert len(robot.motors) == {"chain of 200": 200, "star of 300": 300}.get(name, 6)
+    assert len(robot.solid_pairs) > 10
+
+
+def arguments(**changes: object) -> argparse.Namespace:
+    return argparse.Namespace(**{"robots": ["arm of 700 m", "panda_bullet"], "data": Path(), "seed": 0} | changes)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("own_robots")
+    run(arguments(robots=["arm of 700 m"]), folder)
+    run(arguments(), folder)
+    return folder
+
+
+def test_a_robot_is_measured_once_and_does_what_is_claimed(done: Path) -> None:
+    arm, panda = read(done)
+    assert (arm.robot, panda.robot) == ("arm of 700 m", "panda_bullet")
+    assert (panda.touching, panda.written, panda.touching_after, panda.slides) == (2, 2, 0, 1)
+    assert 0.0 < panda.slide_mm < 1.0 and panda.unsettled == 0 and arm.slide_mm == -1.0
+    assert max(arm.drift_deg, panda.drift_deg, panda.field_drift_deg) < 0.5 and panda.drift_mm < 1.0
+    found = results(done)
+    assert (found["robots"], found["touch themselves at home"], found["and with the SRDF"]) == (2, 1, 0)
+
+
+def test_what_fails_is_named(done: Path) -> None:
+    good = replace(read(done)[1], actions_s=1.0, field_actions_s=1.0)
+    assert failures(good) == []
+    bad = replace(good, drift_mm=1.5, touching_after=1, unsettled=1, field_actions_s=16.0)
+    assert failures(bad) == ["drifts", "touches itself at home", "slide off", "slow"]
+
+
+def test_a_robot_that_cannot_be_read_is_refused_and_not_tried_again(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    for _ in range(2):
+        found = run(arguments(robots=["tiago"], data=tmp_path / "data"), tmp_path)
+    assert "no such file" in found["refused"]["tiago"]
+    assert (tmp_path / "refused.csv").read_text().count("tiago.urdf") == 1
+
+
+def test_the_table_has_a_line_for_each_robot(done: Path) -> None:
+    head, rule, *rows = figure(done).read_text().splitlines()
+    assert len(rows) == 2 and rows[1].startswith("| panda_bullet | 8 (1) |")
+    assert {line.count("|") for line in (head, rule, *rows)} == {15}
+    assert table([])[0] == head
+
+
+def test_records_go_through_text(done: Path) -> None:
+    one = read(done)[0]
+    assert Measured.of_record({name: str(value) for name, value in one.record().items()}) == one
+
+
+def test_an_arm_is_the_longest_chain_of_one_part_that_turns() -> None:
+    icub = load_robot("icub")
+    Lattice(icub, arm_of(icub))
+    assert arm_of(icub) == list(icub.part("left_arm").motors[:4])
+
+
+def test_without_the_package_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.path", [])
+    with pytest.raises(InvalidValue, match="pip install --target erd example-robot-data==6.0.0"):
+        examples_folder()
