@@ -18,7 +18,6 @@ Role = Literal["obstacle", "target", "ghost"]
 Color = tuple[float, float, float, float]
 
 LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
-FARTHEST = 1e6  # m, from the root frame: beyond it the arithmetic would lose millimetres
 _LONG, _SKEW = 1.1e-5, 1e-6  # allowed of a rotation: squares of its rows beside 1, products of two rows
 
 
@@ -72,12 +71,10 @@ def valid_shape(name: str, shape: Geometry) -> Geometry:
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """A copy of a position (3,) m; raises InvalidValue unless it is three numbers of at most FARTHEST in size."""
+    """A copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
     value = _numbers(given)
-    if value is None or value.shape != (3,) or not (np.abs(value) <= FARTHEST).all():
-        raise InvalidValue(
-            f"world object {name!r}: position {given!r}; it must be three finite numbers in metres, each within {FARTHEST:g}."
-        )
+    if value is None or value.shape != (3,) or not np.isfinite(value).all():
+        raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
     return value
 
 

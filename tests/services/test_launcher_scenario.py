@@ -323,3 +323,23 @@ _VALUES = st.recursive(
 @given(st.dictionaries(_KEYS, _VALUES | st.dictionaries(_KEYS, _VALUES, max_size=3), max_size=5))
 def test_settings_survive_as_toml(tables: dict[str, object]) -> None:
     assert tomllib.loads(to_toml(tables)) == tables
+
+
+OLD_ROBOT = """<ZeroPositionKinematicTree version="1.0" robotName="old">
+ <bodypart name="torso"><motor name="pan" minPos="-90" maxPos="90"><joint z="1" name="pan">
+  <link x="0.2"><sphere radius="0.05"/>{0}</link>
+ </joint></motor></bodypart>
+</ZeroPositionKinematicTree>
+"""
+
+
+@pytest.mark.filterwarnings("ignore::mobee.errors.OlderVersion")
+def test_a_robot_of_an_older_version_may_start_and_one_with_a_slip_may_not(tmp_path: Path) -> None:
+    robot, path = tmp_path / "old.xml", tmp_path / "old.toml"
+    path.write_text(f'title = "old"\n[shared]\nrobot = "{robot}"\n[services.robot_sim]\nbackend = "kinematic"\n')
+    robot.write_text(OLD_ROBOT.format(""))
+    (loaded,) = check_robots(read_scenario(str(path))).values()
+    assert loaded.name == "old"
+    robot.write_text(OLD_ROBOT.format("<shpere/>"))
+    with pytest.raises(ConfigError, match=r"old.xml:3: <shpere>: unknown tag .* The launcher ignores nothing"):
+        check_robots(read_scenario(str(path)))

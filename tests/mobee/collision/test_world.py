@@ -67,7 +67,6 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
         ({"position": (0.0, 0.0)}, "three finite numbers"),
         ({"position": (0.0, 0.0, float("nan"))}, "three finite numbers"),
         ({"position": "here"}, "three finite numbers"),
-        ({"position": (0.0, -1.1e6, 0.0)}, "each within 1e\\+06"),
         ({"position": np.zeros(3, dtype=complex)}, "three finite numbers"),
         ({"position": [[0.0, 0.0], [0.0]]}, "three finite numbers"),
         ({"rotation": 2 * np.eye(3)}, "rotation matrix"),
@@ -123,9 +122,9 @@ def test_what_is_no_shape_is_refused(world, shape):
         world.add("lamp", shape)
 
 
-def test_what_is_moved_or_attached_stays_near_enough(world):
-    with pytest.raises(mobee.InvalidValue, match="each within"):
-        world.move("cup", position=(1e7, 0.0, 0.0))
-    with pytest.raises(mobee.InvalidValue, match="each within"):
-        world.attach("cup", "hand", ((0.0, 0.0, 1e160), np.eye(3)))
+def test_a_place_that_is_refused_leaves_the_object_where_it_was(world):
+    with pytest.raises(mobee.InvalidValue, match="three finite numbers"):
+        world.move("cup", position=(float("inf"), 0.0, 0.0))
+    with pytest.raises(mobee.InvalidValue, match="three finite numbers"):
+        world.attach("cup", "hand", ((0.0, 0.0, float("nan")), np.eye(3)))
     assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
