@@ -29,6 +29,7 @@ EXPERIMENTS = {
     "live-table": "experiments.live_table",
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",
+    "originals": "experiments.originals",
     "own-robots": "experiments.own_robots",
     "planner": "experiments.planner",
     "pregrasp": "experiments.pregrasp",
@@ -49,6 +50,7 @@ EXPERIMENTS = {
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
     "unmodelled": "experiments.unmodelled",
+    "urdf-files": "experiments.urdf_files",
     "wall": "experiments.wall",
 }
 

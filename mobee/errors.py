@@ -14,6 +14,10 @@ class RobotFileError(MobeeError):
     """A robot or world file that cannot be read: file, line, field and remedy are in the message."""
 
 
+class OlderVersion(UserWarning):
+    """A file of an older version of the grammar: something in it was read as that version meant it, and not as it stands there."""
+
+
 class InvalidValue(MobeeError, ValueError):
     """An argument with the wrong shape, unit or range."""
 

@@ -16,6 +16,7 @@ from mobee.engine import engine_of
 from mobee.engine.hands import MOST, Hand, hands, hands_of
 from mobee.errors import InvalidValue, UnknownName
 from mobee.pose import Engine, Pose
+from mobee.real_array import real_array
 from mobee.robot.robot import Array, Robot
 
 if TYPE_CHECKING:
@@ -129,11 +130,7 @@ class Model:
         self.world.attach(name, link, seen_from(carrier, pose.objects[name]))
 
     def _checked(self, q: ArrayLike) -> Array:
-        try:
-            value = np.array(q, dtype=np.float64, order="C")
-        except (TypeError, ValueError):
-            raise InvalidValue(f"q is {q!r}; it must be an array of numbers, ({self._motors},) or (..., {self._motors}) rad.") from None
-        n = self._motors
+        value, n = real_array("q", q), self._motors
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")
         # For one pose the first test takes a tenth of the second's time; for many it would wake the threads of BLAS.

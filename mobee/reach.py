@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.plant import Outcome, Plant
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 Aim = Literal["centre", "surface"]
@@ -95,10 +97,10 @@ def reward_of(missing: float, scale: float = 0.01) -> float:
     return 1.0 / (1.0 + missing / scale)
 
 
-def _triple(value: object, what: str) -> Array:
+def _triple(value: ArrayLike, what: str) -> Array:
     try:
-        found = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        found = real_array(what, value)
+    except InvalidValue:
         found = np.empty(0)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InvalidValue(f"{what} {value!r} of the target: must be three finite numbers, in m in the root frame")

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         lines = [part for line in said for part in ([line] if not line or line.startswith(" ") else _wrapped(line, ""))]
         lines += _findings(checked.findings)
         if isinstance(content, Robot):
-            lines += [*_pairs(content, groups, arguments.pairs), *_masses(content)]
+            lines += [*_pairs(content, groups, arguments.pairs), *_srdf(content), *_masses(content)]
         print("\n".join([*lines, _summary(content, checked.findings)]))
     return FAILED if any(finding.severity != "note" for finding in checked.findings) else 0
 
@@ -84,6 +84,16 @@ def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
         if every:
             lines += _wrapped(", ".join(one if one == other else f"{one} - {other}" for one, other in links), "    ")
     return lines
+
+
+def _srdf(robot: Robot) -> list[str]:
+    """Which SRDF was read with a URDF, and which of its poses is home."""
+    file = robot.where.get(("srdf", robot.name))
+    if file is None:
+        return []
+    poses = [f"its pose {name!r} (line {line.rpartition(':')[2]})" for (kind, name), line in robot.where.items() if kind == "home"]
+    home = poses[0] if poses else "every motor at 0, or at the limit nearest to it"
+    return _wrapped(f"SRDF: {file.rpartition(':')[0]}. Home: {home}.", "", "  ")
 
 
 def _masses(robot: Robot) -> list[str]:

@@ -1,15 +1,19 @@
-"""`mobee convert IN OUT`: zero-position XML to URDF, URDF to zero-position XML, by the endings of the two files."""
+"""`mobee convert IN OUT`: zero-position XML to URDF and back, and an older zero-position file or world into today's form."""
 
 from __future__ import annotations
 
 import argparse
+import warnings
 from pathlib import Path
 
+from mobee.collision.world import World
 from mobee.errors import MobeeError
-from mobee.robot.load import load_robot
+from mobee.robot.check.file import world_file
+from mobee.robot.load import ROBOTS, find_file, load_robot, load_world
 from mobee.robot.robot import Robot
 from mobee.robot.write_urdf import write_urdf
-from mobee.robot.write_xml import write_xml
+from mobee.robot.write_xml import write_upgraded, write_xml
+from mobee.robot.xml_node import Remark
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
 from mobee_cli.urdf_options import add_urdf_options, urdf_options
 
@@ -18,7 +22,7 @@ WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The two files and how a URDF is read."""
-    parser.add_argument("source", metavar="IN", help="a shipped robot, or a .xml or .urdf file")
+    parser.add_argument("source", metavar="IN", help="a shipped robot, or a .xml or .urdf file; or a world in .xml")
     parser.add_argument("target", metavar="OUT", type=Path, help="the .xml or .urdf file to write")
     add_urdf_options(parser)
     parser.add_argument("--force", action="store_true", help="write over files that are there")
@@ -35,14 +39,37 @@ def run(arguments: argparse.Namespace) -> int:
     if taken and not arguments.force:
         raise UserError(f"{taken[0]} is there already. Choose another name, or write over it with --force", BAD_INPUT)
     try:
-        robot = load_robot(arguments.source, **urdf_options(arguments))
-        WRITERS[target.suffix.lower()](robot, target)
+        lines = _convert(arguments, target)
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from error
     except OSError as error:
         raise UserError(f"{error.filename or target} cannot be written ({error.strerror})", FAILED) from error
-    print(_summary(robot, target))
+    print("\n".join(lines))
     return 0
+
+
+def _convert(arguments: argparse.Namespace, target: Path) -> list[str]:
+    """Write the target, and say what it holds."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        world = world_file(arguments.source)
+        content = load_robot(arguments.source, **urdf_options(arguments)) if world is None else load_world(world)
+    if isinstance(content, World):
+        if world is None or target.suffix.lower() != ".xml":
+            raise UserError(f"{target}: a world is written as .xml: URDF knows robots only", BAD_INPUT)
+        return [f"{target}: {len(content.objects)} objects", *_understood(write_upgraded(world, target) or [])]
+    source = find_file(arguments.source, ROBOTS, "robot")
+    if source.suffix.lower() == target.suffix.lower() == ".xml":
+        remarks = write_upgraded(source, target)
+        if remarks is not None:
+            return [_summary(content, target), *_understood(remarks)]
+    WRITERS[target.suffix.lower()](content, target)
+    return [*(str(warning.message) for warning in caught), _summary(content, target)]
+
+
+def _understood(remarks: list[Remark]) -> list[str]:
+    """How an older file was understood, a line each."""
+    return [f"{remark.node.file}:{remark.node.line}: {remark.what}" for remark in remarks]
 
 
 def _written(target: Path) -> tuple[Path, ...]:

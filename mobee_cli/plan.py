@@ -7,14 +7,15 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mobee.errors import MobeeError
+from mobee.errors import MobeeError, UnknownName
 from mobee.learning.exploit import target_states
 from mobee.learning.learned import Learned, load_learned
 from mobee.learning.planner import DISCOUNT, Plan, Planner
 from mobee.learning.space import Space
-from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 from mobee.store import STORE
 from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.robot_options import add_robot, require_none, robot_given, robot_of_run
 
 SLACK = 0.01  # rad beyond the limits: poses are given rounded, and encoders are noisy
 _NOTES = """A place is the number of a state, or the angles in rad of the joints that the
@@ -22,6 +23,8 @@ agent knows (or of all motors of its part), within their limits: the state that
 holds this pose.
 Plans trust what was observed, over a weak belief that untried actions work
 (docs/learning.md)."""
+
+_NAME_IT = " The run does not say where the file of its robot is: name it with --robot FILE."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", nargs="+", dest="start", metavar="PLACE", help="where from (default: where the agent was last)")
     text = f"0 to 1, a factor a step: the smaller, the more a short way is preferred over a reliable one (default: {DISCOUNT})"
     parser.add_argument("--discount", type=float, default=DISCOUNT, metavar="X", help=text)
-    parser.add_argument("--robot", metavar="FILE", help="the robot of the run, where it is none that comes with mobee")
+    add_robot(parser, "default: that of the run, which knows it if `mobee launch` made it or if it comes with mobee")
     parser.add_argument("--json", action="store_true", help="print as JSON, with the pose of every state")
 
 
@@ -41,17 +44,26 @@ def run(arguments: argparse.Namespace) -> int:
     """Rebuild, plan, print."""
     file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
     try:
-        robot = load_robot(arguments.robot) if arguments.robot else None
-        learned = load_learned(file, arguments.agent, robot)
+        learned = load_learned(file, arguments.agent, _robot(arguments))
         poses: dict[str, int] = {}
         goal = _state(learned, arguments.to, poses)
         start = learned.state if arguments.start is None else _state(learned, arguments.start, poses)
         plan = Planner(learned.space, learned.model.debiased(), goal, arguments.discount).plan(start)
     except MobeeError as error:
-        raise UserError(str(error), BAD_INPUT) from None
+        unknown = isinstance(error, UnknownName) and str(error).startswith("unknown robot") and arguments.robot is None
+        raise UserError(f"{error}{_NAME_IT if unknown else ''}", BAD_INPUT) from None
     read = [f"{pose} rad is in state {state}." for pose, state in poses.items()]
     print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join([*read, *_lines(learned, plan)]))
     return 0
+
+
+def _robot(arguments: argparse.Namespace) -> Robot | None:
+    """The robot that is given, or that of the settings of the run; None for the one that comes with mobee under the name on record."""
+    arguments.robot = arguments.robot or robot_of_run(arguments.run)
+    if arguments.robot is None:
+        require_none(arguments, "it is for the robot of --robot FILE")
+        return None
+    return robot_given(arguments)
 
 
 def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:

@@ -13,17 +13,21 @@ import numpy as np
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.learning.reaching.load import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import reaching_parts
 from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
 from mobee.reachable import body_at, nearest_outside, nearest_posture
 from mobee.robot.robot import Array, Robot
 from mobee.store import STORE
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.reach_hand import Choose, Hand, hand_chosen
 from mobee_cli.reach_learned import go_to_pre_reach
 from mobee_cli.reach_result import ON, Result, lines
 from mobee_cli.reach_stage import Stage, offline
+from mobee_cli.robot_options import add_robot, add_world, require_none, robot_given, robot_of_run, world_given
 
-_NOTES = f"""Places are in m in the root frame: x backwards, y right, z up, from the waist.
+_NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,
+z up, from the waist.
 Without --run the hand is drawn there from where the robot is; with it, what the
 agent of that run has learned says from which posture, and the way there.
 Reached is a hand within {100 * ON:g} cm of the target's surface, when its force ends.
@@ -36,14 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the place [m]")
     what.add_argument("--object", metavar="NAME", help="a target of the model's world, wherever it goes; as vision's ball")
-    parser.add_argument("--part", default="right_arm", help="what reaches (default: %(default)s)")
-    parser.add_argument("--marker", metavar="NAME", help="what is put there (default: the part's palm)")
+    text = "what is put there (default: the palm nearer to the target at home; of a robot without palms its end with most motors)"
+    parser.add_argument("--marker", metavar="NAME", help=text)
+    parser.add_argument("--part", help="what reaches (default: the part with most motors that move the marker)")
     parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="of the target [m] (default: %(default)g)")
     where = "where on it the marker is to come (default: the centre of a place, the surface of an object, which may be solid)"
     parser.add_argument("--aim", choices=AIMS, help=where)
     parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that learned to reach, or its file {STORE}")
     parser.add_argument("--stay", action="store_true", help="stay there, instead of being drawn back")
-    parser.add_argument("--offline", action="store_true", help="on the offline plant, the iCub at its table")
+    parser.add_argument("--offline", action="store_true", help="on the offline plant, at home")
+    add_robot(parser, "offline; default: that of the run, else the icub")
+    add_world(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
     add_endpoint(parser)
 
@@ -66,20 +73,38 @@ def run(arguments: argparse.Namespace) -> int:
 def _stage(arguments: argparse.Namespace) -> AbstractContextManager[Stage]:
     if arguments.target is not None:
         ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)  # a mistake in it needs no robot
+    target = arguments.object if arguments.target is None else np.array(arguments.target)
     if arguments.offline:
-        return offline()
+        if arguments.robot is None and arguments.run is not None:
+            arguments.robot = robot_of_run(arguments.run)
+        return offline(robot_given(arguments), world_given(arguments), _chooser(arguments), target)
+    require_none(arguments, "it is for --offline; without that the robot and the world are those of the system that runs")
     from mobee_cli.reach_live import live
 
-    return live(arguments.endpoint, arguments.part)
+    return live(arguments.endpoint, _chooser(arguments), target)
+
+
+def _chooser(arguments: argparse.Namespace) -> Choose:
+    """What chooses the hand: the options, and of a run the part that learned."""
+
+    def choose(robot: Robot, place: Array | None) -> Hand:
+        part = arguments.part
+        if part is None and arguments.run is not None and store_of(arguments.run).is_file():
+            learned = reaching_parts(store_of(arguments.run))
+            part = learned[0] if len(learned) == 1 else None
+        return hand_chosen(robot, place, part, arguments.marker)
+
+    return choose
 
 
 def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
-    part = arguments.part
-    agent = _learned(arguments, stage)
-    marker = arguments.marker or (_palm(stage.robot, part) if agent is None else agent.marker)
+    part, marker, why = stage.hand.part, stage.hand.marker, stage.hand.why
     stage.robot.marker(marker)
-    if agent is not None and marker != agent.marker:
-        raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
+    agent = _learned(arguments, stage)
+    if agent is not None:
+        if arguments.marker not in (None, agent.marker):
+            raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
+        marker, why = agent.marker, ""
     if arguments.object is None:
         target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)
         _require_outside(stage, part, marker, target.position)
@@ -97,6 +122,7 @@ def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
         **way,
         part=part,
         marker=marker,
+        why=why,
         target=target,
         outcome=outcome,
         nearest=found,
@@ -108,8 +134,7 @@ def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
 def _learned(arguments: argparse.Namespace, stage: Stage) -> ReachAgent | None:
     if arguments.run is None:
         return None
-    file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
-    return load_reaches(file, stage.plant, arguments.part)
+    return load_reaches(store_of(arguments.run), stage.plant, stage.hand.part)
 
 
 def _require_outside(stage: Stage, part: str, marker: str, position: Array) -> None:
@@ -125,8 +150,6 @@ def _place(position: Array) -> str:
     return f"({', '.join(f'{x:.3g}' for x in position)})"
 
 
-def _palm(robot: Robot, part: str) -> str:
-    """The palm that a part moves: its own, or for the torso the right one."""
-    robot.part(part)
-    side = "left" if part.startswith("left") else "right"
-    return f"{side}_palm"
+def store_of(run: Path) -> Path:
+    """The file of a run that is given as a folder or as this file."""
+    return run / STORE if run.is_dir() else run

@@ -9,13 +9,14 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 from bus_schema import keys
 from bus_schema.chain import Commands, Tick
 from bus_schema.messages import Reach
-from bus_schema.rpc import Config, Empty
+from bus_schema.rpc import Config, Empty, World
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome
@@ -23,6 +24,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Array, Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+from mobee_cli.reach_hand import Choose
 from mobee_cli.reach_stage import Stage
 from services.common import rpc
 from services.common.bus_plant import BusPlant
@@ -123,19 +125,31 @@ def first_that_moves(commands: list[tuple[float, Array]], begun: float, moves: f
 
 
 @contextmanager
-def live(endpoint: str, part: str) -> Iterator[Stage]:
-    """The robot of the system at `endpoint`; its part is taken, and given back at the end.  Raises UserError where there is none."""
+def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Stage]:
+    """The robot of the system at `endpoint`; the part that reaches is taken, and given back at the end.
+
+    `target`: the place (3,) m, or the object's name, that is reached for.  Raises UserError where there is no system.
+    """
     with connected(endpoint) as session:
         try:
             settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=3).config)
         except rpc.CallFailed as failed:
             raise UserError(f"no controller answers at {endpoint} ({failed}): `mobee status` says what runs", ENVIRONMENT) from None
         robot = load_robot(settings["robot"])
-        robot.part(part)
+        hand = choose(robot, _place_of(session, target) if isinstance(target, str) else target)
         with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the reach, and that the verb has to tell
             logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
-            plant = LivePlant(service, robot, part, settings["modality"])
+            plant = LivePlant(service, robot, hand.part, settings["modality"])
             service.ready()
-            yield Stage(robot, plant, plant.q, plant.present_object, plant.first_motion)
+            yield Stage(robot, plant, hand, plant.q, plant.present_object, plant.first_motion)
             plant.leave()
+
+
+def _place_of(session: Any, name: str) -> Array | None:
+    """Where an object of the model's world is, (3,) m; None where it is not known, which is an error when it is presented."""
+    try:
+        objects = rpc.call(session, WHO, keys.world_rpc("list"), Empty, World, tries=3).objects
+    except rpc.CallFailed:
+        return None
+    return next((np.array(one.position) for one in objects if one.name == name), None)

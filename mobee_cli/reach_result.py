@@ -20,6 +20,7 @@ _COLUMNS = 80
 class Result:
     """How a reach went.
 
+    `why`: how marker and part were chosen, "" where they were given.
     `path`: the states that it led through; none without a run.  `avoided`: state-actions that were expected to fail, as pairs of a
     state and the state aimed at.  `expected`: reward, None without a run.  `first_motion`: s from the request to the first command
     that moves, None offline.
@@ -27,6 +28,7 @@ class Result:
 
     part: str
     marker: str
+    why: str
     target: ReachTarget
     outcome: ReachOutcome
     nearest: Nearest
@@ -78,9 +80,11 @@ def lines(result: Result) -> list[str]:
     """For a person, at most 80 columns wide."""
     outcome, aim = result.outcome, result.target.aim
     verdict = "is on" if result.reached else "did not come to"
+    chosen = [f"Reaching with {result.marker}, moved by part {result.part}: {result.why}."] if result.why else []
     told = [
+        *chosen,
         f"{result.marker} {verdict} the target at {_place(result.target.position)}: {1e3 * outcome.missing:.0f} mm from its {aim}, "
-        f"at {_place(outcome.marker)}, after {outcome.duration:.1f} s{'' if outcome.settled else ', still moving'}."
+        f"at {_place(outcome.marker)}, after {outcome.duration:.1f} s{'' if outcome.settled else ', still moving'}.",
     ]
     if not result.reached:
         told.append(_why(result))
@@ -101,9 +105,9 @@ def lines(result: Result) -> list[str]:
 def _why(result: Result) -> str:
     if result.beyond == 0.0:
         learn = "" if result.path else ", as one that has learned to reach knows (--run)"
-        return f"{result.part} is long enough: from another posture, or past what it touched, it may come there{learn}."
+        return f"Part {result.part} is long enough: from another posture, or past what it touched, it may come there{learn}."
     far = f"{1e3 * result.beyond:.0f} mm from the target's surface"
-    return f"The nearest that {result.part} can bring it is {_place(result.nearest.position)}, {far}, if nothing is in the way."
+    return f"The nearest that part {result.part} can bring it is {_place(result.nearest.position)}, {far}, if nothing is in the way."
 
 
 def _place(position: Array) -> str:

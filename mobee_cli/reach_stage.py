@@ -8,24 +8,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.collision.world import World
 from mobee.errors import UnknownName
 from mobee.model import Model
 from mobee.reach import Aim, ReachPlant, ReachTarget
-from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Array, Robot
 from mobee.simulation import OfflinePlant
+from mobee_cli.reach_hand import Choose, Hand
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
     """A plant, offline or live.
 
-    `q`: measures all motors, (n,) rad.  `present_object`: makes an object of the plant's world the target.  `first_motion`: s from
-    the last reach's request to the first command that moves, None where no clock on the wall counts.
+    `hand`: what reaches.  `q`: measures all motors, (n,) rad.  `present_object`: makes an object of the plant's world the target.
+    `first_motion`: s from the last reach's request to the first command that moves, None where no clock on the wall counts.
     """
 
     robot: Robot
     plant: ReachPlant
+    hand: Hand
     q: Callable[[], Array]
     present_object: Callable[[str, Aim], ReachTarget]
     first_motion: Callable[[], float | None]
@@ -37,9 +39,10 @@ class Stage:
 
 
 @contextmanager
-def offline() -> Iterator[Stage]:
-    """The iCub at home, at its table, on the offline plant."""
-    robot, world = load_robot("icub"), load_world("table")
+def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> Iterator[Stage]:
+    """The robot at home in a world, on the offline plant; `target`: the place (3,) m, or the object's name, that is reached for."""
+    known = {name: thing.position for name, thing in world.objects.items()}
+    hand = choose(robot, known.get(target) if isinstance(target, str) else target)
     plant = OfflinePlant(Model(robot, world))
 
     def present_object(name: str, aim: Aim) -> ReachTarget:
@@ -50,4 +53,4 @@ def offline() -> Iterator[Stage]:
         plant.present(target)
         return target
 
-    yield Stage(robot, plant, lambda: np.concatenate([plant.measure(part) for part in robot.parts]), present_object, lambda: None)
+    yield Stage(robot, plant, hand, lambda: np.concatenate([plant.measure(part) for part in robot.parts]), present_object, lambda: None)

@@ -9,10 +9,11 @@ from typing import Any
 
 from mobee.collision.world import World
 from mobee.errors import MobeeError
-from mobee.robot.load import load_robot, load_world
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
 from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from services.common.worlds import world_around
 
 _NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.
 Prints the address of a page and shows it until Ctrl-C; with --save it writes a file instead, for `rerun FILE`."""
@@ -33,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_recording(save)
     try:
         robot = load_robot(arguments.file, **urdf_options(arguments))
-        world = load_world(arguments.world) if arguments.world else None
+        world = world_around(arguments.world, arguments.file) if arguments.world else None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     return show(robot, world, save)

@@ -19,6 +19,7 @@ from experiments.robots.icub_fields import BESIDE
 from experiments.robots.icub_motors import EYES, declare_motors, joint_interval, motor_of
 from experiments.robots.xml_writer import element, number, vector, write
 from mobee.robot.robot import Array
+from mobee.robot.xml_tree import VERSION
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
 HEADING = """
@@ -42,7 +43,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
     """Write the file."""
     data = json.loads(Path(data_path).read_text(encoding="utf-8"))
     model = data["models"]["icub_v2_5"]
-    root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName="icub")
+    root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName="icub")
     torso = element(root, "bodypart", name="torso")
     declare_motors(torso, data, "torso")
     base = element(torso, "link", name="root_link")

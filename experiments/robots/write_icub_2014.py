@@ -17,6 +17,7 @@ import numpy as np
 from experiments.robots.write_icub import add_constraints
 from experiments.robots.xml_writer import box_turn, element, number, vector, write
 from mobee.robot.robot import Array
+from mobee.robot.xml_tree import VERSION
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub_2014.xml"
 HEADING = """
@@ -60,7 +61,7 @@ class Tree:
 def main(data_path: str, out: str | Path = OUT) -> None:
     """Write the file."""
     tree = Tree(json.loads(Path(data_path).read_text(encoding="utf-8")))
-    root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName="icub_2014", adjacency="published_2014")
+    root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName="icub_2014", adjacency="recorded_2014")
     torso = element(root, "bodypart", name="torso")
     declare_motors(torso, tree, "torso")
     # Our one departure: the rule would let a torso bent to 47 deg feel its own pedestal, 4 mm deep.
@@ -105,10 +106,10 @@ def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
                 here.set("length", number(shape["height"]))
     for shape in mine:
         if not shape["implicit_from_node"]:
-            add_shape(here, shape, end)
+            add_shape(here, shape, point)
     for marker in tree.markers:
         if marker["node"] == node["id"]:
-            place = vector("px py pz", np.array(marker["point_root_zero_reference"]) - end)
+            place = vector("px py pz", np.array(marker["point_root_zero_reference"]) - point)
             element(here, "marker", name=MARKERS[marker["name"]], **place, **vector("nx ny nz", np.array(marker["normal_node_frame"])))
     if node["kind"] == "joint" and tree.axis[node["motor"]].endswith("elbow"):
         element(here, "marker", name=f"{node['body_part'].removesuffix('_arm')}_elbow", nx="1")

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mobee.robot.robot import Array
-from mobee.robot.xml_volume import Y, align
+from mobee.robot.xml_tree import write_tree
+from mobee.robot.xml_volume import Y, angle_about, height_and_angle
 
 
 def number(value: float, digits: int = 7) -> str:
@@ -33,15 +34,15 @@ def box_turn(rotation: Array) -> dict[str, str]:
     """The attributes hx, hy, hz and angle [deg] of a box whose orientation is `rotation` (3, 3)."""
     left, _, right = np.linalg.svd(rotation)
     exact = left @ right
-    axis = exact[:, 1]
-    plain = align(Y, axis)[:, 0]
-    angle = np.rad2deg(np.arctan2(axis @ np.cross(plain, exact[:, 0]), plain @ exact[:, 0]))
+    axis, _ = height_and_angle(exact)
     turn = {} if np.allclose(axis, Y, atol=1e-7) else vector("hx hy hz", axis)
-    return turn if abs(angle) < 1e-5 else turn | {"angle": number(float(angle), 5)}
+    written = np.array([float(turn.get(name, 0.0)) for name in ("hx", "hy", "hz")]) if turn else Y
+    if exact[1, 1] * axis[1] < 0:
+        exact = exact * np.array([1.0, -1.0, -1.0])  # the same box
+    angle = np.rad2deg(angle_about(written / np.linalg.norm(written), exact))
+    return turn if abs(angle) < 1e-5 else turn | {"angle": number(float(angle), 6)}
 
 
 def write(root: ET.Element, path: Path, heading: str) -> None:
     """Write the indented file, with a comment that says where it comes from."""
-    ET.indent(root, " ")
-    body = ET.tostring(root, encoding="unicode")
-    path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n<!--\n{heading.strip()}\n-->\n{body}\n', encoding="utf-8")
+    write_tree(root, path, heading)

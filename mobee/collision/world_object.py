@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
@@ -10,14 +9,16 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.geometry import Geometry
+from mobee.collision.geometry import LARGEST, SMALLEST, Geometry, is_length
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array, ShapeKind
 
 Role = Literal["obstacle", "target", "ghost"]
 Color = tuple[float, float, float, float]
 
 LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
+FARTHEST = 1e6  # m, from the root frame: beyond it the arithmetic would lose millimetres
 _LONG, _SKEW = 1.1e-5, 1e-6  # allowed of a rotation: squares of its rows beside 1, products of two rows
 
 
@@ -58,22 +59,25 @@ def valid_name(name: str) -> str:
 
 
 def valid_shape(name: str, shape: Geometry) -> Geometry:
-    """The shape, if it is one of the four primitives with all of its lengths, finite and positive; raises InvalidValue."""
+    """The shape, if it is one of the four primitives with all of its lengths, SMALLEST to LARGEST; raises InvalidValue."""
     if not isinstance(shape, Geometry):
         raise InvalidValue(f"world object {name!r}: shape {shape!r}; it must be a Geometry, as sphere(0.1), box, cylinder or capsule.")
     lengths = LENGTHS.get(shape.kind)
     if lengths is None:
         raise InvalidValue(f"world object {name!r}: a {shape.kind!r} cannot be in the world; valid: {', '.join(LENGTHS)}.")
-    if len(shape.size) != lengths or not all(0.0 < length < math.inf for length in shape.size):
-        raise InvalidValue(f"world object {name!r}: {shape.kind} of size {shape.size}; it must be {lengths} positive lengths in metres.")
+    if len(shape.size) != lengths or not all(is_length(length) for length in shape.size):
+        valid = f"{lengths} lengths of {SMALLEST:g} to {LARGEST:g} m"
+        raise InvalidValue(f"world object {name!r}: {shape.kind} of size {shape.size}; it must be {valid}.")
     return shape
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """A copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
+    """A copy of a position (3,) m; raises InvalidValue unless it is three numbers of at most FARTHEST in size."""
     value = _numbers(given)
-    if value is None or value.shape != (3,) or not np.isfinite(value).all():
-        raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
+    if value is None or value.shape != (3,) or not (np.abs(value) <= FARTHEST).all():
+        raise InvalidValue(
+            f"world object {name!r}: position {given!r}; it must be three finite numbers in metres, each within {FARTHEST:g}."
+        )
     return value
 
 
@@ -86,10 +90,10 @@ def valid_rotation(name: str, given: ArrayLike) -> Array:
 
 
 def _numbers(given: ArrayLike) -> Array | None:
-    """A copy as an array; None if it is no array of numbers."""
+    """A copy as an array; None if it is no array of real numbers."""
     try:
-        return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
+        return real_array("", given)
+    except InvalidValue:
         return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far more than any squash lets through, far less than overflows in it
@@ -12,7 +13,7 @@ LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far more than any squash le
 
 def checked(what: str, value: Array, length: int) -> Array:
     """A copy of what must be that many finite numbers; raises InvalidValue."""
-    array = np.array(value, dtype=np.float64)
+    array = real_array(what, value)
     if array.shape != (length,):
         raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
     if not np.isfinite(array).all():

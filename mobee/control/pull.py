@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
@@ -49,12 +50,12 @@ class Pull:
 def checked_target(model: Model, marker: str, position: Array, normal: Array | None) -> Target:
     """A target, or InvalidValue or UnknownName for what is none."""
     model.robot.marker(marker)
-    where = np.array(position, dtype=np.float64)
+    where = real_array("position of the target", position)
     if where.shape != (3,) or not np.isfinite(where).all():
         raise InvalidValue(f"position {position!r} of the target: must be three finite numbers, m in the root frame")
     if normal is None:
         return Target(marker, where, None)
-    direction = np.array(normal, dtype=np.float64)
+    direction = real_array("normal of the target", normal)
     length = float(np.linalg.norm(direction)) if direction.shape == (3,) else 0.0
     if not 0.0 < length < np.inf:
         raise InvalidValue(f"normal {normal!r} of the target: must be three finite numbers, not all 0")

@@ -9,6 +9,7 @@ import numpy as np
 
 from mobee.control.pull import bend, checked_target, pull
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def reach_path(
     if not (tolerance > 0 and steps > 0):
         raise InvalidValue(f"tolerance {tolerance} and {steps} steps: both must be above 0")
     low, high = model.robot.limits.T
-    path = [np.array(start, dtype=np.float64)]
+    path = [real_array("start", start)]
     here = pull(model, target, path[0])
     end: Literal["reached", "stuck", "steps used up"] = "steps used up"
     while True:

@@ -18,6 +18,7 @@ import numpy as np
 
 from mobee.control.pull import ARM, Pull, checked_target, pull
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.motor_units import limit_zones, motor_units
 from mobee.robot.robot import Array
 
@@ -66,7 +67,7 @@ class Reacher:
         "stuck" while the marker comes no nearer: the target is out of reach, or limits, clauses or contacts are in its way.  It
         is pulled all the same.
         """
-        q = np.asarray(q, dtype=np.float64)
+        q = real_array("q", q)
         controller = self._controller
         found = pull(controller.model, self.target, q)
         self._seen += (found.error - self._seen) * (1.0 if np.isinf(self.distance) else min(1.0, dt / SMOOTH))

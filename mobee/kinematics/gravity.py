@@ -11,6 +11,7 @@ from mobee.errors import InvalidValue
 from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.masses import masses
 from mobee.kinematics.tables import tables
+from mobee.real_array import real_array
 from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Robot
 
@@ -60,7 +61,7 @@ def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Arra
 
 
 def _checked(robot: Robot, q: Array) -> Array:
-    q, n = np.asarray(q, dtype=float), len(robot.motor_table)
+    q, n = real_array("q", q), len(robot.motor_table)
     if q.ndim == 0 or q.shape[-1] != n:
         raise InvalidValue(f"q of shape {q.shape}: must be (..., {n}), a position for every motor of {robot.name}")
     return q

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION, nearest, tree
+from mobee.real_array import real_array
 from mobee.robot.robot import Array, Ints, Part, Robot
 
 MAX_STATES = 100_000  # beyond this the space is no learning problem on a robot any more (thesis 7.4)
@@ -91,7 +92,7 @@ class Space:
         `q`: rad, shape (d,): the joints in their order here, or shape (n_part,): all motors of the part.  When both
         have the same length it is read as the joints; `q_part[space.columns]` is right in either case.
         """
-        given = np.asarray(q, dtype=np.float64)
+        given = real_array(f"q of {self.part}", q)
         if given.shape == self._targets.shape[1:] != self.columns.shape:
             given = given[self.columns]
         if given.shape != self.columns.shape:
@@ -160,7 +161,7 @@ def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
 
 
 def _checked_samples(samples: ArrayLike, joints: int) -> Array:
-    given = np.array(samples, dtype=np.float64)
+    given = real_array("samples", samples)
     if given.ndim != 2 or given.shape[1] != joints or len(given) < 2 or not np.isfinite(given).all():
         raise InvalidValue(
             f"samples have shape {given.shape}: give at least two finite poses of the {joints} joints, shape (S, {joints}), in rad."

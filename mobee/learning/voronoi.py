@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import nearest_goals
 from mobee.learning.space import MAX_STATES, Space, checked_joints, checked_neighbours
+from mobee.real_array import real_array
 from mobee.robot.robot import Array, Ints, Robot
 
 
@@ -69,7 +70,7 @@ def _drawn_samples(samples: Any, limits: Array, seed: int) -> Array:
 
 
 def _checked_within(samples: ArrayLike, limits: Array, joints: Sequence[str]) -> Array:
-    given = np.asarray(samples, dtype=np.float64)
+    given = real_array("samples", samples)
     if given.ndim != 2 or given.shape[1] != len(joints) or not 2 <= len(given) <= MAX_STATES:
         raise InvalidValue(
             f"samples have shape {given.shape}: give 2 to {MAX_STATES} poses of {', '.join(joints)}, shape (S, {len(joints)}), in rad."

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
 from mobee.model import Model
+from mobee.real_array import real_array
 from mobee.roadmap.ik.problem import chosen
 from mobee.roadmap.ik.solids import solid_model
 from mobee.roadmap.ompl_base import EXTENSIONS, Free, Grown, OmplMissing, connected, grown, require_ompl
@@ -137,7 +138,7 @@ def _free(model: Model, motors: Sequence[str] | None, rest: ArrayLike, step: flo
 
 
 def _poses(model: Model, given: ArrayLike) -> Array:
-    poses, n = np.array(given, dtype=np.float64), len(model.robot.motors)
+    poses, n = real_array("the pose", given), len(model.robot.motors)
     if poses.ndim not in (1, 2) or poses.shape[-1] != n or not np.isfinite(poses).all():
         raise InvalidValue(f"a pose of shape {poses.shape}: give all {n} motors of {model.robot.name}, finite, in rad.")
     return poses

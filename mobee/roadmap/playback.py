@@ -12,6 +12,7 @@ from mobee.collision.contact import Contact
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
 from mobee.model import Model
+from mobee.real_array import real_array
 from mobee.roadmap.edges import Flags
 from mobee.roadmap.reference import ROUNDING, Reference, reference
 from mobee.robot.robot import Array, Robot
@@ -167,7 +168,7 @@ def standing(robot: Robot, q: Array) -> Robot:
 
 def _within(robot: Robot, path: ArrayLike) -> Array:
     """The path, if the robot can be there; encoders may say a hair's breadth more than the limits."""
-    given, n = np.array(path, dtype=np.float64), len(robot.motors)
+    given, n = real_array("path", path), len(robot.motors)
     if given.ndim != 2 or given.shape[1] != n or not len(given):
         raise InvalidValue(f"path has shape {given.shape}; it must be (K, {n}) rad.")
     inside = np.clip(given, *robot.limits.T)

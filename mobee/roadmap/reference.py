@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 ROUNDING = 0.1  # rad
@@ -32,7 +33,7 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
     next; it passes the corner in half that distance or less.  0: it stops there instead.
     """
     corners, fastest, hardest = (
-        np.array(path, dtype=np.float64),
+        real_array("path", path),
         np.asarray(speeds, dtype=np.float64),
         np.asarray(accelerations, dtype=np.float64),
     )
@@ -56,7 +57,7 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
 
 def rounded(corners: ArrayLike, rounding: float) -> Array:
     """Places along a path (K, n), about STEP apart, (S, n): straight, with a parabola at each corner."""
-    points = np.asarray(corners, dtype=np.float64)
+    points = real_array("corners", corners)
     ways = np.diff(points, axis=0)
     far = np.linalg.norm(ways, axis=1)
     ways = ways / far[:, None]

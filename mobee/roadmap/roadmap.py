@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model import Model
+from mobee.real_array import real_array
 from mobee.roadmap.archive import read, write
 from mobee.roadmap.fingerprint import robot_digest, world_digest
 from mobee.roadmap.free_way import free_way
@@ -118,7 +119,7 @@ class Roadmap:
         return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
     def _posture(self, given: ArrayLike) -> Array:
-        q, n = np.array(given, dtype=np.float64), len(self.model.robot.motors)
+        q, n = real_array("q_from", given), len(self.model.robot.motors)
         if q.shape != (n,) or not np.isfinite(q).all():
             raise InvalidValue(f"q_from has shape {q.shape}; it must be ({n},) rad, finite, a position for every motor.")
         self._require_vertices()
@@ -134,7 +135,7 @@ class Roadmap:
 
     def _to(self, y_goal: ArrayLike) -> Array:
         """How far every vertex is from task coordinates (m,), (V,) spacings, infinite beyond NEAR of them."""
-        goal, m = np.atleast_1d(np.array(y_goal, dtype=np.float64)), len(self.spacing)
+        goal, m = np.atleast_1d(real_array("y_goal", y_goal)), len(self.spacing)
         if goal.shape != (m,) or not np.isfinite(goal).all():
             raise InvalidValue(f"y_goal has shape {goal.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
         self._require_vertices()
@@ -197,7 +198,10 @@ def digests(model: Model) -> dict[str, str]:
 def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any, robot: Robot | None) -> Model:
     name = settings["robot"]
     if robot is None and name not in shipped_robots():
-        raise MobeeError(f"{path}: made for the robot {name!r}, which does not come with mobee: its file must be named too.")
+        raise MobeeError(
+            f"{path}: made for the robot {name!r}, which does not come with mobee: name its file, as robot=load_robot(FILE), or on the "
+            "command line as --robot FILE."
+        )
     model = Model(load_robot(name) if robot is None else robot, told_world(made_in))
     model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
     return model

@@ -7,6 +7,7 @@ from pathlib import Path
 from mobee.collision.world import World
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.hull import CORNERS, Corners
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml_file import is_file
@@ -18,19 +19,28 @@ WORLDS = Path(__file__).parent / "worlds"
 
 
 def load_robot(
-    name_or_path: str | Path, *, field: float | None = None, meshes: Meshes | None = None, srdf: str | Path | None = None
+    name_or_path: str | Path,
+    *,
+    field: float | None = None,
+    meshes: Meshes | None = None,
+    corners: Corners | None = None,
+    srdf: str | Path | None = None,
+    home: str | None = None,
 ) -> Robot:
     """A shipped robot by name (see shipped_robots), or the robot of a zero-position .xml or a .urdf file.
 
     For URDF files only: `field` gives every solid a field that reaches so much farther, in [m] (none when left out);
-    `meshes` is "hull" (when left out) or "bounding", see UrdfOptions; `srdf` is the SRDF file (the one beside when left out).
+    `meshes` is "hull" (when left out) or "bounding", see UrdfOptions; `corners` is how many the hull of a mesh has at most (64 when
+    left out), or "all" for the exact hull; `srdf` is the SRDF file (when left out the one that is found, see docs/robots.md); `home`
+    names a <group_state> of it, or is "zero".
     Raises UnknownName with the nearest shipped name, InvalidValue for an option that the file cannot have, or RobotFileError
     with file, line, field and remedy.
     """
     path = find_file(name_or_path, ROBOTS, "robot")
     if path.suffix.lower() == ".urdf":
-        return read_urdf(path, UrdfOptions(field, meshes or "hull", srdf))
-    given = [name for name, value in (("field", field), ("meshes", meshes), ("srdf", srdf)) if value is not None]
+        return read_urdf(path, UrdfOptions(field, meshes or "hull", CORNERS if corners is None else corners, srdf, home))
+    options = {"field": field, "meshes": meshes, "corners": corners, "srdf": srdf, "home": home}
+    given = [name for name, value in options.items() if value is not None]
     if given:
         raise InvalidValue(f"{given[0]}= is for .urdf files, and {path} is none: zero-position XML has tags for all of it. Leave it out.")
     return read_robot(path)

@@ -59,14 +59,14 @@ def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
     return clusters
 
 
-def hand_links(subtree: Sequence[int], joints: Sequence[Joint]) -> dict[LinkPair, str]:
-    """Pairs of links of one noSelfCollision subtree; `subtree`: for each link the link that its subtree starts at, -1 for none."""
+def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPair, str]:
+    """Pairs of links of one noSelfCollision subtree; `subtree`: for each link the one that it is in, -1 for none; `names` of subtrees."""
     members: dict[int, list[int]] = {}
     for link, start in enumerate(subtree):
         if start != -1:
             members.setdefault(start, []).append(link)
     return {
-        frozenset(pair): f"same hand (noSelfCollision of joint {joints[start - 1].name})"
+        frozenset(pair): f"same hand (noSelfCollision of {names[start]})"
         for start, links in members.items()
         for pair in combinations(links, 2)
     }

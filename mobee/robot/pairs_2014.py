@@ -1,9 +1,15 @@
-"""Which shapes are tested against each other in the model that was published in 2014 (adjacency="published_2014" in a robot file).
+"""Which shapes are tested against each other in the program that was published in 2014, and in our recorded reading of it.
 
-The rule works on the elements <link> and <joint> of the file. Below every element, and below those beside it, the tree is descended
-until one link and one joint that bear a shape of the role in question have been passed. What is met on the way is a neighbour: its
-fields are not tested against the element's; its solids are not if both are of one part, or one carries the other, or both hang on
-the same element. Read so, no field of icub_2014 touches another at home.
+Both rules work on the elements <link> and <joint> of a file, and find neighbours by descents of the tree: below every element, and
+below those beside it. Fields of neighbours are not tested against each other; their solids are not if both are of one part, or one
+carries the other, or both hang on the same element.
+
+adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs): a descent ends when a link
+under a joint and a joint under a link that bear a solid have been passed, but goes on past elements of the kind that it began with.
+
+adjacency="recorded_2014" is an earlier reading, with which the results of this project on icub_2014 were recorded: a descent ends when
+one link and one joint that bear a shape of the role in question have been passed. With it no field of icub_2014 touches another at
+home; by the rule of the program the forearm's field is 3 mm deep in that of the thumb.
 """
 
 from __future__ import annotations
@@ -11,10 +17,13 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 
 from mobee.robot.robot import Ints, LinkPair, Shape
+
+Rule = Literal["published_2014", "recorded_2014"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,21 +37,21 @@ class Element:
     link: int = 0
 
 
-def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str) -> Ints:
+def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, rule: Rule) -> Ints:
     """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `hosts`: the element of each shape."""
     chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
-    near = neighbours(elements, {hosts[index] for index in chosen})
+    near = _near(elements, hosts, shapes, role, rule)
     pairs = [(i, j) for i, j in combinations(chosen, 2) if not _reason(elements, hosts[i], hosts[j], role, near)]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
-def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
+def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], rule: Rule) -> dict[LinkPair, str]:
     """Pairs of links that are never tested, and why: the rule for solids holds for every element of the one and of the other.
 
     The elements of a link are those that bear a solid or, if there is none, all of them.
     """
-    solid = {host for host, shape in zip(hosts, shapes, strict=True) if shape.role == "solid"}
-    near = neighbours(elements, solid)
+    solid = _bearing(hosts, shapes, "solid")
+    near = _near(elements, hosts, shapes, "solid", rule)
     of_link: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
         of_link.setdefault(element.link, []).append(index)
@@ -54,6 +63,17 @@ def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes
         if all(reasons):
             untested[frozenset((a, b))] = reasons[0]
     return untested
+
+
+def _near(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, rule: Rule) -> set[frozenset[int]]:
+    if rule == "published_2014":
+        return neighbours(elements, _bearing(hosts, shapes, "solid"))
+    return recorded_neighbours(elements, _bearing(hosts, shapes, role))
+
+
+def _bearing(hosts: Sequence[int], shapes: Sequence[Shape], role: str) -> set[int]:
+    """The elements that bear a shape of a role."""
+    return {host for host, shape in zip(hosts, shapes, strict=True) if shape.role == role}
 
 
 def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collection[frozenset[int]]) -> str:
@@ -69,19 +89,57 @@ def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collec
     return ""
 
 
-def neighbours(elements: Sequence[Element], bearing: set[int]) -> set[frozenset[int]]:
-    """Pairs of elements that meet on a descent; `bearing`: the elements that bear a shape."""
+def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
+    """Pairs of elements that meet on a descent; `bearing`: the elements that bear a solid. Element 0 is the root of the file."""
+    children: dict[int, list[int]] = {}
+    for index, element in enumerate(elements):
+        children.setdefault(element.parent, []).append(index)
+    pairs: set[frozenset[int]] = set()
+    for first, element in enumerate(elements):
+        for start in children[element.parent]:
+            waiting = [(first, False, False)]
+            while waiting:
+                here, link, joint = waiting.pop()
+                found = _passed(elements, here, start, bearing, link, joint)
+                if found is None:
+                    continue
+                pairs.add(frozenset((start, here)))
+                waiting += [(child, *found) for child in children.get(here, ())]
+    return pairs
+
+
+def _passed(
+    elements: Sequence[Element], here: int, start: int, bearing: Collection[int], link: bool, joint: bool
+) -> tuple[bool, bool] | None:
+    """Whether a link and a joint have been passed on a descent that has come to an element; None where the descent ends before it."""
+    element, carrier = elements[here], elements[here].parent
+    if carrier <= 0 or carrier == elements[start].parent:
+        return link, joint
+    if link and joint and element.tag != elements[start].tag:
+        return None
+    if here in bearing and element.tag == "link" != elements[carrier].tag:
+        link = True
+    elif here in bearing and element.tag != "link" == elements[carrier].tag:
+        joint = True
+    return link, joint
+
+
+def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
+    """Pairs of elements that meet on a descent by the recorded reading; `bearing`: the elements that bear a shape of the role."""
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
         children.setdefault(element.parent, []).append(index)
     pairs: set[frozenset[int]] = set()
 
     def descend(start: int, below: int, passed: frozenset[str]) -> None:
-        for child in children.get(below, ()):
-            pairs.add(frozenset((start, child)))
-            seen = passed | {elements[child].tag} if child in bearing else passed
-            if len(seen) < 2:
-                descend(start, child, seen)
+        waiting = [(below, passed)]
+        while waiting:
+            here, before = waiting.pop()
+            for child in children.get(here, ()):
+                pairs.add(frozenset((start, child)))
+                seen = before | {elements[child].tag} if child in bearing else before
+                if len(seen) < 2:
+                    waiting.append((child, seen))
 
     for index, element in enumerate(elements):
         descend(index, index, frozenset())
@@ -90,3 +148,20 @@ def neighbours(elements: Sequence[Element], bearing: set[int]) -> set[frozenset[
                 pairs.add(frozenset((index, beside)))
                 descend(index, beside, frozenset({elements[beside].tag} if beside in bearing else ()))
     return pairs
+
+
+def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
+    """Whether the program of 2014 took an element for the base, which is never tested against the world (KinTreeNode::isNearRoot).
+
+    It climbs from the element until a change from link to joint and one from joint to link are behind it, and on past elements of its own
+    kind; what comes to the root so is near it. `parents`: -1 for the first elements of the tree; `tags`: "link" or "joint".
+    """
+    here, link, joint = index, False, False
+    while parents[here] >= 0:
+        if link and joint and tags[here] != tags[index]:
+            return False
+        carrier = tags[parents[here]]
+        link = link or tags[here] == "link" != carrier
+        joint = joint or tags[here] != "link" == carrier
+        here = parents[here]
+    return True

@@ -13,10 +13,11 @@ from mobee.robot.drives import Drive, drives_of
 from mobee.robot.number_text import degrees, number, numbers
 from mobee.robot.robot import Array, Body, Clause, Joint, Motor, Robot, Shape
 from mobee.robot.write_pairs import ignore_elements
-from mobee.robot.xml_node import DEEPEST
-from mobee.robot.xml_volume import Y, align
+from mobee.robot.xml_node import DEEPEST, Remark, read_xml
+from mobee.robot.xml_tree import VERSION, tree_of, write_tree
+from mobee.robot.xml_versions import WORLD_TAGS, upgrade_robot, upgrade_world
+from mobee.robot.xml_volume import height_and_angle
 
-HALFWAY = -0.5  # cosine; beyond it a box is drawn with its axis the other way, for the shortest turn is ill-defined at half a turn
 DIGITS = 1e-14  # m; less is the rounding of a sum
 
 
@@ -27,7 +28,7 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
     convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
-    root = ET.Element("ZeroPositionKinematicTree", version="1.0", robotName=robot.name, adjacency="listed")
+    root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName=robot.name, adjacency="listed")
     for part in robot.parts.values():
         element = ET.SubElement(root, "bodypart", name=part.name)
         for motor in robot.motor_table[part.slice]:
@@ -38,10 +39,23 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
     base = ET.SubElement(root, "link", name=robot.links[0])
     _write_link(robot, drives, base, 0, np.zeros(3))
     root.extend(ignore_elements(robot))
-    ET.indent(root, " ")
-    path = Path(path)
-    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-    return path
+    return write_tree(root, Path(path))
+
+
+def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
+    """Write a robot or world file of an older version in today's form, element by element, and return how it was understood.
+
+    Comments are left out. Returns None, and writes nothing, for a robot that is in today's form. Raises RobotFileError.
+    """
+    root = read_xml(source, repair=True)
+    if root.tag in WORLD_TAGS:
+        remarks = upgrade_world(root)
+    elif root.optional("version") == VERSION:
+        return None
+    else:
+        remarks = upgrade_robot(root)
+    write_tree(tree_of(root), target, f"Written by mobee convert from {source.name}.")
+    return remarks
 
 
 def _motor(motor: Motor) -> ET.Element:
@@ -134,13 +148,8 @@ def _volume(shape: Shape, origin: Array) -> dict[str, str]:
 
 
 def _turn(rotation: Array) -> dict[str, str]:
-    """A box's orientation as the file says it: y the shortest way to an axis, then an angle about that."""
-    axis = rotation[:, 1]
-    if axis[1] < HALFWAY:
-        rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
-        axis = rotation[:, 1]
-    rest = align(Y, axis).T @ rotation
-    return _vector(("hx", "hy", "hz"), axis) | {"angle": degrees(np.arctan2(rest[0, 2], rest[0, 0]))}
+    axis, angle = height_and_angle(rotation)
+    return _vector(("hx", "hy", "hz"), axis) | {"angle": degrees(angle)}
 
 
 def _vector(names: tuple[str, str, str] | str, vector: Array) -> dict[str, str]:

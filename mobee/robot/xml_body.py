@@ -10,7 +10,7 @@ from mobee.robot.robot import Array, Marker, Shape
 from mobee.robot.xml_convex import read_convex
 from mobee.robot.xml_draft import Draft, Place
 from mobee.robot.xml_node import Node
-from mobee.robot.xml_volume import PLACE, Z, align, direction, read_volume
+from mobee.robot.xml_volume import PLACE, X, Z, align, direction, read_volume
 
 MOST_SHAPES = 2000  # what is tested grows with the square
 
@@ -44,8 +44,9 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
     if name in draft.shape_names:
         node.fail("name", f"a second shape {name!r}", "Rename one of the two")
     role = "field" if node.flag("field") else "solid"
-    centre = place.point + volume.centre
-    shape = Shape(name, place.link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
+    centre = place.start + volume.centre
+    link = place.link if node.flag("turns", default=True) else place.carrier
+    shape = Shape(name, link, volume.kind, volume.size, centre, volume.rotation, "solid", place.part, volume.vertices)
     place = replace(place, base=node.flag("base", default=place.base))
     add_shape(node, draft, replace(shape, role="field") if role == "field" else shape, place)
 
@@ -72,12 +73,12 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <marker>; without a normal it is the z axis of its rotation, without a rotation z is turned the shortest way to the normal."""
+    """Add a <marker>; its normal is +x, or the z axis of its rotation; without a rotation z is turned the shortest way to the normal."""
     name = node.text("name")
     if name in draft.markers:
         node.fail("name", f"a second marker {name!r}", "Rename one of the two")
     given = any(axis in node.attributes for axis in ("nx", "ny", "nz"))
-    normal = direction(node, ("nx", "ny", "nz")) if given else Z
+    normal = direction(node, ("nx", "ny", "nz")) if given else X
     rotation = align(Z, normal)
     if "rotation" in node.attributes:
         rotation = np.array(node.numbers("rotation", 9)).reshape(3, 3)
@@ -87,4 +88,5 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
         rotation = left @ right
         normal = normal if given else rotation[:, 2]
     draft.note("marker", name, node)
-    draft.markers[name] = Marker(name, place.link, place.point + node.vector(PLACE), rotation, normal)
+    link = place.link if node.flag("turns", default=True) else place.carrier
+    draft.markers[name] = Marker(name, link, place.start + node.vector(PLACE), rotation, normal)

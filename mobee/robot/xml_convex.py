@@ -9,7 +9,7 @@ from mobee.robot.xml_node import Node
 from mobee.robot.xml_volume import AXIS, PLACE, Volume, box_rotation
 
 CONVEX_ATTRIBUTES = frozenset({"points", "angle", *PLACE, *AXIS})
-MOST_POINTS = 1000
+MOST_POINTS = 10_000
 FLAT = 1e-6  # a hull thinner than this part of its length has no inside that a collision test could find
 
 

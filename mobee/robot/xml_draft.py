@@ -16,11 +16,12 @@ class Draft:
     """What has been read so far."""
 
     links: list[str] = field(default_factory=lambda: ["base"])
-    subtree: list[int] = field(default_factory=lambda: [-1])
+    subtree: list[int] = field(default_factory=lambda: [-1])  # for each link the element whose noSelfCollision holds for it
     joints: list[Joint] = field(default_factory=list)
     drives: list[tuple[Node, str]] = field(default_factory=list)  # for each joint its element and the name of its motor
     motors: dict[str, MotorDraft] = field(default_factory=dict)
     parts: dict[str, list[Node]] = field(default_factory=dict)
+    hands: dict[int, str] = field(default_factory=dict)  # the elements with noSelfCollision, and what a reason calls them
     elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
     shapes: list[Shape] = field(default_factory=list)
     hosts: list[int] = field(default_factory=list)  # for each shape its element
@@ -40,10 +41,12 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in the tree a child stands: the current point [m], the link it is on, its part, motor and hand subtree."""
+    """Where in the tree a child stands: two points, the link it is on, its part, motor, and the element whose noSelfCollision holds."""
 
-    point: Array
+    point: Array  # (3,) m, where links and joints go on: the end of a link
+    start: Array  # (3,) m, where shapes and markers stand: the start of a link
     link: int = 0
+    carrier: int = 0  # in a joint the link that carries it, else the same link: what has turns="false" is on it
     part: str = ""
     motor: str = ""
     subtree: int = -1
@@ -51,7 +54,11 @@ class Place:
     element: int = 0
 
 
-def enter(node: Node, draft: Draft, place: Place) -> Place:
-    """The place inside a link or joint."""
+def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
+    """The place inside a link or joint that a reason calls `name`."""
+    index = len(draft.elements)
+    if node.flag("noSelfCollision") and place.subtree < 0:
+        draft.hands[index] = name
+        place = replace(place, subtree=index)
     draft.elements.append(Element(place.element, node.tag, place.part, place.subtree, place.link))
-    return replace(place, element=len(draft.elements) - 1)
+    return replace(place, element=index)

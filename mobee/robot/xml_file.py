@@ -26,6 +26,17 @@ REMEDIES = {
 }
 
 
+CONFLICT = (b"<<<<<<<", b"=======", b">>>>>>>")
+
+
+class MalformedXml(RobotFileError):
+    """A file that is no XML, and where: line and column from 1, and what the parser says."""
+
+    def __init__(self, message: str, line: int, column: int, problem: str) -> None:
+        super().__init__(message)
+        self.line, self.column, self.problem = line, column, problem
+
+
 class LineHandler(xml.sax.handler.ContentHandler):
     """A handler of SAX events that knows the line it has reached."""
 
@@ -65,7 +76,11 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
     Entities and external references are refused (they can exhaust memory or read other files).
     Raises RobotFileError when the file is missing, not a regular file, larger than 8 MB, not XML or hostile.
     """
-    content = _content(path)
+    parse_content(path, read_content(path), handler)
+
+
+def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
+    """Send the elements of the content of an XML file to `handler`; errors as parse_xml."""
     try:
         defusedxml.sax.parseString(content, handler)
     except defusedxml.DefusedXmlException as error:
@@ -75,12 +90,15 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
     except xml.sax.SAXParseException as error:
         line, column, problem = error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1, error.getMessage()
         remedy = next((REMEDIES[key] for key in REMEDIES if key in problem), "Close every tag and quote every value")
-        raise RobotFileError(f"{path}:{line}: not well-formed XML: {problem} in column {column}. {remedy}.") from error
+        if content.splitlines()[line - 1 : line] and content.splitlines()[line - 1].startswith(CONFLICT):
+            problem, remedy = "a merge of git left its conflict", "Keep one side between <<<<<<< and >>>>>>>, and remove these lines"
+        raise MalformedXml(f"{path}:{line}: not well-formed XML: {problem} in column {column}. {remedy}.", line, column, problem) from error
     except (LookupError, ValueError) as error:  # Python's codecs, where expat does not know the declared encoding
         raise RobotFileError(f"{path}:1: not well-formed XML: its encoding cannot be read ({error}). Save the file as UTF-8.") from error
 
 
-def _content(path: Path) -> bytes:
+def read_content(path: Path) -> bytes:
+    """The bytes of a file of at most 8 MB; errors as parse_xml."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             reason = os.strerror(21) if path.is_dir() else "Not a regular file"

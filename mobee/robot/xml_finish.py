@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 from mobee.errors import InvalidValue
 from mobee.robot.bodies import one_a_link
 from mobee.robot.join import Placed, join_placed
 from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
-from mobee.robot.pairs_2014 import published_pairs, published_untested
+from mobee.robot.pairs_2014 import Rule, published_pairs, published_untested
 from mobee.robot.robot import Ints, Joint, LinkPair, Part, Robot
 from mobee.robot.xml_body import MOST_SHAPES
 from mobee.robot.xml_draft import Draft
@@ -63,17 +64,18 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
 
 def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, Ints, dict[LinkPair, str]]:
     """Tested pairs of fields and of solids, and the reasons for the pairs of links that are never tested."""
-    rule = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "listed", "published_2014"), "rule")
-    if rule == "listed":
+    given = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "listed", *get_args(Rule)), "rule")
+    if given == "listed":
         return tested_pairs(draft.shapes, "field", {}, own=True), tested_pairs(draft.shapes, "solid", {}), {}
-    if rule == "joined":
-        untested = merged(joined_links(joints), hand_links(draft.subtree, joints))
+    if given == "joined":
+        untested = merged(joined_links(joints), hand_links(draft.subtree, draft.hands))
         return tested_pairs(draft.shapes, "field", untested), tested_pairs(draft.shapes, "solid", untested), untested
     if len(draft.elements) > MOST_ELEMENTS_2014:
         root.fail("adjacency", f"the rule of 2014 is for at most {MOST_ELEMENTS_2014} links and joints", 'Write adjacency="joined"')
-    field_pairs, solid_pairs = (published_pairs(draft.elements, draft.hosts, draft.shapes, role) for role in ("field", "solid"))
+    rule: Rule = "published_2014" if given == "published_2014" else "recorded_2014"
+    field_pairs, solid_pairs = (published_pairs(draft.elements, draft.hosts, draft.shapes, role, rule) for role in ("field", "solid"))
     tested = link_pairs(draft.shapes, field_pairs, solid_pairs)
-    reasons = published_untested(draft.elements, draft.hosts, draft.shapes)
+    reasons = published_untested(draft.elements, draft.hosts, draft.shapes, rule)
     return field_pairs, solid_pairs, {pair: reason for pair, reason in reasons.items() if pair not in tested}
 
 

@@ -18,4 +18,4 @@ def read_mass(node: Node, draft: Draft, place: Place) -> None:
     if mass > HEAVIEST:
         node.fail("value", f"{mass:g} is too large", "Masses are in kilograms")
     inertia = from_six(node.numbers("inertia", 6)) if "inertia" in node.attributes else None
-    draft.bodies.append(Body(place.link, mass, place.point + node.vector(PLACE), inertia))
+    draft.bodies.append(Body(place.link, mass, place.start + node.vector(PLACE), inertia))

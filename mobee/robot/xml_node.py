@@ -9,15 +9,16 @@ import xml.sax.xmlreader
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Array
-from mobee.robot.xml_file import LARGEST, LineHandler, parse_xml
+from mobee.robot.xml_file import LARGEST, LineHandler, parse_content, read_content
+from mobee.robot.xml_repair import MOST_REPAIRS, Repair, mend
 
-DEEPEST = 200  # elements; a reader that recurses must not be led into its own limit
+DEEPEST = 2000  # elements inside each other: 500 joints, each in a motor and a link
 MOST_ELEMENTS = 50_000
 FARTHEST = 1e18  # beyond it the readers' arithmetic would overflow; some files write 1e16 for "no limit"
 SMALLEST = 1e-9
@@ -34,6 +35,7 @@ class Node:
     tag: str
     attributes: dict[str, str]
     children: list[Node] = field(default_factory=list)
+    repairs: list[Repair] = field(default_factory=list)  # of the root: what was wrong with the form of the file
 
     def __iter__(self) -> Iterator[Node]:
         return iter(self.children)
@@ -126,9 +128,19 @@ class Node:
             if name not in known:
                 self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
-    def warn(self, problem: str) -> None:
+    def warn(self, problem: str, category: type[Warning] = UserWarning) -> None:
         """Warn with file, line and tag."""
-        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", stacklevel=2)
+        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", category, stacklevel=2)
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """How something in a file was understood: a warning where it was not read as it stands there."""
+
+    node: Node
+    what: str
+    remedy: str = ""
+    severity: Literal["warning", "note"] = "warning"
 
 
 def nearest(given: str, valid: Collection[str]) -> str:
@@ -150,16 +162,37 @@ def shown(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def read_xml(path: Path) -> Node:
+def descendants(root: Node) -> Iterator[Node]:
+    """A node and all that it holds, in the order of the file."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting += reversed(node.children)
+
+
+def read_xml(path: Path, *, repair: bool = False) -> Node:
     """The root node of an XML file.
 
+    `repair`: attributes given twice and bytes that are not UTF-8 do not end the reading; the root lists them in `repairs`.
     Entities and external references are refused (they can exhaust memory or read other files).
     Raises RobotFileError when the file is missing, not XML, hostile, or larger than any robot needs.
     """
-    builder = _Builder(path)
-    parse_xml(path, builder)
+    content, repairs = read_content(path), list[Repair]()
+    while True:
+        builder = _Builder(path)
+        try:
+            parse_content(path, content, builder)
+            break
+        except RobotFileError as error:
+            mended = mend(content, error) if repair and len(repairs) < MOST_REPAIRS else None
+            if mended is None:
+                raise
+            content = mended.content
+            repairs.append(mended.repair)
     if builder.root is None:
         raise RobotFileError(f"{path}:1: holds no element. Write a root element.")
+    builder.root.repairs = repairs
     return builder.root
 
 

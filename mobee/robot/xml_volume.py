@@ -11,8 +11,12 @@ from mobee.robot.xml_node import Node
 
 PLACE = ("px", "py", "pz")
 AXIS = ("hx", "hy", "hz")
+STEP = ("x", "y", "z")
+X = np.array([1.0, 0.0, 0.0])
 Y = np.array([0.0, 1.0, 0.0])
 Z = np.array([0.0, 0.0, 1.0])
+UPRIGHT = 1e-6  # a unit vector with a smaller part across y counts as parallel to y, as in the program of 2014
+HALFWAY = -0.5  # cosine; beyond it a box is written with its axis the other way round, for near -y the rotation is ill-defined
 VOLUME_TAGS: dict[str, frozenset[str]] = {
     "sphere": frozenset({"radius", *PLACE}),
     "capsule": frozenset({"radius", "height", *PLACE, *AXIS}),
@@ -47,9 +51,45 @@ def read_volume(node: Node) -> Volume:
 
 
 def box_rotation(node: Node) -> Array:
-    """The orientation (3, 3) that turns y the shortest way to (hx, hy, hz), then by `angle` [deg] about it."""
-    axis = direction(node, AXIS, (0.0, 1.0, 0.0))
-    return turn_about(axis, np.deg2rad(node.number("angle", 0.0))) @ align(Y, axis)
+    """The orientation (3, 3) of a box: its height along (hx, hy, hz), y when left out, then turned by `angle` [deg] about it."""
+    return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
+
+
+def height_along(axis: Array, angle: float) -> Array:
+    """The orientation (3, 3) of a box whose height lies along a unit vector, as the program of 2014 turned it.
+
+    The box turns about y by the angle between x and the axis seen along y (0 to 180 deg), then about the common normal of y and the
+    axis until its height lies along the axis, then by `angle` [rad] about the axis. Along -y it turns half a turn about x.
+    """
+    sideways = float(np.hypot(axis[0], axis[2]))
+    if sideways <= UPRIGHT:
+        return turn_about(axis, angle) @ align(Y, axis)
+    first = turn_about(Y, float(np.arctan2(abs(axis[2]), axis[0])))
+    tilt = turn_about(np.cross(Y, axis) / sideways, float(np.arctan2(sideways, axis[1])))
+    return turn_about(axis, angle) @ tilt @ first
+
+
+def height_and_angle(rotation: Array) -> tuple[Array, float]:
+    """The unit vector (3,) and the angle [rad] from which `height_along` makes a box with the orientation `rotation` (3, 3)."""
+    if rotation[1, 1] < HALFWAY:
+        rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
+    axis: Array = rotation[:, 1]
+    return axis, angle_about(axis, rotation)
+
+
+def angle_about(axis: Array, rotation: Array) -> float:
+    """The angle [rad] about a unit vector (3,) for which `height_along` comes nearest to `rotation` (3, 3)."""
+    rest = height_along(axis, 0.0).T @ rotation
+    return float(np.arctan2(rest[0, 2] - rest[2, 0], rest[0, 0] + rest[2, 2]))
+
+
+def link_step(node: Node) -> tuple[Array, float]:
+    """The step (3,) m of a <link> and its length: (x, y, z), or with `length` along it."""
+    step = node.vector(STEP)
+    if "length" in node.attributes:
+        length = node.positive("length")
+        return direction(node, STEP) * length, length
+    return step, float(np.linalg.norm(step))
 
 
 def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:

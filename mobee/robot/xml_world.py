@@ -6,20 +6,23 @@ from pathlib import Path
 
 from mobee.collision.geometry import Geometry
 from mobee.collision.world import Role, World
+from mobee.errors import InvalidValue
 from mobee.robot.xml_node import Node, nearest, read_xml
+from mobee.robot.xml_versions import WORLD_TAGS, report, upgrade_world
 from mobee.robot.xml_volume import VOLUME_TAGS, read_volume
 
 ROLES: dict[str, Role] = {"obstacle": "obstacle", "target": "target", "ghost": "ghost"}
 
 
 def read_world(path: Path) -> World:
-    """The world described by an XML file; positions in [m] in the root frame, angles in [deg].
+    """The world described by an XML file of any version; positions in [m] in the root frame, angles in [deg].
 
-    Raises RobotFileError with file, line, field and remedy; warns of tags and attributes that it ignores.
+    Raises RobotFileError with file, line, field and remedy; warns of what it ignores or repairs.
     """
-    root = read_xml(path)
-    if root.tag != "world":
-        root.fail("root element", "this is not a world", "The root of a world file is <World>")
+    root = read_xml(path, repair=True)
+    if root.tag not in WORLD_TAGS:
+        root.fail("root element", "this is not a world", "The root of a world file is <World>, or <WorldList> in files of 2011 to 2014")
+    report(upgrade_world(root))
     root.check_attributes({"name", "version"})
     world = World()
     for node in root:
@@ -43,14 +46,12 @@ def _add(world: World, node: Node) -> None:
     volume, name = read_volume(node), node.text("name")
     if name in world.objects:
         node.fail("name", f"a second object {name!r}", "Rename one of the two")
-    world.add(
-        name,
-        Geometry(volume.kind, volume.size),
-        position=volume.centre,
-        rotation=volume.rotation,
-        role=ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")],
-        color=_color(node),
-    )
+    role = ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")]
+    geometry, color = Geometry(volume.kind, volume.size), _color(node)
+    try:
+        world.add(name, geometry, position=volume.centre, rotation=volume.rotation, role=role, color=color)
+    except InvalidValue as error:
+        node.fail("size or place", str(error).rstrip("."), "Lengths are in metres")
 
 
 def _color(node: Node) -> list[float] | None:

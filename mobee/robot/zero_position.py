@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,53 +19,53 @@ from mobee.robot.xml_include import INCLUDE_ATTRIBUTES, Trail, read_include
 from mobee.robot.xml_mass import MASS_ATTRIBUTES, read_mass
 from mobee.robot.xml_motors import read_motor
 from mobee.robot.xml_node import Node, nearest, read_xml
-from mobee.robot.xml_volume import PLACE, VOLUME_TAGS, direction
+from mobee.robot.xml_versions import report, upgrade_robot
+from mobee.robot.xml_volume import PLACE, STEP, VOLUME_TAGS, direction, link_step
 
 MOST = {"joint": MOST_JOINTS, "ignore": 20_000}  # of one tag, in a file; 1000 of the others. `write_xml` names every ignored pair
 ROOT = "zeropositionkinematictree"
-AXES = ("x", "y", "z")
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
 KNOWN = {
     ROOT: frozenset({"version", "robotName", "adjacency"}),
     "bodypart": frozenset({"name"}),
-    "link": frozenset({"name", *AXES, "length", "radius", "field", "base"}),
+    "link": frozenset({"name", *STEP, "length", "radius", "field", "noSelfCollision", "base"}),
     "joint": frozenset(
-        {"name", "moves", "motor", "type", *AXES, "minPos", "maxPos", "length", "radius", "field", "noSelfCollision", "base"}
+        {"name", "moves", "motor", "type", *STEP, "minPos", "maxPos", "length", "radius", "field", "noSelfCollision", "base"}
     ),
     "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque"}),
-    "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation"}),
+    "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation", "turns"}),
     "mass": MASS_ATTRIBUTES,
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
     "robot": INCLUDE_ATTRIBUTES,
     "ignore": IGNORE_ATTRIBUTES,
-} | {tag: known | {"name", "field", "base"} for tag, known in BODY_TAGS.items()}
-
-BRANCHES = {"bodypart", "motor", "link", "joint", "constraintlist"}
+} | {tag: known | {"name", "field", "base", "turns"} for tag, known in BODY_TAGS.items()}
 
 
 def read_robot(path: Path) -> Robot:
-    """The robot described by a zero-position XML file.
+    """The robot described by a zero-position XML file of any version (xml_versions.py).
 
     Lengths in the file are in [m], angles in [deg]; everything in the Robot is in SI units, root frame, zero pose.
-    Raises RobotFileError with file, line, field and remedy; warns of tags and attributes that it ignores.
+    Raises RobotFileError with file, line, field and remedy; warns of what it ignores or repairs.
     """
     return _read(path, Trail())
 
 
 def _read(path: Path, trail: Trail) -> Robot:
-    root = read_xml(path)
+    root = read_xml(path, repair=True)
     if root.tag != ROOT:
         root.fail("root element", "this is not a robot", "The root of a robot file is <ZeroPositionKinematicTree robotName=...>")
-    root.check_attributes(KNOWN[ROOT])
     _check_counts(root)
+    report(upgrade_robot(root))
+    root.check_attributes(KNOWN[ROOT])
     draft, inside = Draft(), trail.into(path)
     for node in root:
         if node.tag == "robot":
             node.check_attributes(KNOWN[node.tag])
             _check_children(node)
             draft.others.append((node, read_include(node, inside, _read)))
-    _read_children(root, draft, Place(np.zeros(3)))
+    root.children = [node for node in root if node.tag != "robot"]
+    _read_tree(root, draft, Place(np.zeros(3), np.zeros(3)))
     return finish_robot(root, draft, root.optional("robotName") or path.stem)
 
 
@@ -81,16 +82,19 @@ def _check_counts(root: Node) -> None:
         waiting += reversed(node.children)
 
 
-def _read_children(parent: Node, draft: Draft, place: Place) -> None:
-    for node in parent:
+def _read_tree(root: Node, draft: Draft, place: Place) -> None:
+    """Everything below the root, in the order of the file."""
+    waiting = [(child, place) for child in reversed(root.children)]
+    while waiting:
+        node, place = waiting.pop()
         if node.tag not in KNOWN:
             _warn_unknown(node)
             continue
-        if node.tag == "robot" and parent.tag == ROOT:
-            continue  # read before everything else
         node.check_attributes(KNOWN[node.tag])
-        READERS.get(node.tag, _misplaced)(node, draft, place)
-        if node.tag not in BRANCHES:
+        inside = READERS.get(node.tag, _misplaced)(node, draft, place)
+        if inside is not None:
+            waiting += [(child, inside) for child in reversed(node.children)]
+        elif node.tag != "constraintlist":  # its reader has looked at its rows
             _check_children(node)
 
 
@@ -116,35 +120,38 @@ def _misplaced(node: Node, draft: Draft, place: Place) -> None:
     node.fail("position in the file", "this tag cannot stand here", remedy)
 
 
-def _read_part(node: Node, draft: Draft, place: Place) -> None:
+def _read_part(node: Node, draft: Draft, place: Place) -> Place:
     name = node.text("name")
     draft.parts.setdefault(name, []).append(node)
     draft.note("part", name, node)
-    _read_children(node, draft, replace(place, part=name))
+    return replace(place, part=name)
 
 
-def _read_motor(node: Node, draft: Draft, place: Place) -> None:
+def _read_motor(node: Node, draft: Draft, place: Place) -> Place:
     if not place.part:
         node.fail("position in the file", "a motor outside of every part", "Move it into a <bodypart>")
+    if node.optional("name") in draft.motors:
+        name = node.text("name")
+        remedy = f'rename one, or write <joint motor="{name}"> without a second <motor> where that one is meant'
+        node.fail("name", f"a second motor {name!r}", f"The first is in line {draft.motors[name].node.line}: {remedy}")
     motor = read_motor(node, place.part, len(draft.motors))
-    if motor.name in draft.motors:
-        node.fail("name", f"a second motor {motor.name!r}", f"The first is in line {draft.motors[motor.name].node.line}: rename one")
     draft.motors[motor.name] = motor
     draft.note("motor", motor.name, node)
-    _read_children(node, draft, replace(place, motor=motor.name))
+    return replace(place, motor=motor.name)
 
 
-def _read_link(node: Node, draft: Draft, place: Place) -> None:
-    here = enter(node, draft, replace(place, base=place.base and node.flag("base", default=True)))
-    step = node.vector(AXES)
-    length = float(np.linalg.norm(step))
-    if "length" in node.attributes:
-        step = direction(node, AXES) * node.positive("length")
-        length = node.positive("length")
+def _read_link(node: Node, draft: Draft, place: Place) -> Place:
+    here = enter(
+        node,
+        draft,
+        replace(place, start=place.point, carrier=place.link, base=node.flag("base", default=place.base)),
+        f"the link in line {node.line}",
+    )
+    step, length = link_step(node)
     if place.link == 0 and "name" in node.attributes:
         _name_base(node, draft)
     read_skeleton(node, draft, here, place.point + step / 2, step, length)
-    _read_children(node, draft, replace(here, point=place.point + step))
+    return replace(here, point=place.point + step)
 
 
 def _name_base(node: Node, draft: Draft) -> None:
@@ -155,9 +162,9 @@ def _name_base(node: Node, draft: Draft) -> None:
     draft.note("link", name, node)
 
 
-def _read_joint(node: Node, draft: Draft, place: Place) -> None:
+def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
     index = len(draft.joints)
-    axis = direction(node, AXES)
+    axis = direction(node, STEP)
     motor = node.optional("motor") or place.motor or node.missing("motor")
     name = node.optional("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
     kind = node.choice("type", node.attributes.get("type", "revolute"), ("revolute", "prismatic"), "type of joint")
@@ -169,12 +176,16 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> None:
     draft.links.append(link)
     draft.note("joint", name, node)
     draft.note("link", link, node)
-    subtree = index + 1 if node.flag("noSelfCollision") and place.subtree < 0 else place.subtree
-    draft.subtree.append(subtree)
-    here = enter(node, draft, replace(place, link=index + 1, motor=motor, subtree=subtree, base=node.flag("base")))
-    length = node.positive("length", float(np.linalg.norm(node.vector(AXES))))
+    here = enter(
+        node,
+        draft,
+        replace(place, start=place.point, link=index + 1, carrier=place.link, motor=motor, base=node.flag("base")),
+        f"joint {name}",
+    )
+    draft.subtree.append(here.subtree)
+    length = node.positive("length", float(np.linalg.norm(node.vector(STEP))))
     read_skeleton(node, draft, here, place.point, axis, length)
-    _read_children(node, draft, here)
+    return here
 
 
 def _read_constraints(node: Node, draft: Draft, place: Place) -> None:
@@ -189,7 +200,8 @@ def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
     draft.ignores.append(node)
 
 
-READERS = {
+# What reads a tag, and the place for what stands inside; None where nothing does, or where it has been read already.
+READERS: dict[str, Callable[[Node, Draft, Place], Place | None]] = {
     "bodypart": _read_part,
     "motor": _read_motor,
     "link": _read_link,
@@ -198,4 +210,5 @@ READERS = {
     "mass": read_mass,
     "constraintlist": _read_constraints,
     "ignore": _read_ignore,
-} | dict.fromkeys(BODY_TAGS, read_shape)
+    **dict.fromkeys(BODY_TAGS, read_shape),
+}

@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from experiments.progress import Progress
+from mobee import Model
 from mobee.roadmap.ik.ngik import METHODS
 from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
+from mobee_cli.robot_options import add_robot, add_world, given_options, robot_given, world_given
 
 NOTES = """The map is on disk every 10 s: after Ctrl-C, or a crash, the same command goes
 on with it. A file of other settings, or of another robot or world, is refused.
-A task of your own is a Python file with a function example(): docs/roadmaps.md."""
+A task of your own is a Python file with a function example(), or example(model),
+which is given the robot of --robot in the world of --world: docs/roadmaps.md.
+The tasks that come with mobee need the icub."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "task", metavar="TASK|FILE.py", help="a task that comes with mobee, or a file of your own; `mobee roadmap tasks` lists them"
     )
+    add_robot(parser, "of a task file; default: the icub")
+    add_world(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="MAP.npz", help="where to (default: TASK.npz, here)")
     parser.add_argument("--method", choices=METHODS, default="hybrid", help="how poses are found (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is drawn (default: 0)")
@@ -35,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from mobee_cli.roadmap.task_file import task_named
     from mobee_cli.roadmap.text import as_json, summary
 
-    example = task_named(arguments.task)
+    example = task_named(arguments.task, given_options(arguments), lambda: Model(robot_given(arguments), world_given(arguments)))
     path: Path = arguments.output or Path(f"{Path(arguments.task).stem}.npz")
     if not path.resolve().parent.is_dir():
         raise UserError(f"--output {path}: there is no folder {path.resolve().parent}: make it", BAD_INPUT)

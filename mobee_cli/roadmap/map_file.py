@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from mobee import Model
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
-from mobee.robot.load import load_robot
 from mobee.robot.robot import Array
 from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.robot_options import add_robot, require_none, robot_given, world_given
+from services.common.worlds import NO_WORLD
 
 PLACES = """A place is the task's coordinates, in the order of `mobee roadmap show`.
 The way begins at home, or at --from: a place of the map, or all motors in rad."""
@@ -19,7 +22,9 @@ The way begins at home, or at --from: a place of the map, or all motors in rad."
 def add_map(parser: argparse.ArgumentParser) -> None:
     """The map, and its robot."""
     parser.add_argument("map", type=Path, metavar="MAP", help="a map's file, as `mobee roadmap build` writes it")
-    parser.add_argument("--robot", metavar="FILE", help="the robot it was made for, where it is none that comes with mobee")
+    add_robot(parser, "default: the one it was made for, if that comes with mobee")
+    text = f"look at it in this world: a shipped one, a .xml file, or {NO_WORLD} (default: the world it was made in)"
+    parser.add_argument("--world", metavar="FILE", help=text)
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
@@ -29,8 +34,18 @@ def add_places(parser: argparse.ArgumentParser) -> None:
 
 
 def map_given(arguments: argparse.Namespace) -> Roadmap:
-    """The map that is named, in the world it was made in."""
-    return load_roadmap(arguments.map, robot=load_robot(arguments.robot) if arguments.robot else None)
+    """The map that is named, in the world it was made in or in the one that is given.
+
+    Raises MobeeError; UserError for options of a robot where none is named.
+    """
+    if arguments.robot is None:
+        require_none(arguments, "it is for the robot of --robot FILE", names=())
+    trm = load_roadmap(arguments.map, robot=robot_given(arguments) if arguments.robot else None)
+    if arguments.world is None:
+        return trm
+    model = Model(trm.model.robot, world_given(arguments))
+    model.reaching = trm.model.reaching
+    return replace(trm, model=model)
 
 
 def start_of(trm: Roadmap, given: list[float] | None) -> Array:

@@ -52,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Find the way, play it, tell how it went."""
     if not 0.0 < arguments.speed <= 1.0:
         raise UserError(f"--speed {arguments.speed:g}: must be above 0 and at most 1", BAD_INPUT)
+    if arguments.live and arguments.world is not None:
+        raise UserError(f"--world {arguments.world}: it is for offline; live, the world is that of the running model", BAD_INPUT)
     trm = map_given(arguments)
     if arguments.live:
         from mobee_cli.roadmap.live import play_live

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from mobee.learning.value_iteration import load_planning
 from services.agents.config import Config
 from services.agents.node import AgentNode
 from services.agents.reach_node import ReachNode
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 
 
@@ -18,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run an agent until it is told to end, or has made its transitions."""
     config = load_config(Config, argv, "services.agents")
     with explained("services.agents"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         robot.part(config.part)
         load_planning()  # before the bus hears of it: planning is compiled, and who loads it in the first plan seems frozen
         with Service(f"agent_{config.part}", config, robot) as service:

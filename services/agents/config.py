@@ -6,9 +6,15 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.errors import InvalidValue
+from mobee.learning.lattice import Lattice
+from mobee.learning.space import MAX_STATES
 from mobee.reach import RADIUS
+from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
+from services.common.hands import hand_of, moved_markers
 
+ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
 Explorer = Literal["curious", "random", "least_tried", "nearest_untried", "count_bonus", "posterior_sampling", "depleting"]
 
 
@@ -18,7 +24,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     part: str = "left_arm"
     """The part it moves."""
     joints: tuple[str, ...] = ()
-    """Motors that span its state space; empty: the torso's three, or an arm's shoulder and elbow."""
+    """Motors that span its state space; empty: all of its part, or shoulder and elbow of a part that has a motor called elbow."""
     levels: tuple[float, ...] = (0.25, 0.5, 0.75)
     """Fractions of each joint's range at which the samples lie."""
     neighbours: Annotated[int, Meta(ge=0)] = 0
@@ -54,7 +60,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
     """Of what is presented there, m."""
     marker: str = ""
-    """What is to come there; empty: its palm."""
+    """What is to come there; empty: the palm of its part, or the marker at an end of the part that most motors move."""
     predictor: str = "weighted"
     """Of the rewards of reaching."""
     strategy: str = "intrinsic"
@@ -65,3 +71,31 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Folder of a run whose transitions it plans its ways to reaches with; empty: it believes that most actions work."""
     tries: Annotated[int, Meta(ge=0)] = 0
     """End after so many problem-tries in all; 0: go on for ever."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: the part must span a state space, and have a marker to reach with if there are targets."""
+        super().check_robot(robot)
+        if not self.learned:  # else the space is that of the record
+            self.space(robot)
+        if not self.targets:
+            return
+        marker = self.marker or hand_of(robot, self.part)
+        if marker not in moved_markers(robot, self.part):
+            valid = ", ".join(moved_markers(robot, self.part))
+            raise InvalidValue(f"{self.part} does not move the marker {marker!r} that is to reach. Valid: {valid or 'none'}.")
+
+    def space(self, robot: Robot) -> Lattice:
+        """The lattice of thesis 7.4 for the part, unless the settings say otherwise; raises MobeeError where it cannot be made."""
+        part = robot.part(self.part)
+        is_arm = any(name.endswith("elbow") for name in part.motors)
+        joints = self.joints or tuple(name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS))
+        if len(self.levels) ** len(joints) > MAX_STATES:
+            raise InvalidValue(
+                f"{len(self.levels)} levels of {len(joints)} motors make {len(self.levels) ** len(joints):.3g} states, and an agent can "
+                f"have {MAX_STATES}: choose some motors of {self.part!r}, for example joints = {_listed(joints[:4])}."
+            )
+        return Lattice(robot, joints, self.levels, self.neighbours or (16 if is_arm else 8), tie_seed=self.tie_seed)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return f"[{', '.join(f'{name!r}' for name in names)}]".replace("'", '"')

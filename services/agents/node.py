@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
-from mobee import CuriousAgent, Lattice
+from mobee import CuriousAgent
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
@@ -18,17 +17,6 @@ from services.common.bus_plant import BusPlant
 from services.common.delivery import EVENTS
 from services.common.service import Service
 
-ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
-
-
-def published_space(robot: Robot, config: Config) -> Lattice:
-    """The lattice of thesis 7.4 for the part, unless the settings say otherwise."""
-    part = robot.part(config.part)
-    is_arm = any(name.endswith("elbow") for name in part.motors)
-    joints = config.joints or [name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS)]
-    neighbours: int | Literal["equidistant"] = config.neighbours or (16 if is_arm else 8)
-    return Lattice(robot, joints, config.levels, neighbours, tie_seed=config.tie_seed)
-
 
 class AgentNode:
     """A curious agent on the live plant; every transition is on disk before the next action."""
@@ -38,7 +26,7 @@ class AgentNode:
         self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
         plant = BusPlant(service, robot, (config.part,))
         self._agent = CuriousAgent(
-            published_space(robot, config),
+            config.space(robot),
             plant,
             explorer=config.explorer,
             seed=config.seed,

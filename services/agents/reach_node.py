@@ -13,10 +13,10 @@ from mobee.learning.reaching.store import ReachStore
 from mobee.robot.robot import Robot
 from mobee.store import STORE
 from services.agents.config import Config
-from services.agents.node import published_space
 from services.agents.reach_stream import ReachStream
 from services.agents.work import Work
 from services.common.bus_plant import BusPlant
+from services.common.hands import hand_of
 from services.common.service import Service
 
 
@@ -28,12 +28,11 @@ class ReachNode:
         self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
         plant = BusPlant(service, robot, (config.part,))
         known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
-        side = "left" if config.part.startswith("left") else "right"
         self._agent = ReachAgent(
-            published_space(robot, config) if known is None else known.space,
+            config.space(robot) if known is None else known.space,
             plant,
             None if known is None else known.model.debiased(),
-            marker=config.marker or f"{side}_palm",
+            marker=config.marker or hand_of(robot, config.part),
             predictor=config.predictor,
             strategy=config.strategy,
             failures=config.failures,

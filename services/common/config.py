@@ -14,9 +14,12 @@ import msgspec
 import tyro
 from msgspec import Meta, Struct
 
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
 from services.common.session import DEFAULT_ENDPOINT, NAMESPACE
 
 _C = TypeVar("_C", bound=Struct)
+_KEY = re.compile("[a-z0-9_]+")
 
 
 class ConfigError(Exception):
@@ -38,6 +41,18 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """The clock on the wall sets the pace, or lockstep: every tick waits for all who take part, as fast as they are."""
     patience: Annotated[float, Meta(ge=2, le=60)] = 2.0
     """Lockstep: s of the clock on the wall after which who has not answered counts as lost; more where others use the machine too."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """Raise MobeeError for a robot that the service cannot serve with these settings: what, why, and what to do instead.
+
+        The launcher asks before it starts anything, and the service itself before it is ready. Services add their own conditions.
+        """
+        for part in robot.parts:
+            if not _KEY.fullmatch(part):
+                raise InvalidValue(
+                    f"part {part!r} of {robot.name!r} cannot be used live, because its name stands in keys on the bus, which have a-z, 0-9 "
+                    "and _ only: rename the part (bodypart of an XML file, group of an SRDF)."
+                )
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:

@@ -1,4 +1,4 @@
-"""How a service ends when it was given something that it cannot use: in one line."""
+"""How a service begins with its robot, and ends in one line when it was given something that it cannot use."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from mobee.errors import InvalidValue, MobeeError, RobotFileError, UnknownName
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from services.common.config import ServiceConfig
 from services.common.session import BusUnreachable
+
+
+def robot_of(config: ServiceConfig) -> Robot:
+    """The robot of a service; raises MobeeError for one that cannot be read, or that the service cannot serve."""
+    robot = load_robot(config.robot)
+    config.check_robot(robot)
+    return robot
 
 
 @contextmanager

@@ -8,7 +8,31 @@ from mobee.errors import InvalidValue
 from mobee.kinematics import link_transforms
 from mobee.robot.robot import Array, Robot
 
+EYES = ("left_eye", "right_eye")
+SEEN_WITH = ("head", "torso")  # parts whose posture is sent with each picture
+UPRIGHT = 1e-3  # sine of the smallest angle between a direction of view and the vertical
 UP = np.array([0.0, 0.0, 1.0])  # at zero pose the pictures stand upright
+
+
+def require_eyes(robot: Robot) -> None:
+    """Raise InvalidValue for a robot through whose eyes nothing can be seen: what is missing, and what to do."""
+    instead = "Leave renderer and vision out of the scenario, or add what is missing to the robot's file."
+    if missing := [name for name in EYES if name not in robot.markers]:
+        raise InvalidValue(
+            f"{robot.name!r} cannot see: pictures are taken from the markers {' and '.join(EYES)}, and it has no "
+            f"{' and no '.join(missing)}. {instead}"
+        )
+    if missing := [name for name in SEEN_WITH if name not in robot.parts]:
+        raise InvalidValue(
+            f"{robot.name!r} cannot see: each picture is sent with the posture of its parts {' and '.join(SEEN_WITH)}, and it has no "
+            f"part {' and no part '.join(missing)}. {instead}"
+        )
+    for name in EYES:
+        if np.linalg.norm(np.cross(robot.marker(name).normal, UP)) < UPRIGHT:
+            raise InvalidValue(
+                f"{robot.name!r} cannot see: the normal of its marker {name} is the direction of view, and it is vertical at zero pose, "
+                f"so no side of the picture is up. Give the marker a normal that looks ahead (nx, ny, nz)."
+            )
 
 
 def eye_frame(robot: Robot, transforms: Array, eye: str) -> tuple[Array, Array]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.controller.config import Config
 from services.controller.node import ControllerNode
@@ -16,7 +15,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the controller until it is told to end."""
     config = load_config(Config, argv, "services.controller")
     with explained("services.controller"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with Service("controller", config, robot, prompt=True) as service:
             ControllerNode(service, config, robot)
             service.ready()

@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 
 
@@ -22,3 +24,14 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Milliseconds after which robot_sim holds a part that it hears nothing for."""
     posture: dict[str, list[float]] = {}
     """Where a part that nobody owns shall be, rad, by part; a part that is not named stays where it is."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: the robot must be able to take the posture."""
+        super().check_robot(robot)
+        for part, posture in self.posture.items():
+            limits = robot.limits[robot.part(part).slice]
+            if len(posture) != len(limits):
+                raise InvalidValue(f"posture of {part}: {len(posture)} numbers, it has {len(limits)} motors")
+            for motor, q, (lower, upper) in zip(robot.part(part).motors, posture, limits, strict=True):
+                if not lower <= q <= upper:
+                    raise InvalidValue(f"posture of {part}: {motor} at {q:g} rad, its range is {lower:.4f} to {upper:.4f}")

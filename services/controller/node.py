@@ -16,7 +16,6 @@ from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
 from mobee.control import Forces
 from mobee.control.checked import LARGEST_FORCE
-from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
 from services.common.fingerprint import robot_hash
@@ -59,7 +58,6 @@ class ControllerNode:
         self._commanding = Commanding(service, config.ttl, self._actions, self._drives)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
-        self._check_posture()
         warm(self._law, robot)
         self._reaches = ReachesUnderWay(service.bus, robot, self._law, self._actions, lambda: self._q)
         self._goals = GoalDesk(service, robot, self._law, self._actions, self._reaches, self._stay, self._amend)
@@ -70,16 +68,6 @@ class ControllerNode:
         service.on_tick(self._begin)
         if service.locked:
             service.on_alive(self._note_alive)
-
-    def _check_posture(self) -> None:
-        """Raise what the library says of a posture that the robot cannot take."""
-        for part, posture in self._config.posture.items():
-            limits = self._robot.limits[self._robot.part(part).slice]
-            if len(posture) != len(limits):
-                raise InvalidValue(f"posture of {part}: {len(posture)} numbers, it has {len(limits)} motors")
-            for motor, q, (lower, upper) in zip(self._robot.part(part).motors, posture, limits, strict=True):
-                if not lower <= q <= upper:
-                    raise InvalidValue(f"posture of {part}: {motor} at {q:g} rad, its range is {lower:.4f} to {upper:.4f}")
 
     def _begin(self, tick: Tick) -> None:
         if tick.mode == "paused":

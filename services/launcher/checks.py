@@ -6,12 +6,14 @@ import importlib.util
 import socket
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from mobee.errors import MobeeError, UnknownName
+from mobee.errors import MobeeError, OlderVersion, UnknownName
+from mobee.robot.robot import Robot
 from services.common.config import ConfigError, nearest
+from services.common.worlds import NO_WORLD
 from services.launcher.scenario import Part, Scenario
 
 
@@ -72,11 +74,13 @@ def check_gains(scenario: Scenario) -> None:
         raise ConfigError(f"{scenario.where('shared.gains')}: gains differ: {said}. They share one law: set it once, as shared.gains.")
 
 
-def check_rate(scenario: Scenario) -> None:
-    """Raise ConfigError when the controller would answer no tick, since its gains are unstable at the robot's rate."""
+def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
+    """Raise ConfigError when the controller would answer no tick, since its gains are unstable at the robot's rate.
+
+    `robots`: as check_robots returns them.
+    """
     from mobee.control.gains import Gains
     from mobee.control.stability import require_stable
-    from mobee.robot.load import load_robot
 
     configs = {part.entry.module: part.config for part in scenario.parts}
     controller = configs.get("services.controller")
@@ -84,7 +88,7 @@ def check_rate(scenario: Scenario) -> None:
     if controller is None or rate is None or gains is None:
         return
     try:
-        require_stable(load_robot(controller.robot), Gains.named(gains), 1.0 / rate)
+        require_stable(robots[controller.robot], Gains.named(gains), 1.0 / rate)
     except MobeeError as error:
         raise ConfigError(f"{scenario.where('services.robot_sim.rate')}: rate {rate:g} Hz: {error}") from None
 
@@ -104,14 +108,18 @@ def check_lockstep(scenario: Scenario) -> None:
             )
 
 
-def check_robots(scenario: Scenario) -> None:
-    """Raise ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored."""
+def check_robots(scenario: Scenario) -> dict[str, Robot]:
+    """The robots by the name or path that services give for them.
+
+    Raises ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored.
+    """
     from mobee.robot.load import load_robot, load_world
 
     read_robot, read_world = cache(load_robot), cache(load_world)
+    robots: dict[str, Robot] = {}
     for part in scenario.parts:
-        robot = _read(scenario, part, "robot", read_robot)
-        if getattr(part.config, "world", ""):
+        robot = robots[part.config.robot] = _read(scenario, part, "robot", read_robot)
+        if getattr(part.config, "world", "") not in ("", NO_WORLD):
             _read(scenario, part, "world", read_world)
         name = getattr(part.config, "part", None)
         if name is not None and name not in robot.parts:
@@ -121,12 +129,26 @@ def check_robots(scenario: Scenario) -> None:
             if joint not in robot.part(name).motors:
                 place = scenario.where(f"services.{part.who}.joints")
                 raise ConfigError(f"{place}: joints: {name} has no motor {joint!r}.{nearest(joint, robot.part(name).motors)}")
+    return robots
+
+
+def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
+    """Raise ConfigError in one line for the first service that cannot serve its robot; `robots`: as check_robots returns them.
+
+    Such a service would end as soon as it is started, and a service that is not vital would be started again and again.
+    """
+    for part in scenario.parts:
+        try:
+            part.config.check_robot(robots[part.config.robot])
+        except MobeeError as error:
+            raise ConfigError(f"{scenario.where(f'services.{part.who}')}: {part.who}: {error}") from None
 
 
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)  # a misspelt table would be no table
+            warnings.simplefilter("default", OlderVersion)  # nothing is lost of it
             return read(getattr(part.config, field))
     except UserWarning as warning:
         raise ConfigError(f"{warning}. The launcher ignores nothing: correct it or take it out.") from None

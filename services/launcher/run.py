@@ -29,6 +29,7 @@ from services.launcher.checks import (
     check_ports,
     check_rate,
     check_robots,
+    check_services,
 )
 from services.launcher.child import Program
 from services.launcher.engine import EngineMissing, compile_engine
@@ -68,8 +69,9 @@ def launch(options: Options) -> int:
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
         check_gains(scenario)
         check_lockstep(scenario)
-        check_robots(scenario)
-        check_rate(scenario)
+        robots = check_robots(scenario)
+        check_services(scenario, robots)
+        check_rate(scenario, robots)
         check_extras(scenario)
         check_ports(scenario)
         compile_engine()

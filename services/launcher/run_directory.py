@@ -11,6 +11,7 @@ from pathlib import Path
 from msgspec import structs, to_builtins
 
 from services.common.config import ServiceConfig
+from services.common.worlds import is_path
 from services.launcher.scenario import Scenario
 from services.launcher.toml import to_toml
 
@@ -43,7 +44,9 @@ def _new_folder(runs: Path, name: str) -> Path:
 
 
 def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
-    config = structs.replace(config, endpoint=endpoint)
+    """The settings as they are used: files by absolute paths, so that a command in another folder finds the run's robot."""
+    files = {field: str(Path(given).resolve()) for field in ("robot", "world") if is_path(given := getattr(config, field, ""))}
+    config = structs.replace(config, endpoint=endpoint, **files)
     if "run_dir" in config.__struct_fields__ and "run_dir" not in given:
         config = structs.replace(config, run_dir=str(directory))
     return config

@@ -13,6 +13,7 @@ from typing import Any
 from msgspec import Struct, structs, to_builtins
 
 from services.common.config import ConfigError, ServiceConfig, convert, line_of, nearest
+from services.common.worlds import WorldConfig, effective_world
 from services.launcher.catalogue import NAMES, Entry, entry_of
 
 SHIPPED = Path(__file__).parent / "scenarios"
@@ -160,7 +161,14 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
         raise ConfigError(f"{where(place)}: unknown service {who!r}.{nearest(who, NAMES)} Another program needs `module = ...`.")
     cls = _config_class(entry, where(place))
     given = {key: value for key, value in [*shared.items(), *entry.given.items()] if key in cls.__struct_fields__} | own
-    return Part(who, entry, convert(given, cls, where, f"{place}."), frozenset(given))
+    return Part(who, entry, _in_its_world(convert(given, cls, where, f"{place}.")), frozenset(given))
+
+
+def _in_its_world(config: ServiceConfig) -> ServiceConfig:
+    """The settings with the world that will be loaded, so that the record of a run shows it also where the scenario names none."""
+    if not isinstance(config, WorldConfig):
+        return config
+    return structs.replace(config, world=effective_world(config.world, config.robot))
 
 
 def _in_step(parts: list[Part]) -> list[Part]:

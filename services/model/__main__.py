@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from mobee.engine.load import load as load_engine
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.model.config import Config
 from services.model.node import ModelNode
@@ -18,7 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "services.model")
     with explained("services.model"):
         load_engine()  # before the bus hears of it: compiled anew, it takes half a minute
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with Service("model", config, robot, prompt=True) as service:
             ModelNode(service, config, robot)
             service.ready()

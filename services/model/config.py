@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from services.common.config import ServiceConfig
+from services.common.worlds import WorldConfig
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The model's settings."""
+class Config(WorldConfig, frozen=True, kw_only=True):
+    """The model's settings; objects of its world that have the role target are left to be perceived."""
 
-    world: str = "table"
-    """Shipped world, or path to a world file; objects of role target are left to be perceived."""
     gains: Literal["default", "published_2014"] = "published_2014"
     """Which set shapes the constraint forces; the controller must use the same."""
     propagate: Literal["tree", "part"] = "tree"

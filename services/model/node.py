@@ -11,7 +11,7 @@ from bus_schema import VERSION, keys
 from bus_schema.chain import Tick
 from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
 from bus_schema.rpc import JacobianAt, JacobianReply
-from mobee import Gains, Model, load_world
+from mobee import Gains, Model
 from mobee.collision.contact import Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
@@ -24,6 +24,7 @@ from services.common.delivery import LATEST
 from services.common.figures import Percentiles
 from services.common.lockstep import Participant
 from services.common.service import CallRefused, Service
+from services.common.worlds import TABLE
 from services.model.config import Config
 from services.model.world import WorldDesk
 
@@ -33,7 +34,7 @@ class ModelNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
-        self._model = Model(robot, load_world(config.world))
+        self._model = Model(robot, config.load_world())
         for name, item in list(self._model.world.objects.items()):
             if item.role == "target":
                 self._model.world.remove(name)
@@ -122,7 +123,7 @@ class ModelNode:
         if 0 <= self._last_k < k:
             self._skipped += k - self._last_k - 1
         self._last_k = k
-        self._table_ticks += any("table" in names for names in touching.values())
+        self._table_ticks += any(TABLE in names for names in touching.values())
         self._field_ticks += any(c.kind == "field" for c in pose.contacts)
         self._solid_ticks += any(c.kind == "solid" for c in pose.contacts)
 
@@ -141,7 +142,8 @@ class ModelNode:
             "evaluate_ms_p50": self._time.at(50),
             "evaluate_ms_p99": self._time.at(99),
         }
-        return f"{self._ticks} ticks, touching the table in {self._table_ticks}", numbers
+        table = f", touching the table in {self._table_ticks}" if TABLE in self._model.world.objects else ""
+        return f"{self._ticks} ticks{table}", numbers
 
     def _jacobian(self, request: JacobianAt) -> JacobianReply:
         q = self._q if request.q is None else np.array(request.q)

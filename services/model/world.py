@@ -14,6 +14,7 @@ from mobee import Model, World
 from mobee.collision import WorldObject as Thing
 from mobee.collision import geometry
 from mobee.collision.world import placed
+from mobee.collision.world_object import valid_position, valid_shape
 from mobee.errors import InvalidValue, MobeeError
 from mobee.kinematics.quaternion import from_matrix, to_matrix
 from mobee.reach import TARGET
@@ -114,7 +115,9 @@ class WorldDesk:
                 world.set_role(seen.name, seen.role)
             return
         shape = _shape(seen.geometry)
-        if known is not None:
+        valid_shape(seen.name, shape)
+        valid_position(seen.name, seen.position)
+        if known is not None:  # nothing is removed for what cannot be added
             world.remove(seen.name)
         world.add(seen.name, shape, position=seen.position, rotation=rotation, role=seen.role)
 

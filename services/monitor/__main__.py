@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
-from services.monitor.blueprint import blueprint
+from services.monitor.blueprint import blueprint, shown_of
 from services.monitor.config import Config
 from services.monitor.node import MonitorNode
 from services.monitor.output import open_output, recording_of
@@ -18,8 +17,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the monitor until it is told to end."""
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
-        robot = load_robot(config.robot)
-        with open_output(config, blueprint(config.page), recording_of(config)) as output, Service("monitor", config, robot) as service:
+        robot = robot_of(config)
+        with (
+            open_output(config, blueprint(shown_of(robot), config.page), recording_of(config)) as output,
+            Service("monitor", config, robot) as service,
+        ):
             MonitorNode(service, config, robot, output)
             service.ready()
             service.run()

@@ -2,24 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
 import rerun.blueprint as rrb
 
-from services.monitor.palette import PARTS
+from mobee.robot.robot import Array, Robot
+from services.common.worlds import AT_TABLE
+from services.monitor.extent import eye_of
+from services.monitor.palette import colors_of
 
 TIMELINE = "robot_time"
 ROOT = "root_link"  # frame of everything in the scene
 BACKGROUND = (24, 27, 33)
 WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
-
-
 TABS = ("robot", "learning")
 
 
-def blueprint(page: str = TABS[0]) -> rrb.Blueprint:
+@dataclass(frozen=True)
+class Shown:
+    """What is on the page.
+
+    `name`: of the robot.  `parts`: those with plots.  `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    eye: Array
+    target: Array
+
+
+def shown_of(robot: Robot) -> Shown:
+    """The page of a robot; the iCub is seen together with its table."""
+    parts = tuple(colors_of(robot.parts))
+    if robot.name in AT_TABLE:
+        return Shown("iCub", parts, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
+    return Shown(robot.name, parts, *eye_of(robot))
+
+
+def blueprint(shown: Shown, page: str = TABS[0]) -> rrb.Blueprint:
     """Two tabs, the one called `page` open: the robot and what moves it, and what the agents know; no side panels."""
     return rrb.Blueprint(
-        rrb.Tabs(_robot(), _learning(), active_tab=TABS.index(page)),
+        rrb.Tabs(_robot(shown), _learning(shown.parts), active_tab=TABS.index(page)),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TopPanel(state="hidden"),
@@ -29,23 +55,24 @@ def blueprint(page: str = TABS[0]) -> rrb.Blueprint:
     )
 
 
-def _robot() -> rrb.Horizontal:
+def _robot(shown: Shown) -> rrb.Horizontal:
     """The robot large, its pictures and the log below it, plots on the right."""
-    left = rrb.Vertical(_scene(), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
-    plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in PARTS]
+    left = rrb.Vertical(_scene(shown), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
+    plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in shown.parts]
     learning = rrb.Tabs(
         _plot("reward, nats", "plots/reward", rrb.ScalarAxis(range=SURPRISE)),
         _plot("value", "plots/value"),
         _plot("transitions", "plots/transitions"),
     )
     forces = _plot("forces, rad/s²", "plots/forces")
-    right = rrb.Vertical(*plots, rrb.Horizontal(forces, learning), row_shares=[1, 1, 1, 0.9])
+    right = rrb.Vertical(*plots, rrb.Horizontal(forces, learning), row_shares=[*[1] * len(plots), 0.9])
     return rrb.Horizontal(left, right, column_shares=[1.75, 1], name=TABS[0])
 
 
-def _learning() -> rrb.Horizontal:
+def _learning(parts: Sequence[str]) -> rrb.Horizontal:
     """A column an agent: its space with the actions that surprised it, and bars over all its state-actions."""
-    return rrb.Horizontal(*(_agent(part) for part in PARTS), column_shares=[1, 1.4, 1.4], name=TABS[1])
+    shares = [1.0 if part == "torso" else 1.4 for part in parts]
+    return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name=TABS[1])
 
 
 def _agent(part: str) -> rrb.Vertical:
@@ -62,15 +89,15 @@ def _agent(part: str) -> rrb.Vertical:
     return rrb.Vertical(space, *bars, row_shares=[3, 1, 1, 1])
 
 
-def _scene() -> rrb.Spatial3DView:
+def _scene(shown: Shown) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         contents=["/scene/**", "/robot/**"],
-        name="iCub",
+        name=shown.name,
         background=rrb.Background(color=BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         spatial_information=rrb.SpatialInformation(target_frame=ROOT),
-        eye_controls=rrb.EyeControls3D(position=(-0.98, -0.60, 0.42), look_target=(-0.14, 0.0, 0.06), eye_up=(0.0, 0.0, 1.0)),
+        eye_controls=rrb.EyeControls3D(position=shown.eye, look_target=shown.target, eye_up=(0.0, 0.0, 1.0)),
     )
 
 

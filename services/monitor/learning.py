@@ -38,6 +38,7 @@ class Learning:
 
     def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
+        self._colors = palette.colors_of(robot.parts)
         self._drawn: dict[str, Drawn | None] = {}
         self._made_from: dict[str, str] = {}
 
@@ -58,7 +59,7 @@ class Learning:
         )
         if tries is None or reward is None or value is None:
             return
-        path, color = f"learning/{part}", palette.PARTS[part]
+        path, color = f"learning/{part}", self._colors[part]
         for name, numbers in zip(QUANTITIES, (tries, reward, value), strict=True):
             self._stream.log(f"{path}/{name}", rr.BarChart(numbers[drawn.exists].astype(np.float32), color=color))
         surprising = np.zeros(shape, dtype=bool)
@@ -76,7 +77,7 @@ class Learning:
         drawn = self._drawn.get(part)
         if drawn is None or max(seen.s, seen.goal, seen.s_next) >= len(drawn.places):
             return
-        color = (*palette.PARTS[part], 255)
+        color = (*self._colors[part], 255)
         ends = np.array([seen.goal, seen.s_next])
         self._arrows(f"learning/{part}/space/newest", drawn, np.array([seen.s, seen.s]), ends, THICK, [(255, 255, 255, 120), color])
 

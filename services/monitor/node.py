@@ -21,7 +21,7 @@ from services.monitor.blueprint import TIMELINE
 from services.monitor.config import Config
 from services.monitor.learning import Learning
 from services.monitor.output import Output
-from services.monitor.palette import PARTS
+from services.monitor.palette import colors_of
 from services.monitor.plots import Plots
 from services.monitor.poses import Poses
 from services.monitor.scene import Scene
@@ -38,7 +38,7 @@ class MonitorNode:
         self._service, self._output, self._stream = service, output, output.stream
         bus = service.bus
         self._body = Body(bus, robot)
-        self._motions = {part: bus.latest(keys.motion(part), Motion, part) for part in PARTS}
+        self._motions = {part: bus.latest(keys.motion(part), Motion, part) for part in colors_of(robot.parts)}
         self._forces = bus.latest(keys.MODEL_FORCES, Forces)
         self._contacts = bus.latest(keys.MODEL_CONTACTS, Contacts)
         self._images = {eye: bus.latest(keys.image(eye), Image) for eye in keys.EYES}
@@ -109,7 +109,7 @@ class MonitorNode:
 
     def _learn(self, seen: Transition) -> None:
         part = seen.agent.removeprefix("agent_")
-        if part in PARTS:
+        if part in self._motions:
             self._plots.log_transition(part, seen)
             self._learning.log_step(part, seen)
             if self._body.update():
@@ -117,7 +117,7 @@ class MonitorNode:
             self._transitions += 1
 
     def _know(self, told: Learned) -> None:
-        if told.agent in PARTS:
+        if told.agent in self._motions:
             self._learning.log(told.agent, told)
 
     def _tell(self, event: Event) -> None:

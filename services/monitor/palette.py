@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 Color = tuple[int, int, int]
 Rgba = tuple[int, int, int, int]
@@ -25,6 +25,14 @@ SOLIDS: tuple[Color, ...] = (
     (130, 172, 142),
     (172, 150, 196),
 )  # by part
+SHOWN_PARTS = 3  # of a robot with other parts: so many columns of plots fit on the page
+
+
+def colors_of(parts: Collection[str]) -> dict[str, Color]:
+    """The parts that plots and learning are shown of, with their colours: torso and arms of the iCub, of another robot the first parts."""
+    if PARTS.keys() <= set(parts):
+        return PARTS
+    return dict(zip(list(parts)[:SHOWN_PARTS], PARTS.values(), strict=False))
 
 
 def faded(color: Color, share: float) -> Color:

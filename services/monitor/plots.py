@@ -18,16 +18,18 @@ class Plots:
 
     def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
         self._stream = stream
-        for part in palette.PARTS:
+        parts = palette.colors_of(robot.parts)
+        for part in parts:
             motors = robot.part(part).motors[:SHOWN]
-            names = [motor.rsplit("_", 1)[-1] for motor in motors]  # pitch, roll, yaw, elbow
+            short = [motor.rsplit("_", 1)[-1] for motor in motors]  # pitch, roll, yaw, elbow
+            names = short if not any(name.isdecimal() for name in short) else list(motors)
             colors = palette.JOINTS[: len(motors)]
             goals = [palette.faded(color, 0.6) for color in colors]
             widths = [1.6] * len(motors) + [0.8] * len(motors)
             self._style(f"joints/{part}", [*colors, *goals], widths, names + ["goal"] * len(motors))
         self._style("forces", list(palette.FORCES.values()), [1.4] * len(palette.FORCES), list(palette.FORCES))
         for quantity in LEARNED:
-            for part, color in palette.PARTS.items():
+            for part, color in parts.items():
                 self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
 
     def log_motion(self, part: str, motion: Motion) -> None:

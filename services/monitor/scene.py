@@ -1,4 +1,4 @@
-"""The scene: the robot's meshes, its fields, the objects around it, and where its hands have been."""
+"""The scene: the robot's meshes or solids, its fields, the objects around it, and where its hands have been."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Array, Robot, Shape
 from services.monitor import palette
 from services.monitor.blueprint import ROOT
+from services.monitor.solids import Solids
 from services.monitor.volumes import drawn
 
 TRAIL = 60  # points a hand
@@ -43,6 +44,7 @@ class Scene:
         names = {joint.name: index for index, joint in enumerate(robot.joints)}
         joints = self.tree.joints() if self.tree else []
         self.meshes = [(joint, names[joint.name]) for joint in joints if joint.name in names]  # with the index in the robot
+        self._solids = None if self.tree else Solids(stream, robot)
 
     def forget(self) -> None:
         """A new run: trails end."""
@@ -55,6 +57,8 @@ class Scene:
         angles = self._robot.coupling[0] @ q + self._robot.coupling[1]
         for joint, index in self.meshes:
             self._stream.log("robot/joints", joint.compute_transform(float(angles[index]), clamp=False))
+        if self._solids is not None:
+            self._solids.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
         if self._looks % TRAIL_STEP == 0:
             self._log_trails(transforms)
@@ -81,8 +85,9 @@ class Scene:
         capsules = [shape for shape in self._fields if shape.kind == "capsule"]
         spheres = [shape for shape in self._fields if shape.kind == "sphere"]
         lengths = [shape.size[1] for shape in capsules]
-        turns = np.array([transforms[shape.link, :3, :3] @ shape.rotation for shape in capsules])
-        starts = np.array([_now(transforms, shape) for shape in capsules]) - turns[:, :, 2] * np.array(lengths)[:, None] / 2.0
+        turns = np.array([transforms[shape.link, :3, :3] @ shape.rotation for shape in capsules]).reshape(-1, 3, 3)
+        centres = np.array([_now(transforms, shape) for shape in capsules]).reshape(-1, 3)
+        starts = centres - turns[:, :, 2] * np.array(lengths)[:, None] / 2.0
         self._stream.log(
             "scene/fields/capsules",
             rr.Capsules3D(
@@ -120,11 +125,14 @@ class Scene:
             self._stream.log("scene/trails", rr.LineStrips3D(strips, colors=colors, radii=0.003))
 
     def _load_tree(self) -> UrdfTree | None:
-        """Log the iCub's meshes once; None where they are not installed."""
+        """Log the iCub's meshes once; None for a robot that has not its joints, or where they are not installed."""
         try:
             with tempfile.TemporaryDirectory() as folder:
                 path = _plain(write_upper_body_urdf(Path(folder) / "icub.urdf"))
                 tree = UrdfTree.from_file_path(path, entity_path_prefix="robot")
+                moving = {joint.name for joint in tree.joints() if joint.joint_type == "revolute"}
+                if not moving <= {joint.name for joint in self._robot.joints}:
+                    return None
                 tree.log_urdf_to_recording(self._stream)
                 return tree
         except MobeeError:

@@ -6,22 +6,19 @@ import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from mobee.collision.world import World
-from mobee.kinematics import link_transforms
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.monitor.blueprint import BACKGROUND
 from services.monitor.config import Config
+from services.monitor.extent import eye_of
 from services.monitor.figure import TIMELINE, Figure
 from services.monitor.output import open_output
 from services.monitor.sweep import RATE, Stretch, sweep
 
-VIEWPOINT = np.array([-1.0, -0.9, 0.6])  # from where the robot is seen
 MOST_NAMES = 4  # a longer legend hides the plot
-DISTANCE = 1.4  # of the eye, in diameters of the scene
 
 
 def view(
@@ -55,8 +52,7 @@ def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretche
 
 def layout(robot: Robot) -> rrb.Blueprint:
     """The robot large, its motors, contacts and what happens on the right, time below."""
-    centre, diameter = _seen(robot)
-    eye = centre + DISTANCE * diameter * VIEWPOINT / np.linalg.norm(VIEWPOINT)
+    eye, centre = eye_of(robot)
     scene = rrb.Spatial3DView(
         origin="/",
         contents=["/robot/**", "/world/**", "/contacts"],
@@ -79,16 +75,6 @@ def layout(robot: Robot) -> rrb.Blueprint:
         auto_views=False,
         auto_layout=False,
     )
-
-
-def _seen(robot: Robot) -> tuple[Array, float]:
-    """Centre (3,) and diameter [m] of the robot at home."""
-    transforms = link_transforms(robot, np.clip(robot.home, *robot.limits.T))
-    links = [shape.link for shape in robot.shapes] + [joint.parent for joint in robot.joints]
-    places = [shape.position for shape in robot.shapes] + [joint.point for joint in robot.joints]
-    points = np.array([transforms[link, :3, :3] @ place + transforms[link, :3, 3] for link, place in zip(links, places, strict=True)])
-    low, high = points.min(axis=0), points.max(axis=0)
-    return (low + high) / 2.0, float(max(np.linalg.norm(high - low), 0.1))
 
 
 def _free_ports() -> tuple[int, int]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from services.common.config import ServiceConfig, load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.port_filter.config import Config
 from services.port_filter.node import FilterNode
@@ -16,7 +15,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the filter until it is told to end."""
     config = load_config(Config, argv, "services.port_filter")
     with explained("services.port_filter"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         theirs = ServiceConfig(endpoint=config.endpoint, namespace=config.clients, robot=config.robot, mode=config.mode)
         with Service("robot_sim", theirs, robot) as twin, Service("port_filter", config, robot, inbox=twin.inbox) as service:
             twin.log.disabled = True  # its events are for the clients; people are told by the service

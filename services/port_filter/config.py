@@ -8,21 +8,19 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from mobee.control.reflex_settings import ReflexSettings
-from services.common.config import ServiceConfig
+from services.common.worlds import WorldConfig
 
 _SETTINGS = ReflexSettings()
 Seconds = Annotated[float, Meta(ge=0, le=60)]
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
+class Config(WorldConfig, frozen=True, kw_only=True):
     """The port filter's settings; times in simulated seconds."""
 
     clients: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = "icub_filtered"
     """Namespace in which its clients find the robot."""
     participants: list[str] = []
     """Lockstep: clients whose answers every tick waits for."""
-    world: str = "table"
-    """Shipped world, or path to a world file."""
     contacts: Literal["solid", "field", "both"] = "both"
     """Kinds of contact that call the reflex: bodies, or the larger volumes around them."""
     tolerance: Annotated[float, Meta(ge=0)] = math.radians(1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee import Model, load_world
+from mobee import Model
 from mobee.control.reflex import Reflex
 from mobee.control.violation import KINDS, Violation, Watch
 from mobee.robot.robot import Array, Robot
@@ -16,7 +16,7 @@ class Switch:
 
     def __init__(self, config: Config, robot: Robot) -> None:
         self._settings = config.reflex
-        model = Model(robot, load_world(config.world))
+        model = Model(robot, config.load_world())
         for name, item in list(model.world.objects.items()):
             if item.role == "target":  # left to be perceived, as in the model's own process
                 model.world.remove(name)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee.robot.load import load_robot
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.robot_sim.config import Config
 from services.robot_sim.make import make_backend
@@ -17,7 +16,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the simulated robot until it is told to end."""
     config = load_config(Config, argv, "services.robot_sim")
     with explained("services.robot_sim"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         backend = make_backend(config, robot)
         with Service("robot_sim", config, robot, prompt=True) as service:
             node = Node(service, config, robot, backend)

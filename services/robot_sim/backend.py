@@ -8,7 +8,10 @@ from typing import Protocol
 
 from mobee.collision.world import World
 from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
+
+SIMULATED = "icub"  # the robot that PyBullet's URDF describes
 
 
 class BackendUnavailable(InvalidValue):
@@ -21,6 +24,15 @@ class SolidContact:
 
     depth: float = 0.0  # m
     pair: str = ""
+
+
+def require_simulated(robot: Robot) -> None:
+    """Raise BackendUnavailable for a robot that PyBullet cannot move."""
+    if robot.name != SIMULATED:
+        raise BackendUnavailable(
+            f'backend = "pybullet" cannot move {robot.name!r}: the physics simulates the links and motors of the {SIMULATED} only. '
+            'Set backend = "kinematic": the motor model alone, which moves every robot.'
+        )
 
 
 class Backend(Protocol):

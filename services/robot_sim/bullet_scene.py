@@ -15,11 +15,10 @@ from mobee.kinematics.gravity import gravity_torque
 from mobee.kinematics.quaternion import from_matrix
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Array, Robot
-from services.robot_sim.backend import BackendUnavailable
+from services.robot_sim.backend import require_simulated
 from services.robot_sim.bullet_torque import Motion
 
 GRAVITY = -9.81  # m/s^2
-SIMULATED = "icub"  # the robot that the URDF describes
 BASE = -1  # PyBullet's index of the base link
 
 
@@ -32,11 +31,7 @@ class BulletScene:
 
     def __init__(self, robot: Robot, world: World, substep: float) -> None:
         """`substep`: s.  Raises BackendUnavailable for a robot that the URDF does not describe."""
-        if robot.name != SIMULATED:
-            raise BackendUnavailable(
-                f"the pybullet back-end simulates the robot {SIMULATED!r} only, not {robot.name!r}: there is no URDF of it. "
-                'Use the kinematic back-end: backend = "kinematic".'
-            )
+        require_simulated(robot)
         self.client = BulletClient(pybullet.DIRECT)
         self.client.setPhysicsEngineParameter(fixedTimeStep=substep, numSubSteps=1, deterministicOverlappingPairs=1)
         self.client.setGravity(0.0, 0.0, GRAVITY)

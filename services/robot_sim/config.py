@@ -7,12 +7,15 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from services.common.config import ServiceConfig
+from mobee.robot.robot import Robot
+from mobee.simulation.motors import MotorParameters
+from services.common.worlds import WorldConfig
+from services.robot_sim.backend import require_simulated
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
+class Config(WorldConfig, frozen=True, kw_only=True):
     """The simulated robot's settings."""
 
     backend: Literal["pybullet", "kinematic"] = "pybullet"
@@ -21,8 +24,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Ticks a second."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
     """Simulated seconds a second; a command's ttl stays in real time, its age is counted in ticks."""
-    world: str = "table"
-    """Shipped world, or path to a world file."""
     motors: Literal["published", "identified"] = "published"
     """The motors' numbers: those below, or those that were fitted to this robot, with which they do not count (docs/plant.md)."""
     lag: NotNegative = 0.05
@@ -47,3 +48,11 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Lockstep: stop after so many ticks; 0: go on for ever."""
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.record); empty: none."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: PyBullet moves the iCub only, and only some robots' motors were identified."""
+        super().check_robot(robot)
+        if self.backend == "pybullet":
+            require_simulated(robot)
+        if self.motors == "identified":
+            MotorParameters.identified(robot.name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from mobee.robot.load import load_world
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.backend import Backend, BackendUnavailable
@@ -37,7 +36,7 @@ def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
 def _make_backend(config: Config, robot: Robot) -> Backend:
     parameters = motor_parameters(config, robot)
     if config.backend == "kinematic":
-        return KinematicBackend(robot, lambda: load_world(config.world), parameters, config.seed)
+        return KinematicBackend(robot, config.load_world, parameters, config.seed)
     try:
         from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
     except ModuleNotFoundError as error:
@@ -45,4 +44,4 @@ def _make_backend(config: Config, robot: Robot) -> Backend:
             f"the pybullet back-end needs the module {error.name!r}: pip install '.[sim]' in MoBeE's folder on Python 3.11. "
             'Without it: backend = "kinematic".'
         ) from error
-    return BulletBackend(robot, lambda: load_world(config.world), parameters, config.seed, round(1e9 / config.rate) / 1e9)
+    return BulletBackend(robot, config.load_world, parameters, config.seed, round(1e9 / config.rate) / 1e9)

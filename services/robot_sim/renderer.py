@@ -13,12 +13,11 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
-from mobee import load_robot, load_world
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.config import load_config
 from services.common.delivery import BULK
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.figures import Percentiles
 from services.common.service import Service
 from services.robot_sim.renderer_config import RendererConfig
@@ -31,7 +30,7 @@ class RendererNode:
     def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
         self._service = service
         self._period = round(1e9 / config.frame_rate)  # ns
-        self._scene = Scene(robot, load_world(config.world), config.width, config.height, config.view_deg)
+        self._scene = Scene(robot, config.load_world(), config.width, config.height, config.view_deg)
         self._body = Body(service.bus, robot)
         self._truth = service.bus.latest(keys.SIM_TRUTH, Truth)
         self._images = {eye: service.bus.publisher(keys.image(eye), Image, BULK) for eye in keys.EYES}
@@ -104,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the renderer until it is told to end."""
     config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
     with explained("services.robot_sim.renderer"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with Service("renderer", config, robot) as service:
             RendererNode(service, config, robot)
             service.ready()

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from services.common.config import ServiceConfig
+from mobee.robot.robot import Robot
+from services.common.eyes import require_eyes
+from services.common.worlds import WorldConfig
 
 
-class RendererConfig(ServiceConfig, frozen=True, kw_only=True):
+class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """The renderer's settings."""
 
-    world: str = "table"
-    """Shipped world, or path to a world file."""
     frame_rate: Annotated[float, Meta(gt=0, le=30)] = 5.0
     """Pictures of each eye a second of simulated time."""
     width: Annotated[int, Meta(ge=16, le=1280)] = 320
@@ -22,3 +22,8 @@ class RendererConfig(ServiceConfig, frozen=True, kw_only=True):
     """Rows of a picture."""
     view_deg: Annotated[float, Meta(gt=5, lt=120)] = 50.0
     """Vertical field of view, in degrees."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: a robot needs eyes."""
+        super().check_robot(robot)
+        require_eyes(robot)

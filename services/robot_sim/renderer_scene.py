@@ -13,12 +13,14 @@ from mobee.collision.world import World, WorldObject
 from mobee.kinematics import link_transforms
 from mobee.kinematics.quaternion import from_matrix, to_matrix
 from mobee.robot.robot import Array, Robot, Shape
+from mobee.robot.urdf.hull import facets
 from services.common.eyes import eye_frame
 from services.robot_sim.renderer_cast import CastBox, CastSphere, Floats, Picture, paint_box, paint_sphere, pixel_rays
 
 NEAR, FAR = 0.03, 3.0  # m
 BACKGROUND = (168, 174, 182)
 NEUTRAL = {"torso": (0.62, 0.64, 0.67, 1.0), "left_arm": (0.78, 0.79, 0.80, 1.0), "right_arm": (0.70, 0.71, 0.73, 1.0)}
+Color = tuple[float, float, float, float]
 DEFAULT_COLOR = (0.6, 0.6, 0.55, 1.0)
 LIGHT = np.array([0.37, -0.24, 0.90])  # unit vector towards it: behind, left of and above the robot
 
@@ -49,9 +51,10 @@ class Scene:
         """Put the robot's links where they are at q (n,) in rad."""
         self._transforms = link_transforms(self._robot, q)
         quaternions = from_matrix(self._transforms[:, :3, :3])[:, [1, 2, 3, 0]]
-        for link, body in self._links.items():
+        for link, bodies in self._links.items():
             at, turn = self._transforms[link, :3, 3].tolist(), quaternions[link].tolist()
-            pybullet.resetBasePositionAndOrientation(body, at, turn, physicsClientId=self._client)
+            for body in bodies:
+                pybullet.resetBasePositionAndOrientation(body, at, turn, physicsClientId=self._client)
 
     def place(self, name: str, position: Array, quaternion: Array) -> None:
         """Put an object of the world somewhere: (3,) m, quaternion wxyz; what the world does not hold is passed over."""
@@ -98,13 +101,14 @@ class Scene:
         depth[nothing] = np.inf
         return picture, depth
 
-    def _make_links(self) -> dict[int, int]:
-        """One body a link; the head's own shapes are left out, the eyes are inside them."""
-        bodies = {}
+    def _make_links(self) -> dict[int, list[int]]:
+        """The bodies of each link: one of its primitives, and one a hull; the head's own shapes are left out, the eyes are inside them."""
+        bodies: dict[int, list[int]] = {}
         for link in range(len(self._robot.links)):
             shapes = [s for s in self._robot.shapes if s.link == link and s.role == "solid" and s.part != "head"]
-            if shapes:
-                bodies[link] = self._make_body(shapes, NEUTRAL.get(shapes[0].part, DEFAULT_COLOR))
+            primitives = [shape for shape in shapes if shape.kind != "convex"]
+            made = [self._make_body(primitives, _color(primitives[0]))] if primitives else []
+            bodies[link] = made + [self._make_hull(shape, _color(shape)) for shape in shapes if shape.kind == "convex"]
         return bodies
 
     def _add(self, thing: WorldObject) -> None:
@@ -120,7 +124,7 @@ class Scene:
         self._bodies[thing.name] = self._make_body([own], color)
         self.place(thing.name, thing.position, from_matrix(thing.rotation))
 
-    def _make_body(self, shapes: list[Shape], color: tuple[float, float, float, float]) -> int:
+    def _make_body(self, shapes: list[Shape], color: Color) -> int:
         visual = [_visual(shape) for shape in shapes]
         index = pybullet.createVisualShapeArray(
             shapeTypes=[v[0] for v in visual],
@@ -133,6 +137,26 @@ class Scene:
             physicsClientId=self._client,
         )
         return int(pybullet.createMultiBody(baseVisualShapeIndex=index, physicsClientId=self._client))
+
+    def _make_hull(self, shape: Shape, color: Color) -> int:
+        """A body of triangles with flat faces, which the array of primitives above cannot hold."""
+        local = facets(np.empty((0, 3)) if shape.vertices is None else shape.vertices)
+        corners = local @ shape.rotation.T + shape.position
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+        index = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=corners.reshape(-1, 3).tolist(),
+            indices=list(range(3 * len(corners))),
+            normals=np.repeat(normals, 3, axis=0).tolist(),
+            rgbaColor=list(color),
+            physicsClientId=self._client,
+        )
+        return int(pybullet.createMultiBody(baseVisualShapeIndex=index, physicsClientId=self._client))
+
+
+def _color(shape: Shape) -> Color:
+    return NEUTRAL.get(shape.part, DEFAULT_COLOR)
 
 
 def _visual(shape: Shape) -> tuple[int, float, list[float], float]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee import load_robot
 from services.common.config import load_config
-from services.common.entry import explained
+from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.vision.config import Config
 from services.vision.node import VisionNode
@@ -16,7 +15,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the target locator until it is told to end."""
     config = load_config(Config, argv, "services.vision")
     with explained("services.vision"):
-        robot = load_robot(config.robot)
+        robot = robot_of(config)
         with Service("vision", config, robot) as service:
             VisionNode(service, config, robot)
             service.ready()

@@ -6,7 +6,9 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
+from services.common.eyes import require_eyes
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
@@ -16,3 +18,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The ball's radius, in m."""
     valid_for: Annotated[float, Meta(gt=0, le=60)] = 5.0
     """How long a position may be used after the picture was taken, in s of simulated time."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """As ServiceConfig: a robot needs eyes."""
+        super().check_robot(robot)
+        require_eyes(robot)

@@ -84,6 +84,15 @@ def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
     assert told.stdout.startswith(printed[1])
 
 
+def test_the_readers_own_robot_gets_a_map_of_its_own_task(tmp_path: Path) -> None:
+    blocks("docs/robots.md", tmp_path)
+    robot = ("--robot", "pointer.xml")
+    summary = run(tmp_path, "-m", "mobee_cli", "roadmap", "build", "sweep.py", *robot, "--world", "desk.xml")
+    assert re.match(r"sweep\.npz: [1-9]\d+ poses", summary) and "(desk, ball)" in summary
+    assert "tip" in run(tmp_path, "-m", "mobee_cli", "roadmap", "show", "sweep.npz", *robot)
+    run(tmp_path, "-m", "mobee_cli", "reach", "--offline", *robot, "--world", "desk.xml", "--object", "ball")
+
+
 @pytest.mark.system
 def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None:
     blocks("docs/robots.md", tmp_path)

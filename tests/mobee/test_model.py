@@ -183,6 +183,8 @@ def test_what_is_attached_to_no_link_of_the_robot_is_refused_by_name(model, engi
         (0.0, r"shape \(\).*has 3 motors"),
         ("home", r"q is 'home'; it must be an array of numbers"),
         ([[0.0, 0.0, 0.0], [0.0]], "must be an array of numbers"),
+        (np.zeros(3, dtype=complex), "q is complex"),
+        ([1j, 0.0, 0.0], "q is complex"),
         ([0.0, np.nan, 0.0], "motor 'm1' is nan"),
         (np.array([[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]), "motor 'm2' is inf"),
     ],

@@ -10,7 +10,7 @@ from mobee_cli.__main__ import main
 from tests.mobee.robot.check.arm import ARM
 from tests.mobee.robot.check.test_urdf import URDF
 from tests.mobee.robot.robot_files import robot_file
-from tests.mobee.robot.urdf_files import arm_with
+from tests.mobee.robot.urdf_files import arm_with, foreign, srdf_file
 
 
 @pytest.fixture
@@ -89,6 +89,28 @@ def test_a_urdf_is_checked_with_fields_and_an_srdf_of_its_own(tmp_path: Path, ca
     assert capsys.readouterr().out.endswith("toy: 2 parts, 2 motors, 2 joints, 2 shapes: nothing is wrong\n")
     assert main(["check", "katana", "--field", "0.03"]) == 2
     assert "field= is for .urdf files" in capsys.readouterr().err
+
+
+def test_the_srdf_that_was_found_and_the_home_in_it_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm = arm_with(tmp_path, '<sphere radius="0.1"/>')
+    poses = ('<group_state name="up" group="all"><joint name="elbow" value="1"/></group_state>', '<group_state name="down" group="all"/>')
+    srdf = srdf_file(tmp_path, *poses)
+    main(["check", str(arm)])
+    assert f"SRDF: {srdf}. Home: every motor at 0" in " ".join(capsys.readouterr().out.split())
+    main(["check", str(arm), "--home", "up"])
+    assert f"SRDF: {srdf}. Home: its pose 'up' (line 2)." in " ".join(capsys.readouterr().out.split())
+    assert main(["check", str(arm), "--home", "upp"]) == 2
+    assert "Did you mean 'up'? Valid: down, up, zero." in capsys.readouterr().err
+
+
+def test_corners_are_a_number_or_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(foreign("kuka_iiwa/model.urdf")), "--corners", "all"]) == 0
+    assert "stand out" not in capsys.readouterr().out
+    assert main(["check", str(foreign("kuka_iiwa/model.urdf")), "--corners", "7"]) == 2
+    assert "Give a whole number from 8 on" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["check", str(foreign("kuka_iiwa/model.urdf")), "--corners", "some"])
+    assert "'some' is neither a whole number nor 'all'" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee import CuriousAgent, Lattice, load_robot
+from mobee import CuriousAgent, Lattice, Model, OfflinePlant, load_robot
 from mobee.learning.tabular import TabularPlant
 from mobee.store import STORE, TransitionStore
 from mobee_cli.__main__ import main
+from tests.services.robots import chain
 
 ROBOT = load_robot("icub")
 TORSO = Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours="equidistant")
@@ -87,6 +88,37 @@ def test_what_cannot_be_planned_is_said_in_a_line(run: Path, words: list[str], s
     error = capsys.readouterr().err
     assert code == 2
     assert says in error and error.count("\n") == 1
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A run of an agent of a robot that does not come with mobee; its folder also holds the robot's file."""
+    (tmp_path / "arm.urdf").write_text(chain(3))
+    robot = load_robot(tmp_path / "arm.urdf")
+    space = Lattice(robot, robot.motors, neighbours=8)
+    with TransitionStore(tmp_path / STORE, "all") as store:
+        CuriousAgent(space, OfflinePlant(Model(robot), seed=0), store=store).run(3)
+    return tmp_path
+
+
+def test_a_run_whose_robot_is_not_known_says_how_to_name_it(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--run", str(own), "--to", "0"]) == 2
+    said = capsys.readouterr().err
+    assert "unknown robot 'chain'" in said and said.endswith("name it with --robot FILE.\n")
+    assert planned(own, "--to", "0", "--robot", str(own / "arm.urdf"), capsys=capsys)["path"][-1] == 0
+    assert main(["plan", "--run", str(own), "--to", "0", "--field", "0.02"]) == 2
+    assert "--field 0.02: it is for the robot of --robot FILE" in capsys.readouterr().err
+
+
+def test_the_settings_of_a_run_name_its_robot(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (own / "scenario.toml").write_text(f'title = ""\n[services.model]\nrobot = "{own}/arm.urdf"\n')
+    assert planned(own, "--to", "0", capsys=capsys)["path"][-1] == 0
+    (own / "arm.urdf").rename(own / "moved.urdf")
+    assert main(["plan", "--run", str(own), "--to", "0"]) == 2
+    assert "there is no such file: name it with --robot FILE" in capsys.readouterr().err
+    (own / "scenario.toml").write_text("title = ")
+    assert main(["plan", "--run", str(own / STORE), "--to", "0"]) == 2
+    assert "the settings of the run cannot be read" in capsys.readouterr().err
 
 
 def test_a_run_without_transitions_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee import Lattice, Model, OfflinePlant, ReachTarget, World, load_robot, load_world
-from mobee.collision.geometry import sphere
+from mobee import Lattice, Model, OfflinePlant, ReachTarget, load_robot, load_world
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.store import STORE
 from mobee_cli.__main__ import main
+from tests.services.robots import chain
 
 ROBOT = load_robot("icub")
 HOME = Model(ROBOT).evaluate(ROBOT.home)
@@ -51,7 +51,7 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest
     assert main(["reach", "--offline", "--target", "-3", "0.2", "0.1"]) == 1
     said = capsys.readouterr().out
     assert "right_palm did not come to the target at (-3.000, 0.200, 0.100)" in said
-    assert "The nearest that right_arm can bring it is (" in said
+    assert "The nearest that part right_arm can bring it is (" in said
     assert max(map(len, said.splitlines())) <= 80
 
 
@@ -60,11 +60,9 @@ def test_an_object_of_the_world_is_reached_for_by_name(capsys: pytest.CaptureFix
     assert result["target"] == {"position": [-0.35, 0.0, -0.07], "radius": 0.03, "aim": "surface"}
 
 
-def test_an_object_inside_the_body_is_refused_as_a_place_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    world = World()
-    world.add("pill", sphere(0.01), position=[0.0, 0.0, 0.1], role="target")
-    monkeypatch.setattr("mobee_cli.reach_stage.load_world", lambda name: world)
-    assert main(["reach", "--offline", "--object", "pill"]) == 2
+def test_an_object_inside_the_body_is_refused_as_a_place_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "pill.xml").write_text('<World name="pill"><sphere name="pill" radius="0.01" pz="0.1" role="target"/></World>')
+    assert main(["reach", "--offline", "--object", "pill", "--world", str(tmp_path / "pill.xml")]) == 2
     assert "is inside the robot's own torso_2" in capsys.readouterr().err
 
 
@@ -110,7 +108,10 @@ def test_a_run_that_does_not_fit_is_refused_in_one_line(learned: Path, capsys: p
             "is inside the robot's own torso_2: choose a place outside its body; the nearest to which right_arm",
         ),
         (["--target", "-0.3", "0.2", "0.1", "--part", "right_amr"], "Did you mean 'right_arm'?"),
-        (["--target", "-0.3", "0.2", "0.1", "--marker", "left_palm"], "right_arm does not move the marker 'left_palm'. Valid: right_elbow"),
+        (
+            ["--target", "-0.3", "0.2", "0.1", "--part", "right_arm", "--marker", "left_palm"],
+            "right_arm does not move the marker 'left_palm'. Valid: right_elbow",
+        ),
         (["--object", "balll"], "Did you mean 'ball'?"),
     ],
 )
@@ -120,6 +121,84 @@ def test_what_cannot_be_reached_for_is_refused_in_one_line(words: list[str], say
     assert said.out == ""
     assert says in said.err
     assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "marker", "part", "why"),
+    [
+        ([], "right_palm", "right_arm", "the palm nearer to the target at home"),
+        (["--marker", "left_palm"], "left_palm", "left_arm", "the part with most motors that move it"),
+        (["--part", "torso"], "right_palm", "torso", "the marker of torso"),
+        (["--part", "right_arm", "--marker", "right_elbow"], "right_elbow", "right_arm", ""),
+    ],
+)
+def test_what_reaches_is_chosen_and_the_choice_is_printed(
+    words: list[str], marker: str, part: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["reach", "--offline", "--target", "-0.3", "0.2", "0.1", *words])
+    said = capsys.readouterr().out
+    assert " ".join(said.split()).startswith(f"Reaching with {marker}, moved by part {part}: {why}" if why else f"{marker} ")
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_the_left_palm_reaches_for_what_is_on_the_left(capsys: pytest.CaptureFixture[str]) -> None:
+    _, result = reach("--target", "-0.3", "-0.2", "0.1", capsys=capsys)
+    assert (result["marker"], result["part"]) == ("left_palm", "left_arm")
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    (tmp_path / "arm.urdf").write_text(chain(6))
+    return tmp_path / "arm.urdf"
+
+
+def test_a_robot_of_ones_own_reaches_with_its_end_and_without_a_table(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = load_robot(arm)
+    at = Model(robot).evaluate(robot.home + 0.3).position("link_5")
+    code, result = reach(*place(at), "--robot", str(arm), "--stay", capsys=capsys)
+    assert (code, result["marker"], result["part"]) == (0, "link_5", "all")
+    assert main(["reach", "--offline", "--object", "ball", "--robot", str(arm)]) == 2
+    assert "unknown target of the offline world 'ball'. Valid: none." in capsys.readouterr().err
+    _, result = reach("--object", "ball", "--robot", str(arm), "--world", "table", capsys=capsys)
+    assert result["target"]["position"] == [-0.35, 0.0, -0.07]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--robot", "{arm}", "--marker", "left_palm"], "unknown marker 'left_palm'. Valid: link_5."),
+        (["--robot", "{arm}", "--part", "left_arm"], "unknown part 'left_arm'. Valid: all."),
+        (["--robot", "ikub"], "Did you mean 'icub'?"),
+        (["--robot", "no.urdf"], "no.urdf: no such file"),
+        (["--world", "tabel"], "Did you mean 'table'?"),
+        (["--field", "0.03"], "field= is for .urdf files"),
+    ],
+)
+def test_a_robot_or_world_that_cannot_be_used_is_refused_in_one_line(
+    arm: Path, words: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["reach", "--offline", "--target", "-0.1", "0.1", "0.6", *(word.replace("{arm}", str(arm)) for word in words)]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and says in said.err and said.err.count("\n") == 1
+
+
+def test_the_robot_of_the_running_system_cannot_be_chosen(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--robot", "katana"], ["--world", "none"], ["--field", "0.03"]):
+        assert main(["reach", "--target", "-0.3", "0.2", "0.1", *words]) == 2
+        assert f"{words[0]} {words[1]}: it is for --offline" in capsys.readouterr().err
+
+
+def test_the_robot_of_a_run_is_that_of_its_settings(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = arm.parent / "run"
+    run.mkdir()
+    robot = load_robot(arm)
+    space = Lattice(robot, ["joint_1", "joint_3"], neighbours=4)
+    with ReachStore(run / STORE, "all") as store:
+        agent = ReachAgent(space, OfflinePlant(Model(robot)), marker="link_5", store=store)
+        agent.learn([ReachTarget(np.array([0.3, 0.0, 0.6]))], 2)
+    (run / "scenario.toml").write_text(f'[services.controller]\nrobot = "{arm}"\n')
+    _, result = reach("--target", "0.3", "0.0", "0.6", "--run", str(run), capsys=capsys)
+    assert (result["marker"], result["part"]) == ("link_5", "all") and result["expected_reward"] is not None
 
 
 def test_without_a_system_the_verb_says_how_to_start_one(capsys: pytest.CaptureFixture[str]) -> None:

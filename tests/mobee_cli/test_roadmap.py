@@ -13,6 +13,7 @@ import mobee
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
 from mobee_cli.roadmap.tour import PLACES, tour
+from tests.services.robots import chain
 
 MOTORS = ("r_shoulder_pitch", "r_shoulder_roll")
 SIDE, STEP, TURN = 5, 0.1, 0.2
@@ -217,6 +218,80 @@ def test_a_map_of_a_task_of_ones_own_is_built_kept_and_played(say: Say, tmp_path
     code, _, err = say("build", tmp_path / "own.py", "-o", path, "--method", "least_squares")
     assert code == 2 and "differ in neighbours" in _flat(err)
     assert say("play", path, "--from", 0.6, 0.8, "--to", 0.8, 0.9)[0] == 0
+
+
+TASK_OF_ANY_ROBOT = """
+import mobee
+from experiments.trm.example import Example
+
+def example(model):
+    task = mobee.tasks.motors({"joint_1": (0.5, 0.9), "joint_3": (0.7, 1.0)})
+    return Example("own", "", model, (mobee.costs.collision(), mobee.costs.home()), task, 0.1, ("joint_1", "joint_3"), ())
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    (tmp_path / "arm.urdf").write_text(chain(4))
+    (tmp_path / "task.py").write_text(TASK_OF_ANY_ROBOT)
+    return tmp_path / "arm.urdf"
+
+
+def test_a_task_file_is_built_shown_asked_and_played_for_another_robot(
+    say: Say, arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.drawing.cloud.marker_cloud", lambda *given, **_: given[3])
+    path, robot = tmp_path / "task.npz", ("--robot", arm)
+    assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--neighbours", 4, *robot)[0] == 0
+    code, out, _ = say("show", path, *robot)
+    assert code == 0 and "Robot chain" in _flat(out) and "(nothing)" in _flat(out) and "Where link_3 is" in _flat(out)
+    code, out, _ = say("query", path, *robot, "--from", 0.6, 0.8, "--to", 0.8, 0.9)
+    assert code == 0 and "Nothing is in its way" in _flat(out)
+    assert say("play", path, *robot, "--from", 0.6, 0.8, "--to", 0.8, 0.9)[0] == 0
+    code, out, err = say("query", path, "--to", 0.8, 0.9)
+    assert code == 2 and out == "" and "--robot FILE" in err
+
+
+def test_a_way_is_looked_at_in_another_world(say: Say, arm: Path, tmp_path: Path) -> None:
+    path, words = tmp_path / "task.npz", ("--from", 0.6, 0.8, "--to", 0.8, 0.9)
+    assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--robot", arm)[0] == 0
+    at = mobee.load_roadmap(path, robot=mobee.load_robot(arm)).model.evaluate(np.array([0.0, 0.8, 0.0, 0.9])).position("link_3")
+    place = " ".join(f'p{axis}="{value:.4f}"' for axis, value in zip("xyz", at, strict=True))
+    (tmp_path / "ball.xml").write_text(f'<World name="ball"><sphere name="ball" radius="0.1" {place}/></World>')
+    code, out, _ = say("query", path, "--robot", arm, "--world", tmp_path / "ball.xml", *words)
+    assert code == 1 and "Something is in the way" in out
+    assert say("query", path, "--robot", arm, "--world", "none", *words)[0] == 0
+    code, _, err = say("play", path, "--robot", arm, "--world", "none", "--live", "--to", 0.8, 0.9)
+    assert code == 2 and "--world none: it is for offline" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["build", "palm-down", "--robot", "{arm}"], "the task 'palm-down' is made of the markers and motors of the icub"),
+        (["build", "palm-down", "--world", "none"], "--world none: the task 'palm-down'"),
+        (["build", "{folder}/fixed.py", "--robot", "{arm}"], "fixed.py makes its model itself; write `def example(model)`"),
+        (["build", "{folder}/many.py"], "many.py: example has 2 parameters"),
+        (["build", "{folder}/task.py", "--robot", "no.urdf"], "no.urdf: no such file"),
+        (["build", "{folder}/task.py", "--robot", "{arm}", "--world", "tabel"], "Did you mean 'table'?"),
+        (["build", "{folder}/task.py", "-o", "{folder}/a.npz"], "unknown part or motor 'joint_1'"),
+        (["build", "{folder}/wrong.py"], "wrong.py:3: ZeroDivisionError"),
+        (["query", "{map}", "--to", "0", "0", "--field", "0.1"], "--field 0.1: it is for the robot of --robot FILE"),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_refused_in_a_line(say: Say, free: Path, arm: Path, words: list[str], text: str) -> None:
+    folder = arm.parent
+    (folder / "fixed.py").write_text(TASK)
+    (folder / "many.py").write_text("def example(model, world):\n    return None\n")
+    (folder / "wrong.py").write_text("\ndef example(model):\n    return 1 / 0\n")
+    code, out, err = say(*(word.format(arm=arm, folder=folder, map=free) for word in words))
+    assert code == 2 and out == ""
+    assert text in err and err.count("\n") == 1
+
+
+def test_tasks_name_the_robot_they_need(say: Say) -> None:
+    assert "All of them need the robot icub." in _flat(say("tasks")[1])
+    assert {one["robot"] for one in json.loads(say("tasks", "--json")[1])} == {"icub"}
 
 
 def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,6 +77,10 @@ def test_the_summary_says_whether_the_run_can_be_repeated_and_what_its_states_we
 
 
 def test_a_rate_at_which_the_controller_would_answer_nothing_is_refused() -> None:
-    check_rate(read_scenario("lockstep"))
+    def check(*settings: str) -> None:
+        scenario = read_scenario("lockstep", settings)
+        check_rate(scenario, check_robots(scenario))
+
+    check()
     with pytest.raises(ConfigError, match="services.robot_sim.rate.*rate 5 Hz: gains unstable at steps of 0.2 s"):
-        check_rate(read_scenario("lockstep", ["services.robot_sim.rate=5"]))
+        check("services.robot_sim.rate=5")

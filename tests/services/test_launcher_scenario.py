@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 from mobee.robot import load
 from services.common.config import ConfigError
-from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots
+from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots, check_services
+from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import read_scenario, shipped
 from services.launcher.toml import to_toml
 from tests.services.launched import mobee, toys
+from tests.services.robots import ARM, chain, seer
 
 SCENARIO = """\
 title = "a test"
@@ -51,7 +53,7 @@ def mistake(path: Path | str, *settings: str) -> str:
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_scenarios_are_right(name: str) -> None:
     scenario = read_scenario(name)
-    check_robots(scenario)
+    check_services(scenario, check_robots(scenario))
     assert scenario.title
 
 
@@ -81,6 +83,29 @@ def test_an_agent_is_told_its_part_and_shared_settings_reach_whom_they_concern(s
     assert parts["agent_torso"].part == "torso"
     assert parts["model"].gains == "published_2014"
     assert not hasattr(parts["robot_sim"], "gains")
+
+
+def test_a_robot_of_ones_own_has_no_table_and_the_run_s_record_shows_it(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(ARM)
+    path = tmp_path / "arm.toml"
+    path.write_text(f'[shared]\nrobot = "{tmp_path}/arm.xml"\n[services.robot_sim]\nbackend = "kinematic"\n[services.model]\n')
+    scenario = read_scenario(str(path))
+    assert {part.who: part.config.world for part in scenario.parts} == {"robot_sim": "none", "model": "none"}
+    check_robots(scenario)
+    run = make_run_directory(tmp_path / "runs", scenario, "tcp/127.0.0.1:1")
+    assert tomllib.loads((run / "model.toml").read_text())["world"] == "none"
+    empty = read_scenario("kinematic", ["shared.world=none"])
+    assert {part.config.world for part in empty.parts if hasattr(part.config, "world")} == {"none"}
+    assert {part.config.world for part in read_scenario(str(path), ["shared.robot=icub"]).parts} == {"table"}
+
+
+def test_the_run_s_record_names_files_so_that_they_are_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.xml").write_text(ARM)
+    Path("arm.toml").write_text('[services.model]\nrobot = "arm.xml"\nworld = "table"\n')
+    run = make_run_directory(tmp_path / "runs", read_scenario("arm.toml"), "tcp/127.0.0.1:1")
+    written = tomllib.loads((run / "model.toml").read_text())
+    assert (written["robot"], written["world"]) == (str(tmp_path / "arm.xml"), "table")
 
 
 def test_settings_of_the_command_line_win(scenario: Path) -> None:
@@ -146,6 +171,75 @@ def test_a_typo_in_a_world_that_a_library_would_ignore_is_refused(tmp_path: Path
     world = tmp_path / "mine.xml"
     world.write_text("\n".join(lines))
     assert mistake("default", f"shared.world={world}").startswith(f"{world}:{number}: {said}")
+
+
+def unable(folder: Path, robot: str, services: str, suffix: str = "xml") -> str:
+    """What is said of a scenario whose robot one of its services cannot serve."""
+    (folder / f"own.{suffix}").write_text(robot)
+    path = folder / "own.toml"
+    path.write_text(f'[shared]\nrobot = "{folder}/own.{suffix}"\n{services}')
+    scenario = read_scenario(str(path))
+    with pytest.raises(ConfigError) as caught:
+        check_services(scenario, check_robots(scenario))
+    assert "\n" not in str(caught.value)
+    return str(caught.value).removeprefix(f"{path}:3: ")
+
+
+NO_EYES = '<marker name="left_eye" nx="-1"/>'
+VERTICAL = '<marker name="left_eye" nz="1"/><marker name="right_eye" nz="1"/>'
+
+
+@pytest.mark.parametrize(
+    ("robot", "services", "says", "instead"),
+    [
+        (ARM, "[services.renderer]\n", "renderer: 'arm' cannot see: pictures are taken from", "Leave renderer and vision out"),
+        (seer(eyes=NO_EYES), "[services.vision]\n", "vision: 'seer' cannot see: pictures are taken from", "has no right_eye. Leave"),
+        (seer(head="neck"), "[services.vision]\n", "vision: 'seer' cannot see: each picture is sent", "has no part head. Leave"),
+        (seer(eyes=VERTICAL), "[services.renderer]\n", "renderer: 'seer' cannot see: the normal of", "Give the marker a normal"),
+        (ARM, "[services.robot_sim]\n", "robot_sim: backend = \"pybullet\" cannot move 'arm'", 'Set backend = "kinematic"'),
+        (ARM, '[services.agent_arm]\njoints = ["pan"]\n', "agent_arm: neighbours", "2"),
+        (
+            ARM,
+            "[services.agent_arm]\nneighbours = 8\ntargets = [[0, 0, 0]]\nmarker = 'palm'",
+            "agent_arm: arm does not move",
+            "Valid: tip.",
+        ),
+        (ARM, "[services.controller]\nposture = { arm = [0.0] }\n", "controller: posture of arm: 1 numbers", "it has 2 motors"),
+        (ARM.replace('bodypart name="arm"', 'bodypart name="Arm"'), "[services.model]\n", "model: part 'Arm' of 'arm'", "rename the part"),
+    ],
+)
+def test_a_service_that_cannot_serve_the_robot_is_refused_before_the_start(
+    tmp_path: Path, robot: str, services: str, says: str, instead: str
+) -> None:
+    text = unable(tmp_path, robot, services)
+    assert text.startswith(says)
+    assert instead in text
+
+
+def test_a_state_space_that_is_too_large_is_refused_with_joints_to_take(tmp_path: Path) -> None:
+    text = unable(tmp_path, chain(11), "[services.agent_all]\n", "urdf")
+    assert text.startswith("agent_all: 3 levels of 11 motors make 1.77e+05 states")
+    assert 'joints = ["joint_0", "joint_1", "joint_2", "joint_3"]' in text
+
+
+def test_a_robot_with_eyes_is_served_by_every_service(tmp_path: Path) -> None:
+    (tmp_path / "seer.xml").write_text(seer())
+    path = tmp_path / "seer.toml"
+    names = ("model", "controller", "renderer", "vision", "monitor", "port_filter")
+    tables = "".join(f"[services.{name}]\n" for name in names)
+    path.write_text(f'[shared]\nrobot = "{tmp_path}/seer.xml"\n[services.robot_sim]\nbackend = "kinematic"\n{tables}')
+    scenario = read_scenario(str(path))
+    check_services(scenario, check_robots(scenario))
+
+
+def test_the_command_ends_with_two_and_one_line_when_a_service_cannot_serve_the_robot(tmp_path: Path) -> None:
+    (tmp_path / "own.xml").write_text(ARM)
+    done = mobee("launch", "kinematic", "--set", f"shared.robot={tmp_path}/own.xml")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    (tmp_path / "own.toml").write_text(f'[services.robot_sim]\nrobot = "{tmp_path}/own.xml"\n')
+    done = mobee("launch", str(tmp_path / "own.toml"), "--runs", str(tmp_path / "runs"))
+    assert (done.returncode, done.stderr.count("\n"), (tmp_path / "runs").exists()) == (2, 1, False)
+    assert 'Set backend = "kinematic"' in done.stderr
 
 
 def test_an_unknown_scenario_names_the_nearest() -> None:

@@ -23,11 +23,14 @@ from bus_schema.rpc import ObjectState
 from mobee.kinematics import link_transforms
 from mobee.kinematics.quaternion import to_matrix
 from mobee.robot.load import load_robot
+from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
 from services.monitor import palette  # noqa: E402  # only where Rerun is
+from services.monitor.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
 from services.monitor.page import program  # noqa: E402  # only where Rerun is
+from services.monitor.plots import Plots  # noqa: E402  # only where Rerun is
 from services.monitor.scene import Scene  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
@@ -96,6 +99,41 @@ def test_a_field_is_red_while_it_is_in_contact() -> None:
     shown = [item for item in notebook.logged["scene/fields/capsules"] if isinstance(item, rr.Capsules3D)]
     assert channels(shown[0]) == [palette.TOUCHED if name == capsules[3] else palette.FIELD for name in capsules]
     assert set(channels(shown[1])) == {palette.FIELD}
+
+
+def test_a_robot_without_meshes_is_drawn_by_its_solids_which_move_as_its_links_do(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(ARM)
+    robot = load_robot(tmp_path / "arm.xml")
+    notebook = Notebook()
+    scene = Scene(notebook.stream, robot)
+    q = np.array([0.5, -0.3])
+    scene.log_robot(q, [])
+    assert scene.tree is None
+    transforms = link_transforms(robot, q)
+    for shape in robot.shapes:
+        frame, body = notebook.logged[f"/robot/solids/{robot.links[shape.link]}/{shape.name}"]
+        assert isinstance(frame, rr.CoordinateFrame) and isinstance(body, rr.Cylinders3D)
+        (place,) = notebook.logged[f"robot/frames/link_{shape.link}"]
+        np.testing.assert_allclose(place.translation.as_arrow_array().to_pylist(), [transforms[shape.link, :3, 3]], atol=1e-6)
+
+
+def test_the_page_shows_the_parts_of_any_robot(tmp_path: Path) -> None:
+    assert palette.colors_of(ROBOT.parts) == palette.PARTS
+    assert list(palette.colors_of(["legs", "tail", "arm", "gripper"])) == ["legs", "tail", "arm"]
+    (tmp_path / "arm.xml").write_text(ARM)
+    robot = load_robot(tmp_path / "arm.xml")
+    shown = shown_of(robot)
+    assert (shown.name, shown.parts) == ("arm", ("arm",))
+    assert blueprint(shown).root_container is not None
+    notebook = Notebook()
+    Plots(notebook.stream, robot)
+    assert {path.removeprefix("plots/") for path in notebook.logged} == {
+        "forces",
+        "joints/arm",
+        "reward/arm",
+        "value/arm",
+        "transitions/arm",
+    }
 
 
 def test_the_meshes_move_as_the_model_s_links_do(rng: np.random.Generator) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from mobee import World, box, cylinder, load_world, sphere
 from mobee.robot.load import load_robot
 from services.common.eyes import eye_frame, frame_at_capture
 from tests.services.harness import wait_for
+from tests.services.robots import seer
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 pytest.importorskip("pybullet")
@@ -115,6 +118,27 @@ def test_the_robot_has_no_red_on_it(scene: Scene) -> None:
         picture = scene.draw(eye).astype(int)
         assert (picture.max(axis=2) - picture.min(axis=2)).max() < 40
         assert (picture != BACKGROUND).any(axis=2).mean() > 0.5
+
+
+def test_a_hull_is_drawn_as_the_box_that_it_is(tmp_path: Path) -> None:
+    place = 'px="-0.35" pz="0.2"'
+    corners = " ".join(f"{x} {y} {z}" for x, y, z in product((-0.05, 0.05), (-0.1, 0.1), (-0.04, 0.04)))
+    pictures = []
+    for block in (
+        f'<box name="block" width="0.1" height="0.2" depth="0.08" {place}/>',
+        f'<convex name="block" points="{corners}" {place}/>',
+    ):
+        (tmp_path / "seer.xml").write_text(seer(block))
+        robot = load_robot(tmp_path / "seer.xml")
+        scene = Scene(robot, World())
+        for turn in (0.0, 0.4):
+            scene.pose(robot.home + [turn, 0.0])
+            pictures.append(scene.draw("left").astype(int))
+        scene.close()
+    for box_drawn, hull_drawn in ((pictures[0], pictures[2]), (pictures[1], pictures[3])):
+        assert (box_drawn != BACKGROUND).any(axis=2).mean() > 0.05
+        assert np.abs(box_drawn - hull_drawn).max() <= 2
+    assert (pictures[2] != pictures[3]).any()
 
 
 def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_port: int) -> None:

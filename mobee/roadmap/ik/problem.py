@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.pose import Pose
+from mobee.real_array import real_array
 from mobee.roadmap.ik.costs import term
 from mobee.roadmap.ik.solids import solid_model
 from mobee.roadmap.ik.term import Term
@@ -100,7 +101,7 @@ def named(terms: Sequence[Term]) -> dict[str, Term]:
 def _start(model: Model, start: ArrayLike | None) -> Array:
     if start is None:
         return model.robot.home.copy()
-    q = np.array(start, dtype=np.float64)
+    q = real_array("start", start)
     if q.shape != (len(model.robot.motors),) or not np.isfinite(q).all():
         raise InvalidValue(f"start has shape {q.shape}; it must be ({len(model.robot.motors)},) rad, finite, a position for every motor.")
     return q

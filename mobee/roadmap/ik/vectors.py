@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
+from mobee.real_array import real_array
 from mobee.robot.robot import Array
 
 
 def vector(name: str, given: ArrayLike) -> Array:
     """A copy of what was given, (3,); raises InvalidValue if it is not three finite numbers."""
-    found = np.array(given, dtype=np.float64)
+    found = real_array(name, given)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
     return found
@@ -45,7 +46,7 @@ def angle_between(one: Array, other: Array) -> Array:
 
 def rotation(name: str, given: ArrayLike) -> Array:
     """A copy of what was given, (3, 3); raises InvalidValue if it is no rotation."""
-    found = np.array(given, dtype=np.float64)
+    found = real_array(name, given)
     if found.shape != (3, 3) or not np.allclose(found @ found.T, np.eye(3), atol=1e-6) or np.linalg.det(found) < 0.0:
         raise InvalidValue(f"{name} is no rotation: its rows must be a right-handed set of three unit vectors.")
     return found

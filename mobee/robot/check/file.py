@@ -12,14 +12,17 @@ from pathlib import Path
 from mobee.collision.world import World
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.check.finding import SEVERITIES, Finding
+from mobee.robot.check.hulls import hulls
 from mobee.robot.check.robot import check_robot
 from mobee.robot.check.source import source
 from mobee.robot.check.world import check_world
 from mobee.robot.load import ROBOTS, WORLDS, find_file, load_robot, load_world, shipped_robots, shipped_worlds
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.hull import Corners
 from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml_file import is_folder
 from mobee.robot.xml_node import read_xml
+from mobee.robot.xml_versions import WORLD_TAGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +39,13 @@ def check_file(
     *,
     field: float | None = None,
     meshes: Meshes | None = None,
+    corners: Corners | None = None,
     srdf: str | Path | None = None,
+    home: str | None = None,
 ) -> Checked:
     """Everything that is wrong with a shipped robot or world, or with a file of one; errors first.
 
-    `world`: what a robot is also checked against, at home; `field`, `meshes`, `srdf`: of a URDF, as in load_robot.
+    `world`: what a robot is also checked against, at home; the others: of a URDF, as in load_robot.
     Raises RobotFileError, UnknownName or InvalidValue when it cannot be read at all, or not with these options.
     """
     _refuse(name_or_path)
@@ -49,18 +54,24 @@ def check_file(
     content: Robot | World
     if path is None:
         with _listening(said):
-            content = load_robot(name_or_path, field=field, meshes=meshes, srdf=srdf)
+            content = load_robot(name_or_path, field=field, meshes=meshes, corners=corners, srdf=srdf, home=home)
         found = check_robot(content, world)
         file = find_file(name_or_path, ROBOTS, "robot")
-        found += source(read_xml(file)) if file.suffix.lower() != ".urdf" else []
-    elif world is not None or (field, meshes, srdf) != (None, None, None):
-        raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it, fields, meshes or an SRDF.")
+        if file.suffix.lower() != ".urdf":
+            found += source(read_xml(file, repair=True))
+        elif corners != "all" and any(shape.vertices is not None for shape in content.shapes):
+            with _listening([]):
+                exact = load_robot(name_or_path, field=field, meshes=meshes, corners="all", srdf=srdf, home=home)
+            found += hulls(content, exact)
+    elif world is not None or any(option is not None for option in (field, meshes, corners, srdf, home)):
+        raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it and options of a URDF.")
     else:
         with _listening(said):
             content = load_world(path)
-        root = read_xml(path)
+        root = read_xml(path, repair=True)
+        said_of_form = list(source(root))
         lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in root}
-        found = check_world(content, lines) + list(source(root))
+        found = check_world(content, lines) + said_of_form
     return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
 
 
@@ -83,7 +94,7 @@ def world_file(name_or_path: str | Path) -> Path | None:
         return WORLDS / f"{given}.xml"
     if path.suffix.lower() != ".xml" or not path.is_file():
         return None
-    return path if read_xml(path).tag == "world" else None
+    return path if read_xml(path, repair=True).tag in WORLD_TAGS else None
 
 
 @contextmanager

@@ -1,13 +1,17 @@
-"""Convex hulls of meshes, with few vertices and never smaller than the mesh."""
+"""Convex hulls of meshes, exact or with few corners, and never smaller than the mesh."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 
-MOST_VERTICES = 64
+Corners = int | Literal["all"]  # of the hull of a mesh, at most; "all": the exact hull
+CORNERS = 64
+FEWEST = 8  # a hull is reduced from the box around it
 THINNEST = 1e-4  # m, half the thickness that a flat mesh is given
 FLAT = 1e-7  # m, the thickness below which a mesh is flat
 SLIM = 1e-5  # the same, and half of what it is given, as a part of the mesh's length
@@ -15,11 +19,11 @@ MARGIN = 1e-7  # of the mesh's size, so that neither rounding nor merging leaves
 NEAR = 1e-8  # of the mesh's size between corners that are one
 
 
-def convex_hull(points: Array) -> Array:
-    """Vertices (v, 3) of a convex body with at most 64 vertices that holds all `points`, v >= 4.
+def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
+    """Vertices (v, 3) of a convex body with at most that many corners that holds all `points`, v >= 4.
 
-    It is the exact hull where that has no more vertices; else planes of the hull's facets are intersected, most
-    protruding corner first, until 64 vertices are reached. Flat meshes are given a thickness of 0.2 mm.
+    It is the exact hull where that has no more vertices, or where `corners` is "all"; else planes of the hull's facets are
+    intersected, most protruding corner first, until no more corners are allowed. Flat meshes are given a thickness of 0.2 mm.
     Raises InvalidValue for points that no hull can be computed of.
     """
     from scipy.spatial import ConvexHull, QhullError  # 0.3 s, and only robots with meshes need it
@@ -28,7 +32,9 @@ def convex_hull(points: Array) -> Array:
     local = _thickened(points - middle)
     try:
         hull = ConvexHull(local)
-        vertices = local[hull.vertices] if len(hull.vertices) <= MOST_VERTICES else _enclosing(local[hull.vertices], hull.equations)
+        vertices = local[hull.vertices]
+        if corners != "all" and len(vertices) > corners:
+            vertices = _enclosing(vertices, hull.equations, corners)
     except QhullError as error:
         raise InvalidValue(f"the points have no convex hull ({str(error).splitlines()[0]})") from error
     hull_vertices: Array = vertices + middle
@@ -61,8 +67,8 @@ def _thickened(points: Array) -> Array:
     return points
 
 
-def _enclosing(vertices: Array, planes: Array) -> Array:
-    """Vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
+def _enclosing(vertices: Array, planes: Array, most: int) -> Array:
+    """At most that many vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
     from scipy.spatial import HalfspaceIntersection
 
     inside = vertices.mean(axis=0)
@@ -73,7 +79,7 @@ def _enclosing(vertices: Array, planes: Array) -> Array:
     best = None
     while True:
         corners = _merged(HalfspaceIntersection(chosen, inside).intersections, NEAR * size)
-        if best is not None and len(corners) > MOST_VERTICES:
+        if best is not None and len(corners) > most:
             return best
         best = corners
         protruding = corners @ planes[:, :3].T + planes[:, 3]  # (corners, planes) m

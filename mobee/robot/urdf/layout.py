@@ -10,7 +10,7 @@ import numpy as np
 
 from mobee.robot.robot import Array, Joint, Marker
 from mobee.robot.urdf.frames import IDENTITY, Frame, child, triple
-from mobee.robot.urdf.motors import joint_limits
+from mobee.robot.urdf.motors import stated_limits
 from mobee.robot.urdf.tree import Tree, UrdfJoint
 from mobee.robot.xml_node import Node
 from mobee.robot.xml_volume import Z, turn_about
@@ -56,7 +56,7 @@ def _locked(joint: UrdfJoint) -> Frame | None:
     """Where a joint whose limits leave it one place holds what it carries; None for one that moves."""
     if child(joint.node, "mimic") is not None or child(joint.node, "limit") is None:
         return None
-    low, high = joint_limits(joint)
+    low, high = stated_limits(joint)
     if high > low:
         return None
     joint.node.warn(f"joint {joint.name!r} has lower = upper = {low:g}, so it is fixed there")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mobee.errors import RobotFileError
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Ints
 from mobee.robot.urdf.mesh_dae import read_dae
 
 LARGEST = 50_000_000  # bytes
@@ -17,11 +17,13 @@ FARTHEST = 1e6  # m
 STL_HEADER, STL_FACET = 84, 50  # bytes of a binary STL: header and count, then each facet
 FACETS = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 OBJ_VERTICES = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+OBJ_FACES = re.compile(rb"^[ \t]*f[ \t]+([^\r\n]+)", re.MULTILINE)
 
 
 def read_mesh(path: Path) -> Array:
-    """All points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
+    """The points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
 
+    They are the corners of its faces; where a file has none, all its points.
     Raises RobotFileError with the remedy for what cannot be read, is no mesh, or holds no points.
     """
     kind = path.suffix.lower()
@@ -59,8 +61,23 @@ def _stl_facets(content: bytes, facets: int) -> Array:
 
 
 def _obj(path: Path) -> Array:
-    content = _content(path)
-    return _numbers(path, OBJ_VERTICES.findall(content), len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE)))
+    content = _content(path).replace(b"\\\n", b" ")  # a line may go on in the next
+    points = _numbers(path, OBJ_VERTICES.findall(content), len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE)))
+    corners = _obj_corners(path, content)
+    if not len(corners) or corners[0] < 0:  # counted back from the face: rare, and all points hold more, not less
+        return points
+    if corners[0] == 0 or corners[-1] > len(points):
+        raise RobotFileError(f"{path}: a face names a vertex beyond the {len(points)} that there are. Export the mesh again.")
+    return points[corners - 1]
+
+
+def _obj_corners(path: Path, content: bytes) -> Ints:
+    """The vertices that faces name, sorted; what no face names, decorates."""
+    named = b" ".join(OBJ_FACES.findall(content)).split()
+    try:
+        return np.unique(np.array([word.partition(b"/")[0] for word in named], dtype=np.bytes_).astype(np.intp))
+    except ValueError as error:
+        raise RobotFileError(f"{path}: a face is no list of vertices ({error}). Export the mesh again.") from error
 
 
 def _numbers(path: Path, words: list[tuple[bytes, bytes, bytes]], vertices: int) -> Array:

@@ -13,7 +13,7 @@ from typing import NoReturn
 import numpy as np
 
 from mobee.errors import RobotFileError
-from mobee.robot.robot import Array
+from mobee.robot.robot import Array, Ints
 from mobee.robot.xml_file import LineHandler, parse_xml
 from mobee.robot.xml_volume import turn_about
 
@@ -21,7 +21,8 @@ DEEPEST = 100
 MOST_ELEMENTS = 50_000
 MOST_POINTS = 2_000_000  # a scene may place one geometry many times
 TRANSFORMS = ("matrix", "translate", "rotate", "scale")
-TEXTS = ("float_array", *TRANSFORMS)  # elements whose text is needed
+TEXTS = ("float_array", "p", *TRANSFORMS)  # elements whose text is needed
+FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 
 
 @dataclass(slots=True, eq=False)
@@ -71,7 +72,7 @@ class _Builder(LineHandler):
 
 
 def read_dae(path: Path) -> Array:
-    """All points (v, 3) in [m] of the geometries that the scene of a COLLADA file shows; raises RobotFileError."""
+    """The points (v, 3) in [m] of the geometries that the scene of a COLLADA file shows; raises RobotFileError."""
     builder = _Builder(path)
     parse_xml(path, builder)
     root = builder.root
@@ -82,20 +83,46 @@ def read_dae(path: Path) -> Array:
 
 
 def _points(path: Path, geometry: _Element) -> Array:
+    """The points that its faces have as corners, for one array of points may serve many geometries; all where it has no faces."""
     sources = {source.attributes.get("id", ""): source for source in geometry.all("source")}
-    names = [
-        given.attributes.get("source", "").removeprefix("#")
-        for vertices in geometry.all("vertices")
-        for given in vertices.all("input")
-        if given.attributes.get("semantic") == "POSITION"
-    ]
     arrays = []
-    for name in names:
-        if name not in sources or not sources[name].all("float_array"):
-            _fail(path, geometry, f"its positions {name!r} are missing", "Export the mesh again")
-        array = sources[name].all("float_array")[0]
-        arrays.append(_numbers(path, array, array.text, 3).reshape(-1, 3))
+    for vertices in geometry.all("vertices"):
+        corners = _corners(path, geometry, vertices.attributes.get("id", ""))
+        for given in vertices.all("input"):
+            if given.attributes.get("semantic") != "POSITION":
+                continue
+            name = given.attributes.get("source", "").removeprefix("#")
+            if name not in sources or not sources[name].all("float_array"):
+                _fail(path, geometry, f"its positions {name!r} are missing", "Export the mesh again")
+            array = sources[name].all("float_array")[0]
+            points = _numbers(path, array, array.text, 3).reshape(-1, 3)
+            if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
+                _fail(path, geometry, f"a face names a point beyond the {len(points)} of {name!r}", "Export the mesh again")
+            arrays.append(points[corners] if len(corners) else points)
     return np.vstack([np.empty((0, 3)), *arrays])
+
+
+def _corners(path: Path, geometry: _Element, vertices: str) -> Ints:
+    """The numbers of the points that faces name, of those that the element <vertices> of that id stands for."""
+    found = [np.empty(0, dtype=np.intp)]
+    for faces in (element for tag in FACES for element in geometry.all(tag)):
+        inputs = [element for element in faces.children if element.tag == "input"]
+        offsets = [_offset(path, element) for element in inputs]
+        for given, offset in zip(inputs, offsets, strict=True):
+            if given.attributes.get("semantic") != "VERTEX" or given.attributes.get("source", "").removeprefix("#") != vertices:
+                continue
+            for listed in faces.all("p"):
+                if listed.text.strip():
+                    numbers = _numbers(path, listed, listed.text, max(offsets) + 1)
+                    found.append(numbers[offset :: max(offsets) + 1].astype(np.intp))
+    return np.unique(np.concatenate(found))
+
+
+def _offset(path: Path, given: _Element) -> int:
+    text = given.attributes.get("offset", "0").strip()
+    if not (text.isascii() and text.isdecimal() and len(text) < 4):
+        _fail(path, given, f"offset {text[:20]!r} is not a whole number", "Export the mesh again")
+    return int(text)
 
 
 def _placed(path: Path, root: _Element, shapes: dict[str, Array]) -> list[Array]:

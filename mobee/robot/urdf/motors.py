@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import copysign, inf, isinf, pi
 
 import numpy as np
 
 from mobee.robot.motor_units import angle_unit, outside_zones
 from mobee.robot.robot import Array, Motor
 from mobee.robot.urdf.frames import FARTHEST, bounded, child
-from mobee.robot.urdf.tree import UrdfJoint
+from mobee.robot.urdf.tree import UrdfJoint, read_name
 from mobee.robot.xml_node import Node, listed, nearest
 
 LEAST = 1e-6  # of a factor between a joint and its motor
+TURN = 2.0 * pi  # rad, of a joint without limits
+SLIDE = 2.0  # m, of a prismatic joint without limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +67,60 @@ def _multiplier(mimic: Node) -> float:
 
 
 def joint_limits(joint: UrdfJoint) -> Array:
-    """The interval (2,) of a joint in [rad] or [m]; a continuous joint gets one turn, for a motor has limits here."""
+    """The interval (2,) of a joint in [rad] or [m], finite, for a motor has limits here.
+
+    A joint without limits gets a turn, or 2 m, about zero; where one limit is missing the interval is as long and ends at the other.
+    """
+    low, high = stated_limits(joint).tolist()
+    span = SLIDE if joint.kind == "prismatic" else TURN
+    if low == -inf and high == inf:
+        return np.array([-span / 2.0, span / 2.0])
+    return np.array([low if low > -inf else high - span, high if high < inf else low + span])
+
+
+def stated_limits(joint: UrdfJoint) -> Array:
+    """The interval (2,) in [rad] or [m] that the file gives a joint, infinite where it states no limit.
+
+    A limit farther than 1e6 is none, and both are none where lower is above upper, which is how files for PyBullet write it.
+    """
     limit = child(joint.node, "limit")
     if joint.kind == "continuous":
-        return np.array([-np.pi, np.pi])
+        return np.array([-inf, inf])
     if limit is None or not {"lower", "upper"} & set(limit.attributes):
         if joint.kind == "prismatic":
             joint.node.fail("limit", "a prismatic joint without limits", 'Add <limit lower="0" upper="0.1" .../> in metres')
-        joint.node.warn(f'joint {joint.name!r} has no limits; -pi to pi is taken. Write <limit lower= upper=>, or type="continuous"')
-        return np.array([-np.pi, np.pi])
-    low, high = bounded(limit, "lower", 0.0), bounded(limit, "upper", 0.0)
-    if low > high:
-        limit.fail("lower", f"{low:g} is above upper {high:g}", 'Swap the two, or write type="continuous" for a joint without limits')
+        return np.array([-inf, inf])
+    low, high = _or_infinite(limit, "lower"), _or_infinite(limit, "upper")
+    if low > high or (isinf(low) and low == high):
+        return np.array([-inf, inf])
     return np.array([low, high])
+
+
+def _or_infinite(limit: Node, name: str) -> float:
+    """A number of a <limit>, 0 where it is left out; infinite where it is farther, or faster, than any joint goes."""
+    try:
+        value = float(limit.optional(name))
+    except ValueError:
+        value = 0.0
+    return copysign(inf, value) if abs(value) > FARTHEST else limit.number(name, 0.0)
+
+
+def _warn_of_free(joint: UrdfJoint) -> None:
+    """Say which interval is taken for a joint that should have limits and states none."""
+    limit = child(joint.node, "limit")
+    if joint.kind == "continuous" or np.isfinite(stated_limits(joint)).all():
+        return
+    slides = joint.kind == "prismatic"
+    low, high = joint_limits(joint) if slides else np.rad2deg(joint_limits(joint))
+    taken = f"{low:.4g} to {high:.4g} {'m' if slides else 'deg'} is taken"
+    if limit is None or not {"lower", "upper"} & set(limit.attributes):
+        joint.node.warn(f'joint {joint.name!r} has no limits; {taken}. Write <limit lower= upper=>, or type="continuous"')
+        return
+    given = f"lower={limit.optional('lower') or '0'}, upper={limit.optional('upper') or '0'}"
+    remedy = "If it has limits, write them, lower before upper" + ("" if slides else '; else write type="continuous"')
+    stated = stated_limits(joint)
+    lacks = "limits" if np.isinf(stated).all() else "a lower limit" if np.isinf(stated[0]) else "an upper limit"
+    limit.warn(f"joint {joint.name!r} has {given}, so it is read as one without {lacks}; {taken}. {remedy}")
 
 
 def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
@@ -85,10 +129,11 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
     In units of the joint: [rad], or [m] if it is prismatic. Home is 0, or what is nearest to it outside the limit zones.
     """
     limits = joint_limits(master)
+    _warn_of_free(master)
     for _, joint, drive in driven:
-        if joint is master or joint.kind == "continuous" or child(joint.node, "limit") is None:
+        if joint is master or child(joint.node, "limit") is None:
             continue
-        ends = np.sort((joint_limits(joint) - drive.offset) / drive.scale)
+        ends = np.sort((stated_limits(joint) - drive.offset) / drive.scale)
         narrowed = np.array([max(limits[0], ends[0]), min(limits[1], ends[1])])
         if narrowed[1] - narrowed[0] < 1e-6:
             joint.node.warn(f"the limits of {joint.name!r} leave {master.name!r}, which it mimics, no room, so they are ignored")
@@ -105,8 +150,8 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
     limit = child(master.node, "limit")
     if limit is None:
         return motor
-    velocity, effort = bounded(limit, "velocity", 0.0), limit.number("effort", 0.0)
-    if velocity > 0:  # exporters write 0 for what they do not know
+    velocity, effort = _or_infinite(limit, "velocity"), limit.number("effort", 0.0)
+    if 0 < velocity < inf:  # exporters write 0 for what they do not know
         motor = replace(motor, max_velocity=velocity)
     return replace(motor, max_torque=effort) if effort > 0 else motor
 
@@ -123,7 +168,7 @@ def _extended(master: UrdfJoint, motor: Motor) -> Motor:
     limits = np.sort((motor.limits - offset) / scale)
     return replace(
         motor,
-        name=note.optional("motor") or motor.name,
+        name=read_name(note, "motor") if note.optional("motor") else motor.name,
         limits=limits,
         home=float(np.clip((motor.home - offset) / scale, *limits)),
         joints=tuple((index, factor * scale, factor * offset + shift) for index, factor, shift in motor.joints),

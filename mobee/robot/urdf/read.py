@@ -10,12 +10,14 @@ import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
+from mobee.robot.urdf.hull import CORNERS, FEWEST, Corners
 from mobee.robot.urdf.inertial import read_bodies
 from mobee.robot.urdf.layout import Skeleton, lay_out, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
 from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
 from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown
-from mobee.robot.urdf.srdf import Srdf, read_parts, read_srdf
+from mobee.robot.urdf.srdf import Srdf, find_srdf, read_parts, read_srdf
+from mobee.robot.urdf.states import Home, choose_home, homed
 from mobee.robot.urdf.tree import Tree, UrdfJoint, read_tree
 from mobee.robot.xml_ignore import without_ignored
 from mobee.robot.xml_node import Node, read_xml
@@ -26,12 +28,16 @@ class UrdfOptions:
     """How a URDF is to be read.
 
     `field`: how much farther than the body the fields reach, in [m]; None: no fields. `meshes`: the convex hull of a mesh
-    ("hull"), or the smallest sphere, capsule, cylinder or box around it ("bounding"). `srdf`: the SRDF file, else the one beside.
+    ("hull"), or the smallest sphere, capsule, cylinder or box around it ("bounding"). `corners`: how many a hull may have, from 8
+    on ("all": the exact hull). `srdf`: the SRDF file, else the one that `find_srdf` finds. `home`: the name of a <group_state>, or
+    "zero"; None: as `choose_home` says.
     """
 
     field: float | None = None
     meshes: Meshes = "hull"
+    corners: Corners = CORNERS
     srdf: str | Path | None = None
+    home: str | None = None
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
@@ -49,7 +55,8 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
     skeleton = lay_out(tree)
     if not skeleton.moving:
         root.fail("joint", "no joint moves", "A robot needs a revolute, continuous or prismatic joint; draw fixed things in a world file")
-    return _finish(root, path, tree, skeleton, _find_srdf(path, options, tree), options)
+    name = root.optional("name") or path.stem
+    return _finish(root, name, tree, skeleton, _read_srdf(path, name, options, tree), options)
 
 
 def _check(options: UrdfOptions) -> None:
@@ -57,20 +64,23 @@ def _check(options: UrdfOptions) -> None:
         raise InvalidValue(f"field={options.field!r} is no distance for a field. Give metres, such as field=0.03.")
     if options.meshes not in ("hull", "bounding"):
         raise InvalidValue(f'meshes={options.meshes!r} is unknown. Valid: "hull", "bounding".')
+    whole = isinstance(options.corners, int) and not isinstance(options.corners, bool)
+    if options.corners != "all" and not (whole and options.corners >= FEWEST):
+        raise InvalidValue(f'corners={options.corners!r} is no number of corners. Give a whole number from {FEWEST} on, or "all".')
 
 
-def _find_srdf(path: Path, options: UrdfOptions, tree: Tree) -> Srdf:
-    beside = path.with_suffix(".srdf")
-    if options.srdf is not None:
-        return read_srdf(Path(options.srdf), tree)
-    return read_srdf(beside, tree) if beside.is_file() else Srdf()
+def _read_srdf(path: Path, name: str, options: UrdfOptions, tree: Tree) -> Srdf:
+    found = find_srdf(path, name) if options.srdf is None else Path(options.srdf)
+    return Srdf() if found is None else read_srdf(found, tree)
 
 
-def _finish(root: Node, path: Path, tree: Tree, skeleton: Skeleton, srdf: Srdf, options: UrdfOptions) -> Robot:
-    name = root.optional("name") or path.stem
+def _finish(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, options: UrdfOptions) -> Robot:
     drives = read_drives(tree.joints, skeleton.moving)
-    motors, parts = _motors(tree, skeleton, srdf, drives)
+    home = choose_home(srdf.states, options.home, srdf.path)
+    motors, parts = _motors(tree, skeleton, srdf, drives, home)
     where = _where(root, name, tree, skeleton, srdf, parts)
+    if home.state:
+        where["home", home.name] = _place(next(iter(home.state.values()))[0])
     for motor in motors:
         master = drives[skeleton.moving[motor.joints[0][0]].name].master
         where["motor", motor.name] = _place(tree.joints[master].node)
@@ -108,6 +118,8 @@ def _own_fields(notes: list[Node], parts: dict[str, Part], srdf: Srdf) -> OwnFie
 
 def _where(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, parts: dict[str, Part]) -> dict[tuple[str, str], str]:
     where = {("robot", name): _place(root)}
+    if srdf.path is not None:
+        where["srdf", name] = f"{srdf.path}:1"
     where |= {("part", part): _place(srdf.groups[part][0] if part in srdf.groups else root) for part in parts}
     where |= {("joint", joint.name): _place(joint.node) for joint in skeleton.moving}
     return where | {("link", link): _place(tree.links[link]) for link in skeleton.links}
@@ -117,7 +129,7 @@ def _place(node: Node) -> str:
     return f"{node.file}:{node.line}"
 
 
-def _motors(tree: Tree, skeleton: Skeleton, srdf: Srdf, drives: dict[str, Drive]) -> tuple[tuple[Motor, ...], dict[str, Part]]:
+def _motors(tree: Tree, skeleton: Skeleton, srdf: Srdf, drives: dict[str, Drive], home: Home) -> tuple[tuple[Motor, ...], dict[str, Part]]:
     driven: dict[str, list[tuple[int, UrdfJoint, Drive]]] = {}
     for index, joint in enumerate(skeleton.moving):
         driven.setdefault(drives[joint.name].master, []).append((index, joint, drives[joint.name]))
@@ -127,26 +139,12 @@ def _motors(tree: Tree, skeleton: Skeleton, srdf: Srdf, drives: dict[str, Drive]
         start = len(motors)
         for name in masters:
             master = tree.joints[name]
-            motor = _homed(read_motor(master, driven[name], part), srdf, skeleton.moving)
+            motor = homed(read_motor(master, driven[name], part), home, skeleton.moving)
             if motor.name in motors:
                 master.node.fail("name", f"a second motor {motor.name!r}", "Rename one of the two")
             motors[motor.name] = motor
         parts[part] = Part(part, tuple(motors)[start:], start)
     return tuple(motors.values()), parts
-
-
-def _homed(motor: Motor, srdf: Srdf, moving: list[UrdfJoint]) -> Motor:
-    """The motor with the home of the SRDF, which speaks of joints."""
-    for index, scale, offset in motor.joints:
-        if moving[index].name not in srdf.home:
-            continue
-        node, value = srdf.home[moving[index].name]
-        home = (value - offset) / scale
-        low, high = motor.limits
-        if not low - 1e-6 <= home <= high + 1e-6:
-            node.fail("value", f"{value:g} puts {motor.name!r} outside of {low:g} .. {high:g}", "Choose a home within the limits")
-        return replace(motor, home=float(np.clip(home, low, high)))
-    return motor
 
 
 def _limited(joints: list[Joint], motors: tuple[Motor, ...]) -> Iterator[Joint]:
@@ -168,7 +166,7 @@ def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], option
     """What is on the base belongs to the part of the first joint."""
     part_of = {joint + 1: motor.part for motor in motors for joint, _, _ in motor.joints}
     part_of[0] = part_of[1]
-    reader = ShapeReader(options.meshes, {motor.part for motor in motors})
+    reader = ShapeReader(options.meshes, options.corners, {motor.part for motor in motors})
     body = _Body()
     taken: dict[str, int] = {}
     for link in sorted(skeleton.index, key=skeleton.index.__getitem__):

@@ -13,7 +13,7 @@ from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.robot import Array, Shape
 from mobee.robot.urdf.bounding import smallest, smallest_capsule
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
-from mobee.robot.urdf.hull import convex_hull
+from mobee.robot.urdf.hull import Corners, convex_hull
 from mobee.robot.urdf.mesh import read_mesh
 from mobee.robot.urdf.mesh_path import find_mesh
 from mobee.robot.xml_body import MOST_SHAPES
@@ -40,6 +40,7 @@ class ShapeReader:
     """Reads the shapes of one robot; each mesh file is opened once."""
 
     meshes: Meshes
+    corners: Corners
     parts: Collection[str]
     known: dict[tuple[Path, tuple[float, ...]], Array] = field(default_factory=dict)
     count: int = 0
@@ -103,7 +104,7 @@ class ShapeReader:
                 extent = float(np.ptp(points, axis=0).max())
                 form.fail("scale", f"the mesh is {extent:g} m long", "Correct the scale: URDF counts in metres")
             try:
-                self.known[key] = convex_hull(points)
+                self.known[key] = convex_hull(points, self.corners)
             except InvalidValue as error:
                 form.fail("filename", str(error), "Export the mesh again, or draw a box or cylinder instead")
         vertices = self.known[key]

@@ -1,19 +1,20 @@
-"""What an SRDF file says of a robot: pairs of links that need no test, groups of joints, and where home is."""
+"""What an SRDF file says of a robot: pairs of links that need no test, groups of joints, and poses by name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mobee.robot.urdf.frames import bounded
 from mobee.robot.urdf.motors import Drive
-from mobee.robot.urdf.tree import Tree
+from mobee.robot.urdf.states import State, read_state
+from mobee.robot.urdf.tree import Tree, UrdfJoint
 from mobee.robot.xml_node import Node, nearest, read_xml, shown
 
 NamePair = frozenset[str]
 MOST_GROUPS = 200
 MOST_COMPARED = 100  # names that a misspelt one is compared with
+FREE_BASE = "root_joint"  # Pinocchio's name for the joint that lets a base move freely, in files without a <virtual_joint>
 
 
 @dataclass(slots=True, eq=False)
@@ -23,7 +24,19 @@ class Srdf:
     disabled: dict[NamePair, str] = field(default_factory=dict)  # two links -> reason, file and line
     enabled: set[NamePair] = field(default_factory=set)
     groups: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)  # joints, in the order of the file
-    home: dict[str, tuple[Node, float]] = field(default_factory=dict)  # joint -> rad or m
+    states: dict[str, State] = field(default_factory=dict)  # <group_state> by name; those of several groups with one name are one
+    path: Path | None = None  # None: the robot has no SRDF
+
+
+def find_srdf(urdf: Path, robot: str) -> Path | None:
+    """The SRDF of a URDF: named as the file, or else as the robot in it, beside the file or in ../srdf; case does not count."""
+    folders = (urdf.resolve().parent, urdf.resolve().parent.parent / "srdf")
+    for name in dict.fromkeys((urdf.stem.lower(), robot.lower())):
+        for folder in folders:
+            found = sorted(path for path in folder.glob("*.[sS][rR][dD][fF]") if path.stem.lower() == name and path.is_file())
+            if found:
+                return found[0]
+    return None
 
 
 def read_srdf(path: Path, tree: Tree) -> Srdf:
@@ -31,12 +44,13 @@ def read_srdf(path: Path, tree: Tree) -> Srdf:
     root = read_xml(path)
     if root.tag != "robot":
         root.fail("root element", "this is not an SRDF file", "Its root is <robot name=...>")
-    srdf = Srdf()
+    srdf = Srdf(path=path)
     groups = {node.text("name"): node for node in root if node.tag == "group"}
     if len(groups) > MOST_GROUPS:
         root.fail("group", f"has {len(groups)} groups", f"Write one group a part; at most {MOST_GROUPS} can be read")
+    virtual = {FREE_BASE, *(node.text("name") for node in root if node.tag == "virtual_joint")} - set(tree.joints)
     for name, node in groups.items():
-        joints = dict.fromkeys(_joints_of(node, groups, tree))
+        joints = dict.fromkeys(_joints_of(node, groups, tree, virtual))
         srdf.groups[name] = (node, tuple(joints))
     silent = [name for node in root if node.tag == "disable_default_collisions" for name in _known(node, "link", tree.links)]
     for name in silent:
@@ -55,8 +69,8 @@ def read_srdf(path: Path, tree: Tree) -> Srdf:
             srdf.disabled.pop(pair, None)
             srdf.enabled.add(pair)
     for node in root:
-        if node.tag == "group_state" and node.text("name").lower() == "home":
-            srdf.home |= {name: (inner, bounded(inner, "value")) for inner in node for name in _known(inner, "name", tree.joints)}
+        if node.tag == "group_state":
+            srdf.states.setdefault(node.text("name"), {}).update(read_state(node, tree.joints, virtual))
     return srdf
 
 
@@ -70,14 +84,14 @@ def _known(node: Node, attribute: str, valid: Mapping[str, object]) -> Iterable[
     return ()
 
 
-def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree) -> Iterable[str]:
-    """The joints of a group, those of its subgroups included; a group that holds itself is gone through once."""
+def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree, virtual: Collection[str]) -> Iterable[str]:
+    """The joints of a group without virtual ones, those of its subgroups included; a group that holds itself is gone through once."""
     above = {joint.child: joint for joint in tree.joints.values()}
     seen = {group.text("name")}
     stack = list(reversed(group.children))
     while stack:
         node = stack.pop()
-        if node.tag == "joint":
+        if node.tag == "joint" and node.optional("name") not in virtual:
             yield from _known(node, "name", tree.joints)
         elif node.tag == "link":
             yield from (above[name].name for name in _known(node, "name", tree.links) if name in above)
@@ -91,16 +105,25 @@ def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree) -> Iterable[
 
 
 def _chain(node: Node, tree: Tree) -> list[str]:
+    """The joints between two links, in order; from one branch to another the way leads through the link that carries both."""
+    ends = [name for end in ("base_link", "tip_link") for name in _known(node, end, tree.links)]
+    if len(ends) != 2:
+        return []
+    base, tip = ends
+    up, down = _to_root(base, tree), _to_root(tip, tree)
+    while up and down and up[-1] is down[-1]:
+        up.pop()
+        down.pop()
+    return [joint.name for joint in (*up, *reversed(down))]
+
+
+def _to_root(link: str, tree: Tree) -> list[UrdfJoint]:
     above = {joint.child: joint for joint in tree.joints.values()}
-    base, tip = (node.choice(end, node.text(end), tree.links, "link") for end in ("base_link", "tip_link"))
-    joints = []
-    now = tip
-    while now != base:
-        if now not in above:
-            node.fail("base_link", f"{base!r} does not carry {tip!r}", "Name a link between the root and tip_link")
-        joints.append(above[now].name)
-        now = above[now].parent
-    return joints[::-1]
+    way: list[UrdfJoint] = []
+    while link in above:
+        way.append(above[link])
+        link = above[link].parent
+    return way
 
 
 def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:

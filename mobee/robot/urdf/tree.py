@@ -10,10 +10,11 @@ import numpy as np
 
 from mobee.robot.robot import Array
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
-from mobee.robot.xml_node import Node, listed, nearest
+from mobee.robot.xml_node import Node, listed, nearest, shown
 
 MOVING = ("revolute", "continuous", "prismatic")
 MOST_LINKS = 1000
+LONGEST_NAME = 200
 JOINT_TAGS = ("origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller", "mobee")
 FREE = {
     "floating": "moves freely in space, which this library has no joint for",
@@ -58,18 +59,28 @@ def read_tree(robot: Node) -> Tree:
     joints: dict[str, UrdfJoint] = {}
     for node in robot:
         if node.tag == "link":
-            if node.text("name") in links:
-                _twice(node, links[node.text("name")])
-            links[node.text("name")] = node
+            name = read_name(node)
+            if name in links:
+                _twice(node, links[name])
+            links[name] = node
         elif node.tag == "joint":
-            if node.text("name") in joints:
-                _twice(node, joints[node.text("name")].node)
-            joints[node.text("name")] = _read_joint(node)
+            name = read_name(node)
+            if name in joints:
+                _twice(node, joints[name].node)
+            joints[name] = _read_joint(node)
     if not links:
         robot.fail("link", "the robot has no link", 'Add <link name="base"/>, or check that this is the file that xacro wrote')
     if len(links) > MOST_LINKS:
         robot.fail("link", f"has {len(links)} links", f"Remove what does not move: at most {MOST_LINKS} can be read")
     return _connect(robot, links, joints)
+
+
+def read_name(node: Node, attribute: str = "name") -> str:
+    """A name that a person can read; raises RobotFileError where it is empty, blank, or longer than LONGEST_NAME."""
+    name = node.text(attribute)
+    if len(name) > LONGEST_NAME:
+        node.fail(attribute, f"{shown(name)!r} has {len(name)} letters", f"Give it a name of at most {LONGEST_NAME}")
+    return name
 
 
 def _twice(node: Node, first: Node) -> NoReturn:

@@ -12,7 +12,12 @@ def test_sizes_are_kept_in_the_order_given():
     assert mobee.capsule(0.1, 0.5).kind == "capsule"
 
 
-@pytest.mark.parametrize("length", [0.0, -0.1, float("nan"), float("inf"), "a", None, True, [1.0]])
+@pytest.mark.parametrize("length", [0.0, -0.1, float("nan"), float("inf"), 1e160, 1e-10, "a", None, True, [1.0]])
 def test_a_length_that_is_none_is_refused_by_name(length):
     with pytest.raises(mobee.InvalidValue, match="cylinder: height"):
         mobee.cylinder(0.1, length)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e5, 3])
+def test_lengths_from_a_nanometre_to_a_hundred_kilometres_are_kept(length):
+    assert mobee.sphere(length).size == (length,)

@@ -67,6 +67,8 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
         ({"position": (0.0, 0.0)}, "three finite numbers"),
         ({"position": (0.0, 0.0, float("nan"))}, "three finite numbers"),
         ({"position": "here"}, "three finite numbers"),
+        ({"position": (0.0, -1.1e6, 0.0)}, "each within 1e\\+06"),
+        ({"position": np.zeros(3, dtype=complex)}, "three finite numbers"),
         ({"position": [[0.0, 0.0], [0.0]]}, "three finite numbers"),
         ({"rotation": 2 * np.eye(3)}, "rotation matrix"),
         ({"rotation": np.full((3, 3), np.nan)}, "rotation matrix"),
@@ -82,9 +84,9 @@ def test_what_is_no_pose_role_or_color_is_refused(world, given, complaint):
     assert list(world.objects) == ["cup"]
 
 
-@pytest.mark.parametrize("size", [(float("nan"),), (float("inf"),), (0.0,), (-0.1,), (), (0.1, 0.1)])
+@pytest.mark.parametrize("size", [(float("nan"),), (float("inf"),), (0.0,), (-0.1,), (), (0.1, 0.1), (1e160,), (1e-10,), ("1",)])
 def test_a_volume_without_a_finite_size_is_refused(world, size):
-    with pytest.raises(mobee.InvalidValue, match="positive lengths"):
+    with pytest.raises(mobee.InvalidValue, match="it must be 1 lengths of 1e-09 to 100000 m"):
         world.add("thing", Geometry("sphere", size))
     assert list(world.objects) == ["cup"]
 
@@ -119,3 +121,11 @@ def test_a_name_is_text_that_is_not_empty(world, name):
 def test_what_is_no_shape_is_refused(world, shape):
     with pytest.raises(mobee.InvalidValue, match="must be a Geometry, as sphere"):
         world.add("lamp", shape)
+
+
+def test_what_is_moved_or_attached_stays_near_enough(world):
+    with pytest.raises(mobee.InvalidValue, match="each within"):
+        world.move("cup", position=(1e7, 0.0, 0.0))
+    with pytest.raises(mobee.InvalidValue, match="each within"):
+        world.attach("cup", "hand", ((0.0, 0.0, 1e160), np.eye(3)))
+    assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])

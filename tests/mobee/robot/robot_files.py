@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-HEAD = '<ZeroPositionKinematicTree version="1.0" robotName="toy">'
+HEAD = '<ZeroPositionKinematicTree version="2.0" robotName="toy">'
 TAIL = "</ZeroPositionKinematicTree>"
 
 

@@ -71,13 +71,13 @@ def test_links_and_joints_carry_their_skeleton(robot: Robot) -> None:
 
 
 def test_volumes_stand_where_their_attributes_say(robot: Robot) -> None:
-    end = np.array([0.2, 0, 0.1])
+    start = np.array([0, 0, 0.1])  # of the link in which they stand
     block, ball, wedge = (shape(robot, name) for name in ("block", "ball", "wedge"))
     assert (block.size, block.role, ball.role) == ((0.1, 0.2, 0.3), "solid", "field")
-    np.testing.assert_allclose(block.position, [0.1, 0.2, 0.4])
+    np.testing.assert_allclose(block.position, [0.1, 0.2, 0.3])
     np.testing.assert_allclose(block.rotation[:, 1], [1, 0, 0], atol=1e-12)  # height along (hx, hy, hz)
-    np.testing.assert_allclose(ball.position, end + [0.1, 0.2, 0.3])
-    np.testing.assert_allclose(wedge.position, end + [0.3, 0, 0])
+    np.testing.assert_allclose(ball.position, start + [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(wedge.position, start + [0.3, 0, 0])
     assert wedge.vertices is not None and len(wedge.vertices) == 4
     cylinder, capsule = shape(robot, "can"), shape(robot, "pill")
     assert (cylinder.kind, cylinder.size, cylinder.role) == ("cylinder", (0.1, 0.2), "field")
@@ -88,7 +88,7 @@ def test_volumes_stand_where_their_attributes_say(robot: Robot) -> None:
 
 def test_a_marker_has_a_place_a_normal_and_an_orientation(robot: Robot) -> None:
     tip = robot.markers["tip"]
-    np.testing.assert_allclose(tip.position, [0.3, 0, 0.1])
+    np.testing.assert_allclose(tip.position, [0.1, 0, 0.1])
     np.testing.assert_allclose(tip.normal, [0, 1, 0])
     np.testing.assert_allclose(tip.rotation, np.eye(3), atol=1e-12)
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from mobee.robot.load import load_robot
-from mobee.robot.pairs_2014 import Element, neighbours
+from mobee.robot.pairs_2014 import Element, near_root, neighbours, recorded_neighbours
 from mobee.robot.robot import Robot
 
 
@@ -10,19 +10,35 @@ def bones(count: int, part: str = "arm") -> list[Element]:
     return [Element(-1, "link", "", -1)] + [Element(k, "joint" if k % 2 == 0 else "link", part, -1) for k in range(count)]
 
 
-def test_a_descent_ends_where_a_link_and_a_joint_with_shapes_have_been_passed() -> None:
+def test_a_recorded_descent_ends_where_a_link_and_a_joint_with_shapes_have_been_passed() -> None:
     chain = bones(6)
-    assert {frozenset((1, k)) for k in (2, 3)} <= neighbours(chain, set(range(1, 7)))
-    assert frozenset((1, 4)) not in neighbours(chain, set(range(1, 7)))
-    assert frozenset((1, 4)) in neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears nothing, so the descent goes on
+    assert {frozenset((1, k)) for k in (2, 3)} <= recorded_neighbours(chain, set(range(1, 7)))
+    assert frozenset((1, 4)) not in recorded_neighbours(chain, set(range(1, 7)))
+    assert frozenset((1, 4)) in recorded_neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears nothing, so the descent goes on
+
+
+def test_a_descent_goes_on_past_elements_of_the_kind_that_it_began_with() -> None:
+    chain = bones(6)  # 1 joint, 2 link, 3 joint, 4 link, 5 joint, 6 link
+    near = neighbours(chain, set(range(1, 7)))
+    assert {frozenset((1, k)) for k in (2, 3)} <= near
+    assert frozenset((1, 4)) not in near
+    assert frozenset((2, 4)) in near
+    assert frozenset((2, 6)) not in near  # joint 5 ended it
+    assert frozenset((1, 4)) in neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears no solid
 
 
 def test_what_hangs_on_the_same_element_is_near_with_what_lies_below_it() -> None:
     root = Element(-1, "link", "", -1)
     elements = [root, Element(0, "link", "a", -1), Element(0, "joint", "b", -1), Element(2, "link", "b", -1), Element(3, "joint", "b", -1)]
-    near = neighbours(elements, {1, 2, 3, 4})
+    near = recorded_neighbours(elements, {1, 2, 3, 4})
     assert {frozenset((1, 2)), frozenset((1, 3))} <= near
     assert frozenset((1, 4)) not in near
+    assert {frozenset((1, 2)), frozenset((1, 3)), frozenset((1, 4))} <= neighbours(elements, {1, 2, 3, 4})
+
+
+def test_the_base_reaches_up_to_the_second_change_between_link_and_joint() -> None:
+    tags = ("joint", "link", "joint", "link", "joint", "link")
+    assert [near_root((-1, 0, 1, 2, 3, 4), tags, index) for index in range(6)] == [True, True, True, True, False, False]
 
 
 def linked(robot: Robot, role: str) -> set[frozenset[str]]:

@@ -49,7 +49,7 @@ def test_a_urdf_becomes_xml_of_the_same_robot(tmp_path: Path, name: str, meshes:
 
 def test_angles_that_are_whole_degrees_are_written_so(tmp_path: Path) -> None:
     text = write_xml(load_robot("icub"), tmp_path / "i.xml").read_text()
-    assert '<motor name="torso_roll" minPos="-30" maxPos="30" home="0" velocity="60" acceleration="600" torque="40" />' in text
+    assert '<motor name="torso_roll" minPos="-30" maxPos="30" home="0" velocity="60" acceleration="600" torque="40"/>' in text
 
 
 def turned(seed: int) -> np.ndarray:
@@ -146,14 +146,24 @@ def test_a_joint_of_two_motors_or_of_none_is_refused_with_a_remedy(tmp_path: Pat
         write_xml(idle, tmp_path / "x.xml")
 
 
-def test_a_tree_too_deep_for_a_file_is_refused(tmp_path: Path) -> None:
-    count = 150
+def chain(count: int) -> Robot:
+    """Links one after the other, each with its motor."""
     joints = tuple(
         Joint(f"j{k}", k, "revolute", np.array([0, 0, 1.0]), np.array([k + 1.0, 0, 0]), np.array([-1.0, 1])) for k in range(count)
     )
     motors = tuple(Motor(f"m{k}", "all", np.array([-1.0, 1]), 0.0, ((k, 1.0, 0.0),)) for k in range(count))
     nothing = np.empty((0, 2), dtype=np.intp)
     links = tuple(f"l{k}" for k in range(count + 1))
-    snake = Robot("snake", links, joints, motors, {"all": Part("all", tuple(m.name for m in motors), 0)}, {}, (), (), nothing, nothing)
-    with pytest.raises(InvalidValue, match="is too deep in the tree: a file holds 200 elements inside each other"):
-        write_xml(snake, tmp_path / "x.xml")
+    return Robot("snake", links, joints, motors, {"all": Part("all", tuple(m.name for m in motors), 0)}, {}, (), (), nothing, nothing)
+
+
+def test_a_chain_of_500_joints_is_written_and_read_again(tmp_path: Path) -> None:
+    snake = chain(500)
+    again = load_robot(write_xml(snake, tmp_path / "x.xml"))
+    assert again.motors == snake.motors
+    np.testing.assert_allclose([joint.point for joint in again.joints], [joint.point for joint in snake.joints])
+
+
+def test_a_tree_too_deep_for_a_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValue, match="is too deep in the tree: a file holds 2000 elements inside each other"):
+        write_xml(chain(1100), tmp_path / "x.xml")

@@ -24,16 +24,16 @@ def test_a_convex_keeps_its_points_in_its_own_axes() -> None:
     np.testing.assert_allclose(volume.vertices, [[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])
     np.testing.assert_allclose(volume.centre, [1, 0, 0])
     np.testing.assert_allclose(volume.rotation @ [0, 1, 0], [0, 0, 1], atol=1e-12)  # turned as a box with these attributes is
-    np.testing.assert_allclose(volume.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(volume.rotation @ [0, 0, 1], [0, 1, 0], atol=1e-12)
 
 
 def test_a_robot_carries_a_convex_solid_and_a_convex_field(tmp_path: Path) -> None:
     robot = read_robot(
         robot_file(
             tmp_path,
-            '<bodypart name="arm"><motor name="m" minPos="0" maxPos="1"><joint z="1"><link x="2">',
+            '<bodypart name="arm"><motor name="m" minPos="0" maxPos="1"><joint z="1"><link x="2"><link>',
             f'<convex name="a" points="{TETRAHEDRON}" py="1"/><CONVEX points="{TETRAHEDRON}" field="true"/>',
-            "</link></joint></motor></bodypart>",
+            "</link></link></joint></motor></bodypart>",
         )
     )
     solid, field = robot.shapes
@@ -47,12 +47,12 @@ def test_a_robot_carries_a_convex_solid_and_a_convex_field(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        ("0 0 0 1 0 0 0 1 0", "has 9 numbers. Write x y z of 4 to 1000 points"),
+        ("0 0 0 1 0 0 0 1 0", "has 9 numbers. Write x y z of 4 to 10000 points"),
         (TETRAHEDRON + " 1", "has 13 numbers"),
         ("0 0 0 1 0 0 0 1 0 1 1 0", "all lie in one plane"),
         ("1 1 1 " * 4, "all lie in one plane"),
         ("0 0 0 1 0 0 0 1 0 1 1 1e-8", "all lie in one plane"),
-        (TETRAHEDRON + " 0 0 0" * 997, "has 3003 numbers"),
+        (TETRAHEDRON + " 0 0 0" * 9997, "has 30003 numbers"),
         (TETRAHEDRON + " 1 2 nan", "'nan' is not finite"),
     ],
 )

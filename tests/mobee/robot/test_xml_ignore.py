@@ -10,7 +10,7 @@ from mobee.robot.robot import Ints, Robot
 from tests.mobee.robot.robot_files import TAIL
 
 # A chain a, b, c far apart: a solid on each link, two fields on each of b and c, all of one part.
-HEAD = '<ZeroPositionKinematicTree version="1.0" robotName="toy" adjacency="{0}">'
+HEAD = '<ZeroPositionKinematicTree version="2.0" robotName="toy" adjacency="{0}">'
 BODY = """<bodypart name="arm"><motor name="m1" minPos="-9" maxPos="9"/><motor name="m2" minPos="-9" maxPos="9"/><link name="a">
 <sphere name="a" radius=".1"/>
 <link x="1"><joint name="b" motor="m1" z="1"><sphere name="b" radius=".1"/><sphere name="bf" radius=".2" field="true"/>

@@ -12,11 +12,11 @@ from tests.mobee.robot.robot_files import robot_file
 
 LINES = (
     '<bodypart name="arm">',
-    ' <link name="base" z="0.5"><mass value="5"/>',
+    ' <link name="base" z="0.5"><mass value="5" pz="0.5"/>',
     '  <motor name="pan" minPos="-90" maxPos="90"><joint z="1" moves="upper">',
     "   MASSES",
     '   <link x="0.2">',
-    "    MORE",
+    "    <link>MORE</link>",
     "   </link>",
     "  </joint></motor>",
     " </link>",

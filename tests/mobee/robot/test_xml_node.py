@@ -56,5 +56,5 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_endless_nesting_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RobotFileError, match="nested more than 200 elements deep"):
+    with pytest.raises(RobotFileError, match="nested more than 2000 elements deep"):
         read_xml(written(tmp_path, "<a>" * 5000 + "</a>" * 5000))

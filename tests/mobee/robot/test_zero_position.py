@@ -40,13 +40,13 @@ def test_what_hangs_inside_a_joint_turns_about_its_axis_through_the_current_poin
     robot = read(
         tmp_path,
         '<bodypart name="arm"><link y="1"><motor name="m" minPos="-90" maxPos="90"><joint z="1">',
-        '<link x="1"><marker name="tip"/></link></joint></motor></link></bodypart>',
+        '<link x="1"><link><marker name="tip"/></link></link></joint></motor></link></bodypart>',
     )
     moved = link_transforms(robot, np.array([np.pi / 2]))[robot.markers["tip"].link]
     np.testing.assert_allclose((moved @ [*robot.markers["tip"].position, 1])[:3], [0, 2, 0], atol=1e-12)
 
 
-def test_attachments_are_relative_to_the_end_of_the_link_and_to_the_point_of_the_joint(tmp_path: Path) -> None:
+def test_attachments_are_relative_to_the_start_of_the_link_and_to_the_point_of_the_joint(tmp_path: Path) -> None:
     robot = read(
         tmp_path,
         '<bodypart name="arm"><link z="1"><sphere name="a" radius="0.1" px="0.5"/>',
@@ -54,7 +54,7 @@ def test_attachments_are_relative_to_the_end_of_the_link_and_to_the_point_of_the
         "</link></bodypart>",
     )
     on_link, on_joint = robot.shapes
-    np.testing.assert_allclose(on_link.position, [0.5, 0, 1])
+    np.testing.assert_allclose(on_link.position, [0.5, 0, 0])
     np.testing.assert_allclose(on_joint.position, [0, 0.5, 1])
     assert (on_link.role, on_joint.role) == ("solid", "field")
     assert robot.base_shapes == {0}

@@ -167,6 +167,18 @@ def test_an_attached_object_goes_with_its_link_and_stays_where_it_is_detached(ru
             {"name": "x", "geometry": Geometry(kind="capsule", size=[0.1]), "position": [0.0] * 3, "quaternion": UPRIGHT, "role": "ghost"},
             "2 lengths",
         ),
+        (
+            "add",
+            AddObject,
+            {
+                "name": "table",
+                "geometry": Geometry(kind="sphere", size=[1e7]),
+                "position": [0.0] * 3,
+                "quaternion": UPRIGHT,
+                "role": "ghost",
+            },
+            "lengths of 1e-09 to 100000 m",
+        ),
     ],
 )
 def test_a_wrong_edit_is_refused_with_what_is_valid(run: Stage, verb: str, request_type: type, fields: dict[str, Any], says: str) -> None:

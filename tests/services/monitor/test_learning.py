@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from bus_schema.messages import Learned, Surprise, Transition
 from mobee import Lattice, TransitionModel, load_robot
 from mobee.learning.flat import flat
 from services.agents.learned import surprises
+from tests.services.robots import ARM as OWN
 
 rr = pytest.importorskip("rerun")
 from services.monitor.learning import MOST, Learning  # noqa: E402  # only where Rerun is
@@ -52,6 +54,16 @@ def test_surprises_are_the_outcomes_that_are_no_goals_with_their_shares() -> Non
         model.observe(15, 2, outcome)
     model.observe(0, 0, SPACE.goal(0, 0))
     assert surprises(model) == [Surprise(15, 2, 15, 0.25), Surprise(15, 2, 3, 0.5)]
+
+
+def test_what_an_agent_of_another_robot_knows_is_shown_too(tmp_path: Path) -> None:
+    (tmp_path / "own.xml").write_text(OWN)
+    robot = load_robot(tmp_path / "own.xml")
+    space = Lattice(robot, ["pan", "bend"], neighbours=4)
+    model, notebook = TransitionModel(space), Notebook()
+    model.observe(0, 0, space.goal(0, 0))
+    Learning(notebook, robot).log("arm", told(model, agent="arm", space=json.dumps(space.settings)))
+    assert set(notebook.logged) >= {"learning/arm/tries", "learning/arm/reward", "learning/arm/value"}
 
 
 def test_what_surprised_is_an_arrow_and_what_worked_another() -> None:

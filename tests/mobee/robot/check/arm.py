@@ -19,7 +19,7 @@ ARM = """\
      <motor name="bend" minPos="10" maxPos="100" home="30">
       <joint name="bend" y="-1">
        <link name="fore" x="-0.2" radius="0.02" field="0.06">
-        <marker name="tip" nx="-1"/>
+        <link><marker name="tip" nx="-1"/></link>
        </link>
       </joint>
      </motor>

@@ -11,7 +11,7 @@ from tests.mobee.robot.check.arm import arm, named
 UPPER, FORE = '<link name="upper" x="-0.2" radius="0.02" field="0.06">', '<marker name="tip" nx="-1"/>'
 
 
-def found(folder: Path, upper: str = '<mass value="2"/>', fore: str = '<mass value="1" px="0.05"/>') -> list[Finding]:
+def found(folder: Path, upper: str = '<mass value="2" px="-0.2"/>', fore: str = '<mass value="1" px="0.05"/>') -> list[Finding]:
     return named(arm(folder, (UPPER, UPPER + upper), (FORE, FORE + fore)), "mass")
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from mobee.robot.urdf.hull import MOST_VERTICES, convex_hull, facets
+from mobee.robot.urdf.hull import CORNERS, convex_hull, facets
 from mobee.robot.urdf.mesh import read_mesh
 from tests.mobee.robot.urdf_files import foreign
 
@@ -22,8 +22,26 @@ def test_the_hull_holds_every_point_and_has_few_vertices(seed: int, count: int, 
     rng = np.random.default_rng(seed)
     points = size * rng.normal(size=(count, 3)) * rng.uniform(0.1, 1.0, size=3) + rng.normal(size=3)
     vertices = convex_hull(points)
-    assert 4 <= len(vertices) <= MOST_VERTICES
+    assert 4 <= len(vertices) <= CORNERS
     assert outside(points, vertices) < 1e-12
+
+
+@pytest.mark.parametrize("corners", [8, 30, 64, 200])
+def test_the_number_of_corners_is_kept_and_more_of_them_are_closer(corners: int) -> None:
+    points = np.random.default_rng(3).normal(size=(2000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    vertices = convex_hull(points, corners)
+    assert corners - 8 <= len(vertices) <= corners
+    assert outside(points, vertices) < 1e-12
+    assert ConvexHull(vertices).volume < ConvexHull(convex_hull(points, corners // 2 + 4)).volume or corners == 8
+
+
+def test_an_exact_hull_has_the_corners_of_the_mesh() -> None:
+    points = read_mesh(foreign("kuka_iiwa/meshes/link_1.stl"))
+    vertices = convex_hull(points, "all")
+    assert len(vertices) > CORNERS
+    assert np.abs(np.sort(vertices, axis=0) - np.sort(points[ConvexHull(points).vertices], axis=0)).max() < 1e-9
+    assert ConvexHull(vertices).volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
 
 
 def test_a_hull_of_few_vertices_is_exact() -> None:
@@ -36,7 +54,7 @@ def test_a_ball_grows_by_a_few_percent_at_most() -> None:
     points = np.random.default_rng(1).normal(size=(3000, 3))
     points /= np.linalg.norm(points, axis=1)[:, None]
     vertices = convex_hull(points)
-    assert len(vertices) > MOST_VERTICES - 8
+    assert len(vertices) > CORNERS - 8
     assert np.linalg.norm(vertices, axis=1).max() < 1.15
     assert ConvexHull(vertices).volume < 1.15 * ConvexHull(points).volume
 

@@ -17,7 +17,7 @@ DAE = """<?xml version="1.0"?>
  <library_geometries><geometry id="g"><mesh>
   <source id="p"><float_array id="a" count="12">{numbers}</float_array></source>
   <source id="n"><float_array id="b" count="3">9 9 9</float_array></source>
-  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>{faces}
  </mesh></geometry></library_geometries>
  <library_visual_scenes><visual_scene id="s">{scene}</visual_scene></library_visual_scenes>
 </COLLADA>
@@ -25,10 +25,10 @@ DAE = """<?xml version="1.0"?>
 PLAIN = '<node><instance_geometry url="#g"/></node>'
 
 
-def dae(folder: Path, unit: str = "1", numbers: str | None = None, scene: str = PLAIN) -> Path:
+def dae(folder: Path, unit: str = "1", numbers: str | None = None, scene: str = PLAIN, faces: str = "") -> Path:
     path = folder / "m.dae"
     text = " ".join(map(str, CORNERS.reshape(-1))) if numbers is None else numbers
-    path.write_text(DAE.format(unit=unit, numbers=text, scene=scene), encoding="utf-8")
+    path.write_text(DAE.format(unit=unit, numbers=text, scene=scene, faces=faces), encoding="utf-8")
     return path
 
 
@@ -43,7 +43,8 @@ def text_stl(folder: Path) -> Path:
 
 def obj(folder: Path) -> Path:
     path = folder / "m.obj"
-    path.write_text("# a comment\no t\nvn 0 0 1\nvt 0 0\n" + "".join(f"v {x} {y} {z} 1.0\n" for x, y, z in CORNERS) + "f 1//1 2//1 3//1\n")
+    points = "".join(f"v {x} {y} {z} 1.0\n" for x, y, z in CORNERS)
+    path.write_text(f"# a comment\no t\nvn 0 0 1\nvt 0 0\n{points}f 1//1 2//1 3//1\nf 1 4 \\\n3\n")
     return path
 
 
@@ -52,6 +53,28 @@ def test_every_format_gives_the_same_points(tmp_path: Path) -> None:
     assert np.array_equal(read_mesh(text_stl(tmp_path)), CORNERS)
     assert np.array_equal(read_mesh(obj(tmp_path)), CORNERS)
     assert np.array_equal(read_mesh(dae(tmp_path)), CORNERS)
+
+
+TRIANGLES = (
+    '<triangles count="1"><input semantic="NORMAL" source="#n" offset="1"/><input semantic="VERTEX" source="#v" offset="0"/>'
+    "<p>{0}</p></triangles>"
+)
+
+
+def test_points_that_no_face_has_are_left_out(tmp_path: Path) -> None:
+    """Exporters write one array of points for many meshes, of which each shows some (Romeo's trunk)."""
+    assert np.array_equal(read_mesh(dae(tmp_path, faces=TRIANGLES.format("0 0 3 0 1 0"))), CORNERS[[0, 1, 3]])
+    more = TRIANGLES.format("0 0 2 0 2 0") + TRIANGLES.format("") + TRIANGLES.format("3 0 3 0 3 0").replace("triangles", "polylist")
+    assert np.array_equal(read_mesh(dae(tmp_path, faces=more)), CORNERS[[0, 2, 3]])
+    path = obj(tmp_path)
+    path.write_text(path.read_text() + "v 9 9 9\n")
+    assert np.array_equal(read_mesh(path), CORNERS)
+
+
+def test_faces_that_count_back_leave_all_points_of_an_obj(tmp_path: Path) -> None:
+    path = obj(tmp_path)
+    path.write_text(path.read_text() + "v 9 9 9\nf -1 -2 -3\n")
+    assert np.array_equal(read_mesh(path), [*CORNERS, [9, 9, 9]])
 
 
 def test_a_binary_stl_may_begin_like_a_text(tmp_path: Path) -> None:
@@ -101,6 +124,9 @@ BROKEN: dict[str, tuple[str, bytes, str]] = {
     "obj word": ("m.obj", b"v 1 2 three\n", "a coordinate is no number"),
     "obj of two": ("m.obj", b"v 1 2\n", "1 of 1 vertices lack"),
     "obj far": ("m.obj", b"v 1 2 1e300\n", "not finite or farther"),
+    "obj face of words": ("m.obj", b"v 1 2 3\nf one two\n", "a face is no list of vertices"),
+    "obj face beyond": ("m.obj", b"v 1 2 3\nf 1 2 1\n", "a face names a vertex beyond the 1 that there are"),
+    "obj face of zero": ("m.obj", b"v 1 2 3\nf 0 1 1\n", "a face names a vertex beyond the 1 that there are"),
     "no xml": ("m.dae", b"solid", "not well-formed XML"),
     "entity bomb": ("m.dae", ENTITY.encode(), "entities and external references are refused"),
     "deep": ("m.dae", b"<a>" * 500 + b"</a>" * 500, "more than 100 elements deep"),
@@ -125,6 +151,10 @@ def test_a_broken_mesh_is_refused_with_a_remedy(tmp_path: Path, name: str) -> No
         ({"numbers": ""}, "<float_array>: holds 0 numbers"),
         ({"unit": "nan"}, "<unit>: holds 1 numbers, not a multiple of 1 finite ones"),
         ({"scene": "<node><rotate>0 0 0 90</rotate></node>"}, "<rotate>: the axis has no length"),
+        ({"faces": TRIANGLES.format("0 0 4 0 1 0")}, "<geometry>: a face names a point beyond the 4 of 'p'"),
+        ({"faces": TRIANGLES.format("0 0 -1 0 1 0")}, "<geometry>: a face names a point beyond the 4 of 'p'"),
+        ({"faces": TRIANGLES.format("0 0 3")}, "<p>: holds 3 numbers, not a multiple of 2"),
+        ({"faces": TRIANGLES.format("0 0").replace('"1"', '"-1"')}, "<input>: offset '-1' is not a whole number"),
         ({"scene": SELF}, "the scene holds more than"),
         ({"scene": BOMB}, "the scene holds more than"),
     ],

@@ -110,8 +110,40 @@ def test_a_joint_without_play_is_fixed_where_its_limits_hold_it(tmp_path: Path) 
 
 
 def test_a_revolute_joint_without_limits_gets_a_turn_and_a_warning(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match=r":3: <joint>: joint 'j0' has no limits; -pi to pi is taken"):
+    with pytest.warns(UserWarning, match=r":3: <joint>: joint 'j0' has no limits; -180 to 180 deg is taken"):
         assert fingers(tmp_path, '<limit velocity="1" effort="1"/>').limits.tolist() == [[-np.pi, np.pi]]
+
+
+@pytest.mark.parametrize(
+    "limits", ['lower="-1e16" upper="1e16"', 'lower="-inf" upper="inf"', 'lower="1" upper="-1"', 'lower="2e6" upper="2e6"']
+)
+@pytest.mark.parametrize(("kind", "range_", "taken"), [("revolute", np.pi, "180 deg"), ("prismatic", 1.0, "1 m")])
+def test_limits_that_are_none_are_taken_for_none_with_a_warning(tmp_path: Path, limits: str, kind: str, range_: float, taken: str) -> None:
+    with pytest.warns(UserWarning, match=rf"toy.urdf:3: <limit>: joint 'j0' has lower=.* to {taken} is taken. If it has limits"):
+        robot = fingers(tmp_path, f"<limit {limits}/>", kind=kind)
+    assert robot.limits.tolist() == [[-range_, range_]]
+    assert robot.joints[0].limits.tolist() == [-range_, range_]
+
+
+def test_a_joint_with_one_limit_gets_a_turn_or_two_metres_from_there(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="is read as one without an? (lower|upper) limit; -?[0-9.]+ to") as said:
+        turning = fingers(tmp_path, '<limit lower="-1" upper="1e9"/>', '<limit lower="-1e9" upper="1"/>')
+        sliding = fingers(tmp_path, '<limit lower="0" upper="1e9"/>', kind="prismatic")
+    assert len(said) == 3
+    assert np.allclose(turning.limits, [[-1, 2 * np.pi - 1], [1 - 2 * np.pi, 1]])
+    assert sliding.limits.tolist() == [[0, 2]]
+
+
+def test_a_mimic_without_limits_leaves_its_motor_its_own(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot = fingers(tmp_path, WIDE, '<mimic joint="j0" multiplier="2"/><limit lower="-1e16" upper="1"/>')
+    assert robot.limits.tolist() == [[-3, 0.5]]
+
+
+def test_a_velocity_beyond_measure_means_unknown(tmp_path: Path) -> None:
+    robot = fingers(tmp_path, '<limit lower="0" upper="1" velocity="1e16" effort="5"/>')
+    assert (robot.motor_table[0].max_velocity, robot.motor_table[0].max_torque) == (np.deg2rad(60), 5)
 
 
 MALFORMED = {
@@ -121,7 +153,7 @@ MALFORMED = {
     "no factor": ((WIDE, '<mimic joint="j0" multiplier="0"/>'), r":4: <mimic> multiplier: is 0, so the joint cannot move"),
     "not finite": ((WIDE, '<mimic joint="j0" offset="inf"/>'), r":4: <mimic> offset: 'inf' is not finite"),
     "huge": ((WIDE, '<mimic joint="j0" multiplier="1e9"/>'), r":4: <mimic> multiplier: 1e\+09 is too large"),
-    "wrong way": (('<limit lower="1" upper="-1"/>',), r":3: <limit> lower: 1 is above upper -1. Swap the two"),
+    "no number": (('<limit lower="nan" upper="1"/>',), r":3: <limit> lower: 'nan' is not finite"),
     "limit": (('<limit lower="x" upper="1"/>',), r":3: <limit> lower: 'x' is not a number"),
 }
 

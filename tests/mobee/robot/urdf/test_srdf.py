@@ -66,15 +66,13 @@ def test_groups_may_name_links_and_hold_themselves(tmp_path: Path) -> None:
     assert read(tmp_path, *lines).parts["a"].motors == ("shoulder", "elbow")
 
 
-def test_home_comes_from_the_group_state_of_that_name(tmp_path: Path) -> None:
-    home = '<group_state name="Home" group="arm"><joint name="elbow" value="0.5"/><joint name="shoulder" value="-1"/></group_state>'
-    other = '<group_state name="ready" group="arm"><joint name="elbow" value="0.9"/></group_state>'
-    assert read(tmp_path, home, other).home.tolist() == [-1, 0.5, 0]
-
-
-def test_a_home_outside_of_the_limits_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RobotFileError, match=r"toy.srdf:2: <joint> value: 3 puts 'elbow' outside of -1 .. 1"):
-        read(tmp_path, '<group_state name="home" group="arm"><joint name="elbow" value="3"/></group_state>')
+def test_a_chain_leads_from_one_branch_to_another_through_what_carries_both(tmp_path: Path) -> None:
+    lines = (
+        '<group name="hands"><chain base_link="left" tip_link="right"/></group>',
+        '<group name="arm"><chain base_link="palm" tip_link="base"/></group>',
+    )
+    robot = read(tmp_path, *lines)
+    assert {part.name: part.motors for part in robot.parts.values()} == {"hands": ("l",), "arm": ("elbow", "shoulder")}
 
 
 def test_without_an_srdf_only_adjacent_links_are_left_out(tmp_path: Path) -> None:
@@ -145,6 +143,13 @@ def test_names_that_the_robot_does_not_have_are_warned_of(tmp_path: Path) -> Non
         read(tmp_path, '<disable_collisions link1="lefft" link2="right"/>')
 
 
+@pytest.mark.parametrize("chain", ['base_link="bse" tip_link="palm"', 'base_link="base" tip_link="plam"'])
+def test_a_chain_that_the_robot_does_not_have_is_passed_over(tmp_path: Path, chain: str) -> None:
+    with pytest.warns(UserWarning, match="toy.srdf:2: <chain>: the robot has no '(bse|plam)', so this is ignored. Did you mean"):
+        robot = read(tmp_path, f'<group name="arm"><chain {chain}/><joint name="elbow"/><joint name="shoulder"/></group>', GROUPS[0])
+    assert robot.parts["arm"].motors == ("elbow", "shoulder")
+
+
 def test_more_groups_than_a_robot_can_have_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match="toy.srdf:1: <robot> group: has 201 groups"):
         read(tmp_path, *(f'<group name="g{k}"><joint name="elbow"/></group>' for k in range(201)))
@@ -157,8 +162,10 @@ MALFORMED = {
         ":2: <joint> value: is required and missing",
     ),
     "no link": (('<disable_collisions link1="left"/>',), ":2: <disable_collisions> link2: is required and missing"),
-    "no chain": (('<group name="a"><chain base_link="left" tip_link="right"/></group>',), ":2: <chain> base_link: 'left' does not carry"),
-    "unknown tip": (('<group name="a"><chain base_link="base" tip_link="rigt"/></group>',), "unknown link 'rigt'. Did you mean 'right'"),
+    "not a number": (
+        ('<group_state name="home" group="arm"><joint name="elbow" value="1 0"/></group_state>',),
+        ":2: <joint> value: '1 0' is not a number",
+    ),
 }
 
 

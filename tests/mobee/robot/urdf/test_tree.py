@@ -52,6 +52,9 @@ MALFORMED = {
     "a number that is none": ((LINKS, joint("fixed", '<origin xyz="0 0 nan"/>')), r":3: <origin> xyz: 'nan' is not finite"),
     "text for a number": ((LINKS, joint("fixed", '<origin rpy="0 ${pi} 0"/>')), r":3: <origin> rpy: '\$\{pi\}' is not a number"),
     "an enormous number": ((LINKS, joint("fixed", '<origin xyz="0 0 1e9"/>')), r":3: <origin> xyz: 1e\+09 is too large. URDF counts in m"),
+    "a blank name": ((LINKS, joint("revolute", LIMIT, name=" ")), r":3: <joint> name: is required and missing"),
+    "a long name": ((LINKS, joint("revolute", LIMIT, name="j" * 201)), r":3: <joint> name: 'jj.*' has 201 letters. Give it a name of at"),
+    "a long link": (('<link name="%s"/>' % ("l" * 201),), r":2: <link> name: 'll.*' has 201 letters. Give it a name of at"),
     "two origins": ((LINKS, joint("fixed", "<origin/><origin/>")), r":3: <origin> position in the file: a second <origin>"),
     "nothing moves": (
         (LINKS, joint("fixed"), joint("fixed", name="x", parent="base", child="upper")),

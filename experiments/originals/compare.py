@@ -1,0 +1,225 @@
+"""Compares what this library reads of an original robot file with the rules of the program of 2014, pose by pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.originals.program_2014 import Node, Program, Volume
+from mobee.kinematics.forward import link_transforms
+from mobee.model import Model
+from mobee.robot.robot import Robot
+
+Array = NDArray[np.float64]
+_Placed = tuple[coal.ShapeBase, coal.Transform3s]
+NEAR = 1e-6  # m; a contact that is not deeper may be seen by one side only
+ALONG_Z = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # coal's cylinder stands along z, the program's along y
+SHRUNK = 1e-4  # m off a volume's sizes that end a contact of that depth
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far the two readings differ; the numbers of differences are 0 where they agree."""
+
+    poses: int
+    place: float  # m, largest distance between the centres of a volume, or the places of a marker
+    turn: float  # largest difference of a direction: normals of markers, height axes and faces of volumes
+    pairs: int  # of volumes that one side tests and the other does not
+    base: int  # volumes that only one side tests against the world
+    clauses: int  # answers
+    contacts: int  # contacts that one side sees and the other does not
+    seen: int  # contacts in all
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the readings are the same."""
+        return self.place < 1e-6 and self.turn < 1e-6 and not (self.pairs or self.base or self.clauses or self.contacts)
+
+
+def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
+    """Compare a robot with the program's reading of its file at random motor positions within the limits."""
+    program = Program.read(path)
+    drawn = np.random.default_rng(seed).uniform(*robot.limits.T, (poses, len(robot.motors)))
+    drawn[0] = robot.home
+    volumes = [(node, volume, role) for node in program.nodes for role in ("solid", "field") for volume in _of(node, role)]
+    order = _matched(program, robot, volumes, drawn[-1])
+    pairs = {role: _pairs(program, volumes, role) for role in ("solid", "field")}
+    mine = {
+        role: {frozenset(pair) for pair in found.tolist()} for role, found in (("solid", robot.solid_pairs), ("field", robot.field_pairs))
+    }
+    theirs = {role: {frozenset((int(order[i]), int(order[j]))) for i, j in pairs[role]} for role in pairs}
+    base = {int(order[k]) for k, (node, _, _) in enumerate(volumes) if program.is_base(node)}
+    judge = _Judge(program, robot, volumes, order, pairs)
+    for q in drawn:
+        judge.look(q)
+    return Comparison(
+        poses,
+        judge.place,
+        judge.turn,
+        sum(len(mine[role] ^ theirs[role]) for role in mine),
+        len(base ^ set(robot.base_shapes)),
+        judge.clauses,
+        judge.contacts,
+        judge.seen,
+    )
+
+
+def _of(node: Node, role: str) -> list[Volume]:
+    return node.solids if role == "solid" else node.fields
+
+
+def _degrees(robot: Robot, q: Array) -> dict[str, float]:
+    return dict(zip(robot.motors, np.rad2deg(q).tolist(), strict=True))
+
+
+def _placed(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> tuple[Array, Array]:
+    """Centres (v, 3) and orientations (v, 3, 3) of the program's volumes."""
+    at = program.poses(_degrees(robot, q))
+    centres = np.array([at[node][:3, :3] @ volume.place + at[node][:3, 3] for node, volume, _ in volumes])
+    return centres.reshape(-1, 3), np.array([at[node][:3, :3] @ volume.turn for node, volume, _ in volumes]).reshape(-1, 3, 3)
+
+
+def _shapes(robot: Robot, q: Array) -> tuple[Array, Array]:
+    """Centres (v, 3) and orientations (v, 3, 3) of this library's shapes."""
+    transforms = link_transforms(robot, q)
+    at = [transforms[shape.link] for shape in robot.shapes]
+    centres = np.array([link[:3, :3] @ shape.position + link[:3, 3] for link, shape in zip(at, robot.shapes, strict=True)])
+    return centres.reshape(-1, 3), np.array([link[:3, :3] @ shape.rotation for link, shape in zip(at, robot.shapes, strict=True)])
+
+
+def _matched(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> NDArray[np.intp]:
+    """For each of the program's volumes the shape of its kind, role and size that is nearest at home and in another pose.
+
+    Of equal volumes in one place the first in the file is the first on both sides. Raises ValueError where the volumes are not those here.
+    """
+    if len(volumes) != len(robot.shapes):
+        raise ValueError(f"{len(volumes)} volumes by the program's rules, {len(robot.shapes)} shapes here")
+    poses = (robot.home, q)
+    theirs, mine = [_placed(program, robot, volumes, pose) for pose in poses], [_shapes(robot, pose) for pose in poses]
+    order = np.full(len(volumes), -1, dtype=np.intp)
+    free = dict.fromkeys(range(len(volumes)))
+    for k, (_, volume, role) in enumerate(volumes):
+        best: tuple[float, int] = (np.inf, -1)
+        for i in free:
+            shape = robot.shapes[i]
+            if (shape.kind, shape.role) != (volume.kind, role) or not np.allclose(shape.size, volume.size, atol=1e-12):
+                continue
+            away = max(float(np.abs(a[0][k] - b[0][i]).max()) for a, b in zip(theirs, mine, strict=True))
+            turned = max(_turned(volume, a[1][k], b[1][i]) for a, b in zip(theirs, mine, strict=True))
+            best = min(best, (round(away + turned, 9), i))
+        if best[1] < 0:
+            raise ValueError(f"no {role} {volume.kind} of size {volume.size} here")
+        order[k] = best[1]
+        del free[best[1]]
+    return order
+
+
+def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str) -> list[tuple[int, int]]:
+    """Pairs of volumes that the program tests."""
+    ignored = program.ignored()[0 if role == "solid" else 1]
+    mine = [k for k, one in enumerate(volumes) if one[2] == role]
+    return [
+        (i, j)
+        for index, i in enumerate(mine)
+        for j in mine[index + 1 :]
+        if volumes[i][0] is not volumes[j][0] and frozenset((volumes[i][0], volumes[j][0])) not in ignored
+    ]
+
+
+class _Judge:
+    """Looks at one pose after the other."""
+
+    def __init__(
+        self,
+        program: Program,
+        robot: Robot,
+        volumes: list[tuple[Node, Volume, str]],
+        order: NDArray[np.intp],
+        pairs: dict[str, list[tuple[int, int]]],
+    ) -> None:
+        self.program, self.robot, self.volumes, self.order = program, robot, volumes, order
+        self.model = Model(robot)
+        self.pairs = {role: np.array(found, dtype=np.intp).reshape(-1, 2) for role, found in pairs.items()}
+        self.reach = np.array([_reach(volume) for _, volume, _ in volumes])
+        self.place = self.turn = 0.0
+        self.clauses = self.contacts = self.seen = 0
+
+    def look(self, q: Array) -> None:
+        """Compare one pose (n,) rad."""
+        degrees = _degrees(self.robot, q)
+        centres, turns = _placed(self.program, self.robot, self.volumes, q)
+        mine, mine_turned = (one[self.order] for one in _shapes(self.robot, q))
+        self.place = max([self.place, *np.linalg.norm(centres - mine, axis=1)])
+        self.turn = max(
+            [self.turn, *(_turned(volume, a, b) for (_, volume, _), a, b in zip(self.volumes, turns, mine_turned, strict=True))]
+        )
+        self._markers(degrees, q)
+        for clause, ours in zip(self.program.clauses, self.robot.clauses, strict=True):
+            self.clauses += self.program.obeys(clause, degrees) != bool((ours.a @ q + ours.b > 0).any())
+        self._contacts(centres, turns, q)
+
+    def _markers(self, degrees: dict[str, float], q: Array) -> None:
+        at, pose = self.program.poses(degrees), self.model.evaluate(q)
+        for (_, node, normal), (name, marker) in zip(self.program.markers, self.robot.markers.items(), strict=True):
+            self.place = max(self.place, float(np.linalg.norm(pose.position(name) - at[node][:3, 3])))
+            here = pose.rotation(name) @ marker.rotation.T @ marker.normal
+            self.turn = max(self.turn, float(np.abs(here - at[node][:3, :3] @ normal).max()))
+
+    def _contacts(self, centres: Array, turns: Array, q: Array) -> None:
+        found = {frozenset((contact.first, contact.second)): contact.depth for contact in self.model.evaluate(q).contacts}
+        names = [self.robot.shapes[k].name for k in self.order]
+        objects = [_object(volume, c, t) for (_, volume, _), c, t in zip(self.volumes, centres, turns, strict=True)]
+        theirs = set[frozenset[str]]()
+        for pairs in self.pairs.values():
+            near = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1) < self.reach[pairs].sum(axis=1)
+            for i, j in pairs[near].tolist():
+                if _touch(objects[i], objects[j]):
+                    theirs.add(frozenset((names[i], names[j])))
+        self.seen += len(theirs | found.keys())
+        self.contacts += sum(found[pair] > NEAR for pair in found.keys() - theirs)
+        self.contacts += sum(self._stays(pair, names, centres, turns) for pair in theirs - found.keys())
+
+    def _stays(self, pair: frozenset[str], names: list[str], centres: Array, turns: Array) -> bool:
+        """Whether a contact that only fcl sees remains when both volumes are a little smaller."""
+        i, j = (names.index(name) for name in pair)
+        small = [_object(self.volumes[k][1], centres[k], turns[k], SHRUNK) for k in (i, j)]
+        return _touch(*small)
+
+
+def _touch(first: _Placed, second: _Placed) -> bool:
+    """Whether two volumes overlap, by coal: fcl overlooks contacts of cylinders that are centimetres deep."""
+    return bool(coal.collide(*first, *second, coal.CollisionRequest(), coal.CollisionResult()))
+
+
+def _reach(volume: Volume) -> float:
+    """The radius [m] of a ball about the centre of a volume that holds it."""
+    if volume.kind == "sphere":
+        return volume.size[0]
+    half = (volume.size[0], volume.size[1] / 2) if volume.kind == "cylinder" else tuple(size / 2 for size in volume.size)
+    return float(np.linalg.norm(half))
+
+
+def _turned(volume: Volume, theirs: Array, mine: Array) -> float:
+    """How far the orientations of a volume differ, as far as they show."""
+    if volume.kind == "sphere":
+        return 0.0
+    if volume.kind == "cylinder":  # the program's stands along y, ours along z
+        return float(1.0 - abs(theirs[:, 1] @ mine[:, 2]))
+    return float(np.abs(np.abs(theirs.T @ mine) - np.eye(3)).max())
+
+
+def _object(volume: Volume, centre: Array, turn: Array, less: float = 0.0) -> _Placed:
+    """A volume for coal, smaller by `less` [m] at most."""
+    size = [max(length - less, length / 2) for length in volume.size]
+    if volume.kind == "sphere":
+        shape = coal.Sphere(*size)
+    elif volume.kind == "cylinder":
+        shape = coal.Cylinder(*size)
+        turn = turn @ ALONG_Z
+    else:
+        shape = coal.Box(*size)
+    return shape, coal.Transform3s(turn, centre)

@@ -1,0 +1,74 @@
+"""The robot and the world of a command that needs no running system: options, and what they stand for."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from mobee.collision.world import World
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from services.common.worlds import NO_WORLD, is_path, world_around
+
+DEFAULT = "icub"
+_RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
+
+
+def add_robot(parser: argparse.ArgumentParser, text: str) -> None:
+    """The robot; `text` says which it is when it is left out."""
+    parser.add_argument("--robot", metavar="FILE", help=f"shipped robot, or path of a .xml or .urdf file ({text})")
+    add_urdf_options(parser)
+
+
+def add_world(parser: argparse.ArgumentParser) -> None:
+    """The world around the robot."""
+    text = f"shipped world, path of a .xml file, or {NO_WORLD} (default: the table for the shipped iCubs, {NO_WORLD} for other robots)"
+    parser.add_argument("--world", metavar="FILE", help=text)
+
+
+def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
+    """The robot that the options name, or the default; raises MobeeError."""
+    return load_robot(arguments.robot or default, **urdf_options(arguments))
+
+
+def world_given(arguments: argparse.Namespace, default: str = DEFAULT) -> World:
+    """The world around the robot of `robot_given`; raises MobeeError."""
+    return world_around(arguments.world, arguments.robot or default)
+
+
+def robot_of_run(run: Path) -> str | None:
+    """The name or path of the robot by the settings of a run, None where the run has none; raises UserError.
+
+    `run`: the folder of a run of `mobee launch`, or a file in it.
+    """
+    file = (run if run.is_dir() else run.parent) / _RUN_SETTINGS
+    try:
+        services = tomllib.loads(file.read_text()).get("services")
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UserError(f"{file}: the settings of the run cannot be read ({error}): name its robot with --robot FILE", BAD_INPUT) from None
+    tables = services.values() if isinstance(services, dict) else ()
+    named = [table["robot"] for table in tables if isinstance(table, dict) and isinstance(table.get("robot"), str)]
+    if named and is_path(named[0]) and not Path(named[0]).is_file():
+        raise UserError(
+            f"{named[0]}: the robot of the run by its settings, and there is no such file: name it with --robot FILE",
+            BAD_INPUT,
+        )
+    return named[0] if named else None
+
+
+def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot", "world")) -> list[str]:
+    """The options of robot and world that were given, as on the command line: those of `names`, and all of a URDF."""
+    options = {name: getattr(arguments, name, None) for name in names} | urdf_options(arguments)
+    return [f"--{name} {value}" for name, value in options.items() if value is not None]
+
+
+def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
+    """Raise UserError for the first of the given options, which the command does not use here."""
+    for option in given_options(arguments, names):
+        raise UserError(f"{option}: {why}", BAD_INPUT)

@@ -1,0 +1,100 @@
+"""Which marker a part reaches with: a palm where there are palms, else the end of its chain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.collision.touch import links_moved
+from mobee.errors import InvalidValue
+from mobee.kinematics import link_transforms
+from mobee.robot.robot import Array, Robot
+
+PALMS = ("left_palm", "right_palm")
+AS_NEAR = 1e-3  # m, palms whose distances differ by less are as near
+
+
+def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
+    """The markers that a part moves, in the order of the file; raises UnknownName for a part that the robot does not have."""
+    robot.part(part)
+    moved = links_moved(robot)[part]
+    return tuple(name for name, marker in robot.markers.items() if marker.link in moved)
+
+
+def hand_of(robot: Robot, part: str) -> str:
+    """The marker that a part reaches with: the palm on its side (the right one for a torso), else the first of its end markers.
+
+    Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
+    """
+    found = moved_markers(robot, part)
+    palm = PALMS[0] if part.startswith("left") else PALMS[1]
+    if palm in found:
+        return palm
+    if not found:
+        raise InvalidValue(f"{part} of {robot.name!r} moves no marker to reach with: {_without_markers(robot)}")
+    return next((name for name in end_markers(robot) if name in found), found[0])
+
+
+def end_markers(robot: Robot) -> tuple[str, ...]:
+    """The markers that a motor moves on links at the ends of the tree, or anywhere if no end has one.
+
+    Those with most motors before them come first, so a hand is before a wheel.
+    """
+    inner = {joint.parent for joint in robot.joints}
+    links = frozenset[int]().union(*links_moved(robot).values())
+    moved = [name for name, marker in robot.markers.items() if marker.link in links]
+    ends = [name for name in moved if robot.markers[name].link not in inner] or moved
+    return tuple(sorted(ends, key=lambda name: -len(_motors_before(robot, name))))
+
+
+def part_of(robot: Robot, marker: str) -> str:
+    """The part with the most motors that move a marker, of several the one nearest to it.
+
+    Raises UnknownName for a marker that the robot does not have, InvalidValue for one that no motor moves.
+    """
+    owners = [robot.motor_table[motor].part for motor in _motors_before(robot, marker)]
+    if not owners:
+        valid = ", ".join(end_markers(robot))
+        raise InvalidValue(f"no motor moves the marker {marker!r}. Valid: {valid or 'none'}.")
+    return max(dict.fromkeys(owners), key=owners.count)
+
+
+def hand_for(robot: Robot, place: Array | None) -> str:
+    """The marker to put on a place when none was chosen: the one that is nearest at home of the palms, or of the ends with most motors.
+
+    `place`: (3,) m, None where it is not known. Where several are as near, or nothing is known, it is the right palm, or the first end.
+    Raises InvalidValue for a robot without a marker that a motor moves.
+    """
+    ends = end_markers(robot)
+    if not ends:
+        raise InvalidValue(f"no motor of {robot.name!r} moves a marker to reach with: {_without_markers(robot)}")
+    if all(palm in robot.markers for palm in PALMS):
+        hands = list(reversed(PALMS))
+    else:
+        most = len(_motors_before(robot, ends[0]))
+        hands = [name for name in ends if len(_motors_before(robot, name)) == most]
+    if place is None:
+        return hands[0]
+    far = [float(np.linalg.norm(_at_home(robot, name) - place)) for name in hands]
+    return next(name for name, distance in zip(hands, far, strict=True) if distance < min(far) + AS_NEAR)
+
+
+def _motors_before(robot: Robot, marker: str) -> list[int]:
+    """The motors that move a marker, the nearest to it first."""
+    link = robot.marker(marker).link
+    chain: list[int] = []
+    while link > 0:
+        chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()
+        link = robot.joints[link - 1].parent
+    return list(dict.fromkeys(chain))
+
+
+def _at_home(robot: Robot, name: str) -> Array:
+    marker = robot.marker(name)
+    link = link_transforms(robot, robot.home)[marker.link]
+    place: Array = link[:3, :3] @ marker.position + link[:3, 3]
+    return place
+
+
+def _without_markers(robot: Robot) -> str:
+    known = f"its markers are {', '.join(robot.markers)}" if robot.markers else "it has none"
+    return f'{known}. Add <marker name="tip"/> at the end of its chain in zero-position XML, or a link on a fixed joint in a URDF.'

@@ -1,0 +1,48 @@
+"""Which world stands around a robot when none is given: one rule for every service and command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mobee.collision.world import World
+from mobee.robot.load import load_world
+from services.common.config import ServiceConfig
+
+NO_WORLD = "none"  # the word for a world without objects
+TABLE = "table"
+AT_TABLE = ("icub", "icub_2014", "icub_katana")  # shipped robots whose experiments take place at the table
+
+
+class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
+    """Settings of a service that has a world of its own."""
+
+    world: str = ""
+    """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
+
+    def load_world(self) -> World:
+        """A new world as it is at the start; raises MobeeError for a name or file that cannot be read."""
+        return world_around(self.world, self.robot)
+
+
+def effective_world(given: str | None, robot: str | Path) -> str:
+    """The name or path of the world to load, or NO_WORLD.
+
+    Args:
+        given: a shipped world, a path, NO_WORLD, or nothing ("" or None).
+        robot: the shipped name or the path that the robot is loaded from. A path is an own robot, also where its file has the
+            name icub: only the shipped names imply the table.
+    """
+    if given:
+        return given
+    return TABLE if str(robot) in AT_TABLE else NO_WORLD
+
+
+def is_path(name_or_path: object) -> bool:
+    """Whether a setting is the path of a file, and not a shipped name, as load_robot and load_world read it."""
+    return isinstance(name_or_path, str) and (bool(Path(name_or_path).suffix) or Path(name_or_path).name != name_or_path)
+
+
+def world_around(given: str | None, robot: str | Path) -> World:
+    """A new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
+    name = effective_world(given, robot)
+    return World() if name == NO_WORLD else load_world(name)
