@@ -84,9 +84,9 @@ def _finish(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, o
     for motor in motors:
         master = drives[skeleton.moving[motor.joints[0][0]].name].master
         where["motor", motor.name] = _place(tree.joints[master].node)
-        stated = [skeleton.moving[index].name for index, _, _ in motor.joints if skeleton.moving[index].name in srdf.home]
+        stated = [skeleton.moving[index].name for index, _, _ in motor.joints if skeleton.moving[index].name in home.state]
         if stated:
-            where["home", motor.name] = _place(srdf.home[stated[0]][0])
+            where["home", motor.name] = _place(home.state[stated[0]][0])
     body = _read_body(tree, skeleton, motors, options, where)
     notes = [node for node in root if node.tag == "mobee"]
     rules = PairRules(skeleton.index, adjacent_links(skeleton.joints, body.shapes), srdf, _own_fields(notes, parts, srdf))
