@@ -7,8 +7,9 @@ Source: aims of this reproduction; the thesis has one robot.  Published number: 
 
 Robots of example-robot-data 6.0.0 and pybullet_data, and four that nobody would build: a chain of 200 joints, a star of 300, and an arm
 six orders of magnitude too small and one three too large.  Model, default gains and the motors of the offline plant, an empty world, no
-fields; home and actions also with fields of 3 cm.  The joints' true positions count; of a slide also what the encoders say.  Times are
-those of the machine, the engine compiled.  The figure is a table in markdown.
+fields; home and actions also with fields of 3 cm, whose drift is told and not judged: where fields meet at home, they push.  The joints'
+true positions count; of a slide also what the encoders say.  Times are those of the machine, the engine compiled.  The figure is a table
+in markdown.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def read(folder: Path) -> list[Measured]:
 def failures(one: Measured) -> list[str]:
     """What a robot does not do that is claimed."""
     judged = {
-        "drifts": max(one.drift_deg, one.field_drift_deg) > DEGREES or one.drift_mm > MILLIMETRES,
+        "drifts": one.drift_deg > DEGREES or one.drift_mm > MILLIMETRES,
         "touches itself at home": one.touching_after > 0,
         "slide off": one.slide_mm > MILLIMETRES or one.unsettled > 0,
         "slow": max(one.actions_s, one.field_actions_s) > SECONDS,
@@ -92,6 +93,7 @@ def results(folder: Path) -> dict[str, Any]:
         "touch themselves at home": sum(one.touching > 0 for one in found),
         "and with the SRDF": sum(one.touching_after > 0 for one in found),
         "worst_drift_deg": max((one.drift_deg for one in found), default=None),
+        "worst_drift_with_fields_deg": max((one.field_drift_deg for one in found), default=None),
         "worst_drift_mm": max((one.drift_mm for one in found), default=None),
         "worst_slide_mm": max((one.slide_mm for one in found), default=None),
         "longest_srdf_s": max((one.srdf_s for one in found), default=None),

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from mobee.control.gains import Gains
 from mobee.robot.check.feasible import conflict
 from mobee.robot.check.finding import Finding
 from mobee.robot.check.subject import Subject
@@ -26,8 +27,11 @@ def constraints(subject: Subject) -> Iterator[Finding]:
             yield _impossible(subject, index, most)
         else:
             yield from _idle_rows(subject, index, least, most)
-        if most.max() > 0 and (clause.a @ subject.home + clause.b).max() < -ROUNDING:
+        at_home = clause.a @ subject.home + clause.b
+        if most.max() > 0 and at_home.max() < -ROUNDING:
             yield _violated_at_home(subject, index)
+        elif most.max() > 0 and (at_home / np.linalg.norm(clause.a, axis=1)).max() < Gains.default().constraint_width - ROUNDING:
+            yield _pushed_at_home(subject, index, float(at_home.max()))
     if not dead:
         yield from _contradiction(subject, robot.clauses)
 
@@ -58,6 +62,17 @@ def _violated_at_home(subject: Subject, index: int) -> Finding:
         f"home violates {_name(subject, index)}: a.q + b is {_degrees((clause.a @ home + clause.b).max())} there",
         "the robot is pushed away from home before anything has happened",
         "move the home or correct the constraint (satisfied is a.q + b > 0)",
+    )
+
+
+def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
+    return Finding(
+        "note",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_degrees(value)} there",
+        f"the default gains push within {_degrees(Gains.default().constraint_width)} of it: the robot does not rest at home",
+        "nothing, if that is meant; else move the home",
     )
 
 

@@ -14,7 +14,9 @@ from mobee.robot.check.touching_pairs import TouchingPair, touching_pairs
 from mobee.robot.load import ROBOTS, find_file, load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.merge_srdf import disabled_and_enabled, write_disabled
+from mobee.robot.urdf.srdf import find_srdf
 from mobee.robot.xml_file import is_file
+from mobee.robot.xml_node import read_xml
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any
     again = _read(path, options, target)
     left = sum(contact.kind == "solid" for contact in Model(again).evaluate(again.home).contacts)
     wanted = tuple(pair for pair in touching if pair not in new)
-    return LeftOut(target, base is not None, new, wanted, left, _used(path, None) == target)
+    return LeftOut(target, base is not None, new, wanted, left, _is_found(path, target))
 
 
 def _read(path: Path, options: dict[str, Any], srdf: Path | None) -> Robot:
@@ -65,8 +67,13 @@ def _used(path: Path, srdf: str | Path | None) -> Path | None:
     """The SRDF that load_robot reads."""
     if srdf is not None:
         return Path(srdf)
-    beside = path.with_suffix(".srdf")
-    return beside if is_file(beside) else None
+    root = read_xml(path)
+    return find_srdf(path, root.optional("name") or path.stem)
+
+
+def _is_found(path: Path, srdf: Path) -> bool:
+    found = _used(path, None)
+    return found is not None and found.resolve() == srdf.resolve()
 
 
 def _target(path: Path, out: Path | None, used: Path | None, srdf: str | Path | None) -> Path:

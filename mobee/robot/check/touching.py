@@ -22,15 +22,20 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
             "their contact says nothing, and hides others behind a force that never ends"
             if kind == "field"
             else "every pose counts as a collision, so no plan is ever valid",
-            f"make one smaller, or leave the pair out: {_ignoring(subject, first, second)}",
+            f"make one smaller, or leave the pair out: {_ignoring(subject, first, second)}{_written(subject) if kind == 'solid' else ''}",
         )
+
+
+def _written(subject: Subject) -> str:
+    """What writes the lines of a URDF's solids."""
+    return " (--write-srdf writes it)" if subject.is_urdf else ""
 
 
 def _ignoring(subject: Subject, first: str, second: str) -> str:
     """What leaves out the pair of links of two shapes."""
     link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
     if link1 and link2:
-        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it (--write-srdf writes it)'
+        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
     links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
     return f'<ignore first="{links[first]}" second="{links[second]}"/>'
 
@@ -88,7 +93,7 @@ def _parting(subject: Subject, contact: Contact) -> str:
     remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
     if contact.second_link < 0:
         return remedy
-    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, contact.first, contact.second)}"
+    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, contact.first, contact.second)}{_written(subject)}"
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:

@@ -32,6 +32,12 @@ def test_home_in_violation_is_found(tmp_path: Path) -> None:
     assert said == "warning: home violates the constraint on pan: a.q + b is -45 deg there"
 
 
+@pytest.mark.parametrize(("b", "pushes"), [(10, True), (15, False)])
+def test_a_home_so_near_to_a_boundary_that_it_pushes_is_noted(tmp_path: Path, b: float, pushes: bool) -> None:
+    said = clauses(tmp_path, row("1", b))
+    assert said == (["note: home lies near the boundary of the constraint on pan: a.q + b is 10 deg there"] if pushes else [])
+
+
 def test_a_constraint_that_is_always_satisfied_is_noted(tmp_path: Path) -> None:
     (said,) = clauses(tmp_path, row("1 1", 85, "pan bend"))
     assert said == "note: the constraint on pan, bend is satisfied in every pose within the limits: a.q + b is never below 5 deg"

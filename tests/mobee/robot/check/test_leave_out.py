@@ -143,3 +143,15 @@ def test_no_robot_of_others_touches_itself_at_home_with_it(tmp_path: Path, name:
     done = leave_out_touching(foreign(name), tmp_path / "new.srdf")
     assert (done.touching, done.found) == (0, False)
     assert contacts(foreign(name), done.path) == 0
+
+
+def test_the_srdf_of_a_ros_package_is_the_one_that_grows(urdf: Path, tmp_path: Path) -> None:
+    for folder in ("urdf", "srdf"):
+        (tmp_path / folder).mkdir()
+    moved = urdf.rename(tmp_path / "urdf" / "toy.urdf")
+    srdf = tmp_path / "srdf" / "toy.srdf"
+    srdf.write_text(OLD)
+    done = leave_out_touching(moved)
+    assert done.found and done.path.resolve() == srdf.resolve()
+    assert srdf.read_text() == OLD.replace("</robot>", f" {LINE}\n</robot>")
+    assert contacts(moved) == 0
