@@ -63,7 +63,8 @@ def _motor(motor: Motor) -> ET.Element:
     values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
     values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
     angles = {name: degrees(value) for name, value in values.items()}
-    return ET.Element("motor", {"name": motor.name} | angles | {"torque": number(motor.max_torque)})
+    zone = {"zoneEndsAtHome": "true"} if motor.zone_ends_at_home else {}
+    return ET.Element("motor", {"name": motor.name} | angles | {"torque": number(motor.max_torque)} | zone)
 
 
 def _clause(robot: Robot, clause: Clause) -> ET.Element:

@@ -85,6 +85,8 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
     limits = np.deg2rad([draft.low, draft.high])
     motor = Motor(draft.name, draft.part, limits, float(np.clip(np.deg2rad(draft.home), *limits)), joints)
     node = draft.node
+    if node.flag("zoneEndsAtHome"):
+        motor = replace(motor, zone_ends_at_home=True)
     if "velocity" in node.attributes:
         motor = replace(motor, max_velocity=float(np.deg2rad(node.positive("velocity", unit="degrees per second"))))
     if "acceleration" in node.attributes:

@@ -44,6 +44,7 @@ def test_parts_and_motors(robot: Robot) -> None:
     yaw = robot.motor_table[0]
     np.testing.assert_allclose(np.rad2deg([*yaw.limits, yaw.home, yaw.max_velocity, yaw.max_acceleration]), [-90, 90, 10, 30, 100])
     assert yaw.max_torque == 5
+    assert (yaw.zone_ends_at_home, robot.motor_table[1].zone_ends_at_home) == (True, False)
 
 
 def test_a_motor_drives_each_of_its_joints_from_its_own_interval_onto_theirs(robot: Robot) -> None:

@@ -44,7 +44,9 @@ def test_a_shipped_robot_is_read_back_as_it_was(tmp_path: Path, name: str) -> No
 @pytest.mark.parametrize("name", FOREIGN)
 def test_a_urdf_becomes_xml_of_the_same_robot(tmp_path: Path, name: str, meshes: str) -> None:
     robot = load_robot(foreign(name), field=0.03, meshes=meshes)
-    assert_same_robot(robot, read_back(robot, tmp_path))
+    again = read_back(robot, tmp_path)
+    assert_same_robot(robot, again)
+    assert all(motor.zone_ends_at_home for motor in again.motor_table)
 
 
 def test_angles_that_are_whole_degrees_are_written_so(tmp_path: Path) -> None:
