@@ -45,7 +45,8 @@ def _new_folder(runs: Path, name: str) -> Path:
 
 def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
     """The settings as they are used: files by absolute paths, so that a command in another folder finds the run's robot."""
-    files = {field: str(Path(given).resolve()) for field in ("robot", "world") if is_path(given := getattr(config, field, ""))}
+    named = {field: getattr(config, field, "") for field in ("robot", "world")}
+    files = {field: str(Path(name).resolve()) for field, name in named.items() if is_path(name)}
     config = structs.replace(config, endpoint=endpoint, **files)
     if "run_dir" in config.__struct_fields__ and "run_dir" not in given:
         config = structs.replace(config, run_dir=str(directory))
