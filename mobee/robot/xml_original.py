@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,9 +54,9 @@ class Evidence:
 
 
 def find_evidence(root: Node) -> Evidence | None:
-    """What shows best that a robot file is of 2010 to 2014: first what names a generation, then what is certain."""
+    """What shows best that a robot file is of 2010 to 2014, first what names a generation; certain where anything in the file is."""
     found = sorted(_evidence(root), key=lambda one: (one.generation == GENERATION, not one.certain))
-    return found[0] if found else None
+    return replace(found[0], certain=any(one.certain for one in found)) if found else None
 
 
 def _evidence(root: Node) -> Iterator[Evidence]:

@@ -62,12 +62,10 @@ def upgrade_robot(root: Node) -> list[Remark]:
 
     Raises RobotFileError for an unknown version, and for a fault of form in a file that is not of 2010 to 2014.
     """
-    version, remarks = _version(root)
+    version, remarks, is_certain = _version(root)
     if version == "1.0":
-        ambiguous = not remarks
         remarks = rewrite_original(root) + remarks
-        if ambiguous:
-            remarks += _ambiguous(root)
+        remarks += [] if is_certain else _ambiguous(root)
     else:
         _refuse_repairs(root)
         if version == "0.1":
@@ -89,22 +87,22 @@ def upgrade_world(root: Node) -> list[Remark]:
     return remarks
 
 
-def _version(root: Node) -> tuple[Version, list[Remark]]:
-    """Which version a robot file is of, and the remark that says why, none where its form leaves two."""
+def _version(root: Node) -> tuple[Version, list[Remark], bool]:
+    """Which version a robot file is of, the remark that says why, and whether it can be of no other."""
     given = root.optional("version")
     if given in (VERSION, "0.1"):
-        return ("2.0" if given == VERSION else "0.1"), []
+        return ("2.0" if given == VERSION else "0.1"), [], True
     if given not in ("", "1.0"):
         root.fail(
             "version", f"{shown(given)!r} is not known", f'Write version="{VERSION}" for today\'s grammar. Valid: 0.1, 1.0, {VERSION}'
         )
     original = find_evidence(root)
     if original is not None and original.certain:
-        return "1.0", [original.remark()]
+        return "1.0", [original.remark()], True
     of_0_1 = next(_extensions(root), None)
     if of_0_1 is not None:
-        return "0.1", [Remark(root, f"read as MoBeE 0.1 wrote it, for {of_0_1} is of that version", CONVERT, "note")]
-    return "1.0", [] if original is None else [original.remark()]
+        return "0.1", [Remark(root, f"read as MoBeE 0.1 wrote it, for {of_0_1} is of that version", CONVERT, "note")], True
+    return "1.0", [] if original is None else [original.remark()], False
 
 
 def _extensions(root: Node) -> Iterator[str]:
