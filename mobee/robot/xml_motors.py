@@ -69,7 +69,9 @@ def finish_joints(
         motor = motors[places[node.choice("motor", name, places, "motor")]]
         low, high = node.number("minPos", motor.low), node.number("maxPos", motor.high)
         if low == high:
-            node.fail("minPos", f"equals maxPos {high:g}, so the joint cannot move", "Write a <link> instead, or another interval")
+            node.fail(
+                "minPos", f"equals maxPos {high:g}, so the joint cannot move", 'Write type="fixed" without limits, or another interval'
+            )
         span = np.deg2rad(motor.high - motor.low)
         unit = np.deg2rad(1.0) if joint.kind == "revolute" else 1.0
         scale = (high - low) * unit / span

@@ -192,12 +192,20 @@ def _rewrite_motors(root: Node) -> list[Remark]:
             motor = name
         elif node.tag == "joint":
             remarks += _limits(node)
-            if motor:
+            if node.number("minPos") == node.number("maxPos") == 0:
+                remarks.append(_fixed(node))
+            elif motor:
                 node.attributes["motor"] = motor
         waiting += [(child, motor) for child in reversed(node.children)]
     if again:
         _dissolve(root, again)
     return remarks
+
+
+def _fixed(node: Node) -> Remark:
+    """Make a fixed joint of one that stays at 0."""
+    node.attributes = {name: text for name, text in node.attributes.items() if name not in ("minPos", "maxPos")} | {"type": "fixed"}
+    return Remark(node, "the joint cannot move, for its limits are both 0", 'Write type="fixed" in place of the limits', "note")
 
 
 def _named_again(node: Node, first: Node) -> list[Remark]:

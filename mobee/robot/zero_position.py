@@ -165,9 +165,15 @@ def _name_base(node: Node, draft: Draft) -> None:
 def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
     index = len(draft.joints)
     axis = direction(node, STEP)
+    length = node.positive("length", float(np.linalg.norm(node.vector(STEP))))
+    kind = node.choice("type", node.attributes.get("type", "revolute"), ("revolute", "prismatic", "fixed"), "type of joint")
+    if kind == "fixed":
+        place = replace(place, start=place.point, carrier=place.link, base=node.flag("base"))
+        here = enter(node, draft, place, f"the joint in line {node.line}")
+        read_skeleton(node, draft, here, place.point, axis, length)
+        return here
     motor = node.optional("motor") or place.motor or node.missing("motor")
     name = node.optional("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
-    kind = node.choice("type", node.attributes.get("type", "revolute"), ("revolute", "prismatic"), "type of joint")
     link = node.optional("moves") or name
     if link in draft.links or any(name == joint.name for joint in draft.joints):
         node.fail("name", f"a second joint {name!r} or link {link!r}", "Give every joint its own name and every link it moves another")
@@ -183,7 +189,6 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
         f"joint {name}",
     )
     draft.subtree.append(here.subtree)
-    length = node.positive("length", float(np.linalg.norm(node.vector(STEP))))
     read_skeleton(node, draft, here, place.point, axis, length)
     return here
 

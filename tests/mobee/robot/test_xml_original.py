@@ -143,6 +143,14 @@ def test_no_self_collision_holds_on_a_link_and_below_it(tmp_path: Path) -> None:
     assert tested[1] == 0
 
 
+def test_a_joint_that_stays_at_0_is_fixed_and_moves_nothing(tmp_path: Path) -> None:
+    robot, said = load(old(tmp_path, '<joint x="1" minPos="0" maxPos="0" radius="0.02" length="0.3"><link y="1" radius="0.01"/></joint>'))
+    assert ([joint.name for joint in robot.joints], said) == (["eye", "eye_1"], [])
+    hinge, bone = robot.shapes
+    assert (hinge.size, hinge.link, bone.link) == ((0.02, 0.3), 1, 1)
+    np.testing.assert_allclose(bone.position, [0, 0.5, 0])
+
+
 def test_the_grammar_of_2010(tmp_path: Path) -> None:
     path = tmp_path / "katana.xml"
     lines = (
