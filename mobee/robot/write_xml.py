@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -45,7 +46,8 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
 def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
     """Write a robot or world file of an older version in today's form, element by element, and return how it was understood.
 
-    Comments are left out. Returns None, and writes nothing, for a robot that is in today's form. Raises RobotFileError.
+    Comments are left out, and files that it includes stay as they are. Returns None, and writes nothing, for a robot in today's form.
+    Raises RobotFileError.
     """
     root = read_xml(source, repair=True)
     if root.tag in WORLD_TAGS:
@@ -54,6 +56,9 @@ def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
         return None
     else:
         remarks = upgrade_robot(root)
+    for node in root:
+        if node.tag == "robot" and (source.parent / node.text("file")).is_file():  # no shipped name
+            node.attributes["file"] = Path(os.path.relpath(source.parent / node.text("file"), target.parent)).as_posix()
     write_tree(tree_of(root), target, f"Written by mobee convert from {source.name}.")
     return remarks
 

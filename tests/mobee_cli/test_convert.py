@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import pytest
 
-from mobee.robot.load import load_robot
+from mobee.errors import OlderVersion
+from mobee.robot.load import load_robot, load_world
 from mobee_cli.__main__ import main
 from mobee_cli.errors import BAD_INPUT, FAILED
 from tests.mobee.robot.same_robot import assert_same_robot
@@ -33,6 +35,35 @@ def test_files_that_are_there_are_kept_unless_told_otherwise(tmp_path: Path, cap
     assert "k.srdf is there already. Choose another name, or write over it with --force" in capsys.readouterr().err
     assert not (tmp_path / "k.urdf").exists()
     assert main(["convert", "katana", str(tmp_path / "k.urdf"), "--force"]) == 0
+
+
+def test_an_old_robot_goes_into_todays_form_with_what_was_understood(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "new").mkdir()
+    old, new = tmp_path / "parts" / "old.xml", tmp_path / "new" / "new.xml"
+    motor = '<motor name="m" minPos="0" maxPos="9"><joint z="1"><link x="1"><marker name="tip" nx="1"/></link></joint></motor>'
+    old.write_text(f'<ZeroPositionKinematicTree robotName="old"><bodypart name="arm">{motor}</bodypart></ZeroPositionKinematicTree>')
+    pair = tmp_path / "parts" / "pair.xml"
+    pair.write_text('<ZeroPositionKinematicTree robotName="pair"><robot name="a" file="old.xml"/></ZeroPositionKinematicTree>')
+    assert main(["convert", str(old), str(new)]) == 0
+    said = capsys.readouterr().out
+    assert f"{new}: old, 1 motors, 1 joints, 0 shapes, 1 markers" in said
+    assert "old.xml:1: read as MoBeE 0.1 read it: what stands inside a <link> stands at its end (here)" in said
+    assert 'version="2.0"' in new.read_text() and 'px="1' in new.read_text()
+    assert main(["convert", str(pair), str(tmp_path / "new" / "pair.xml")]) == 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OlderVersion)
+        assert list(load_robot(tmp_path / "new" / "pair.xml").parts) == ["a_arm"]
+
+
+def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new = tmp_path / "old.xml", tmp_path / "new.xml"
+    old.write_text('<WorldList version="1.0"><object name="ball" px="1" type="target"><sphere radius=".1" py="2"/></object></WorldList>')
+    assert main(["convert", str(old), str(new)]) == 0
+    assert f"{new}: 1 objects" in capsys.readouterr().out
+    assert load_world(new).objects["ball"].position.tolist() == [1, 2, 0]
+    assert main(["convert", str(old), str(tmp_path / "new.urdf")]) == BAD_INPUT
+    assert "a world is written as .xml: URDF knows robots only" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
