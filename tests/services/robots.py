@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 ARM = """\
-<ZeroPositionKinematicTree version="1.0" robotName="arm">
+<ZeroPositionKinematicTree version="2.0" robotName="arm">
  <bodypart name="arm">
   <motor name="pan" minPos="-90" maxPos="90" home="0">
    <joint z="1">
@@ -24,7 +24,7 @@ _EYES = """<marker name="left_eye" py="-0.03" nx="-1"/><marker name="right_eye" 
 def seer(block: str = "", eyes: str = _EYES, head: str = "head") -> str:
     """A robot with two eyes on a neck; `block`: a volume on its torso."""
     return f"""\
-<ZeroPositionKinematicTree version="1.0" robotName="seer">
+<ZeroPositionKinematicTree version="2.0" robotName="seer">
  <bodypart name="torso">
   <motor name="turn" minPos="-90" maxPos="90" home="0">
    <joint z="1">

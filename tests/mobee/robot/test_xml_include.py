@@ -11,13 +11,13 @@ from mobee.robot.zero_position import read_robot
 
 ARM = (
     '<bodypart name="arm"><motor name="pan" minPos="0" maxPos="90"><joint z="1">'
-    '<link x="1"><sphere name="tip" radius=".1"/></link></joint></motor></bodypart>'
+    '<link x="1"><sphere name="tip" radius=".1" px="1"/></link></joint></motor></bodypart>'
 )
 
 
 def written(folder: Path, name: str, *lines: str) -> Path:
     path = folder / name
-    text = ['<ZeroPositionKinematicTree robotName="both">', *lines, "</ZeroPositionKinematicTree>"]
+    text = ['<ZeroPositionKinematicTree version="2.0" robotName="both">', *lines, "</ZeroPositionKinematicTree>"]
     path.write_text("\n".join(text), encoding="utf-8")
     return path
 
