@@ -129,8 +129,9 @@ class Node:
                 self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
     def warn(self, problem: str, category: type[Warning] = UserWarning) -> None:
-        """Warn with file, line and tag."""
-        warnings.warn(f"{self.file}:{self.line}: <{shown(self.tag)}>: {problem}", category, stacklevel=2)
+        """Warn with file, line and tag, if there is one."""
+        tag = f"<{shown(self.tag)}>: " if self.tag else ""
+        warnings.warn(f"{self.file}:{self.line}: {tag}{problem}", category, stacklevel=2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,8 +99,8 @@ def rewrite_original(root: Node) -> list[Remark]:
 
 
 def at_line(root: Node, line: int) -> Node:
-    """The root with the line of something in the file that is not an element."""
-    return Node(root.file, line, root.tag, {})
+    """A line of the file that is no element of it."""
+    return Node(root.file, line, "", {})
 
 
 def _with_parents(root: Node) -> Iterator[tuple[Node, Node]]:
