@@ -91,8 +91,8 @@ def _srdf(robot: Robot) -> list[str]:
     file = robot.where.get(("srdf", robot.name))
     if file is None:
         return []
-    poses = [f"its pose {name!r} (line {line.rpartition(':')[2]})" for (kind, name), line in robot.where.items() if kind == "home"]
-    home = poses[0] if poses else "every motor at 0, or at the limit nearest to it"
+    poses = [f"its pose {name!r} (line {line.rpartition(':')[2]})" for (kind, name), line in robot.where.items() if kind == "pose"]
+    home = poses[0] if poses else "every motor at 0, or as near to it as the zones before its limits let it"
     return _wrapped(f"SRDF: {file.rpartition(':')[0]}. Home: {home}.", "", "  ")
 
 

@@ -131,22 +131,26 @@ def _rewrite_structure(root: Node, old: bool) -> list[Remark]:
             node.attributes.pop(name, None)
         if node.tag in ("link", "joint"):
             node.attributes.pop("name", None)  # those programs named neither
-        kept: list[Node] = []
-        inner = list(reversed(node.children))
-        while inner:
-            child = inner.pop()
-            if child.tag in TAGS or (child.tag == "branch" and old):
-                kept.append(child)
-                continue
-            holds = ", not what stands inside" if child.children and child.tag != "object" else ""
-            if child.tag == "object":
-                remarks.append(Remark(child, "an <object> of the world in a robot file is ignored", "Put it into a world file"))
-            else:
-                remarks.append(Remark(child, f"unknown tag is ignored{holds}"))
-                inner += reversed(child.children)
-        node.children = kept
-        waiting += reversed(kept)
+        node.children, ignored = _known_children(node, old)
+        remarks += ignored
+        waiting += reversed(node.children)
     return remarks
+
+
+def _known_children(node: Node, old: bool) -> tuple[list[Node], list[Remark]]:
+    """What an element holds, with the content of unknown tags in their place; `old`: a file of 2010, in which <branch> is known."""
+    kept, remarks = list[Node](), list[Remark]()
+    waiting = list(reversed(node.children))
+    while waiting:
+        child = waiting.pop()
+        if child.tag in TAGS or (child.tag == "branch" and old):
+            kept.append(child)
+        elif child.tag == "object":
+            remarks.append(Remark(child, "an <object> of the world in a robot file is ignored", "Put it into a world file"))
+        else:
+            remarks.append(Remark(child, f"unknown tag is ignored{', not what stands inside' if child.children else ''}"))
+            waiting += reversed(child.children)
+    return kept, remarks
 
 
 def _rewrite_volumes_of_2010(root: Node) -> None:
@@ -269,22 +273,16 @@ def _ignored_constraint(node: Node, parent: Node, in_part: bool) -> Remark | Non
     if node.tag == "constraintlist":
         if not in_part:
             return Remark(node, "<constraintList> outside of every part is ignored, as by the program of 2014", "Move it into a <bodypart>")
-        readable = [child for child in node.children if child.tag == "constraint" and _has_row(child)]
-        return (
-            None
-            if readable
-            else Remark(node, "<constraintList> without a row that can be read is ignored", "Add a <constraint> or remove it")
-        )
+        if any(child.tag == "constraint" and _has_row(child) for child in node):
+            return None
+        return Remark(node, "<constraintList> without a row that can be read is ignored", "Add a <constraint> or remove it")
     if parent.tag != "constraintlist":
         what = "<constraint> outside a <constraintList> is ignored, as by the program of 2014 (VirtualSkin of spring 2012 obeyed it)"
         return Remark(node, what, "Put it into a <constraintList> of its own if it shall count")
-    return (
-        None
-        if _has_row(node)
-        else Remark(
-            node, "<constraint> that cannot be read is ignored, as by the program of 2014", "Give a and q equally many numbers, and b one"
-        )
-    )
+    if _has_row(node):
+        return None
+    what = "<constraint> that cannot be read is ignored, as by the program of 2014"
+    return Remark(node, what, "Give a and q equally many numbers, and b one")
 
 
 def _has_row(node: Node) -> bool:

@@ -80,7 +80,7 @@ def _finish(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, o
     motors, parts = _motors(tree, skeleton, srdf, drives, home)
     where = _where(root, name, tree, skeleton, srdf, parts)
     if home.state:
-        where["home", home.name] = _place(next(iter(home.state.values()))[0])
+        where["pose", home.name] = _place(next(iter(home.state.values()))[0])
     for motor in motors:
         master = drives[skeleton.moving[motor.joints[0][0]].name].master
         where["motor", motor.name] = _place(tree.joints[master].node)
