@@ -92,7 +92,7 @@ def _described(robot: Robot, bare: Robot) -> dict[str, object]:
     return {
         "motors": len(robot.motors),
         "srdf": Path(srdf.rpartition(":")[0]).name,
-        "home": next((name for kind, name in robot.where if kind == "home"), ""),
+        "home": next((name for kind, name in robot.where if kind == "pose"), ""),
         "at_home": _at_home(robot),
         "at_home_without": _at_home(bare),
     }
