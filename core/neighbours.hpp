@@ -1,0 +1,24 @@
+// The contacts of poses that follow each other closely, by a list of neighbours (Verlet).
+#pragma once
+
+#include <cstdint>
+
+#include "contact.hpp"
+#include "robot.hpp"
+
+namespace mobee {
+
+struct Scene;       // a robot among the free objects of one state of the world
+struct Neighbours;  // what one user remembers from pose to pose
+
+// Find the contacts in the pose q (motors,); returns how many, in no order.
+std::int64_t find(Neighbours& near, const double* q);
+
+// Put the contacts of the last `find` in order and add what those of fields do to the motors, the sum of J^T (depth * normal), to
+// `torque` (motors,).
+void feel(Neighbours& near, double* torque);
+
+// The contacts of the last `find`; after `feel` in order: by kind, first and second.
+const Contact& contact(const Neighbours& near, std::int64_t index);
+
+}  // namespace mobee
