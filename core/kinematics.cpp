@@ -96,7 +96,7 @@ void place_links(const Robot& robot, const bool* moved, Links& links) {
     }
 }
 
-void place_links(const Robot& robot, const double* q, Links& links) {
+void place_links_at(const Robot& robot, const double* q, Links& links) {
     joint_angles(robot, q, links.angles.data());
     place_links(robot, nullptr, links);
 }
@@ -129,7 +129,7 @@ MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64
     Links links;
     links.fit(*robot);
     for (std::int64_t b = 0; b < count; ++b) {
-        place_links(*robot, q + b * robot->motors, links);
+        place_links_at(*robot, q + b * robot->motors, links);
         for (const Frame& frame : links.frame) {
             for (int row = 0; row < 3; ++row) {
                 const Four values{frame.x[row], frame.y[row], frame.z[row], frame.shift[row]};
@@ -147,7 +147,7 @@ MOBEE_CALL void mobee_jacobians(const Robot* robot, const double* q, std::int64_
     Links links;
     links.fit(*robot);
     for (std::int64_t b = 0; b < count; ++b) {
-        place_links(*robot, q + b * robot->motors, links);
+        place_links_at(*robot, q + b * robot->motors, links);
         double* here = out + b * 6 * robot->motors;
         std::memset(here, 0, 6 * robot->motors * sizeof(double));
         add_jacobian(*robot, links.frame.data(), link, move(links.frame[link], *point), here);

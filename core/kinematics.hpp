@@ -24,7 +24,7 @@ void sines_cosines(const double* angles, std::int64_t count, double* sines, doub
 void place_links(const Robot& robot, const bool* moved, Links& links);
 
 // All frames at q (motors,).
-void place_links(const Robot& robot, const double* q, Links& links);
+void place_links_at(const Robot& robot, const double* q, Links& links);
 
 // How a point (root frame, now) fixed to a link moves with each motor: adds to `out` (6, motors), linear rows then angular.
 void add_jacobian(const Robot& robot, const Frame* frames, std::int64_t link, Vec3 point, double* out);

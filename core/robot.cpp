@@ -3,6 +3,7 @@
 #include <atomic>
 
 #include "interface.hpp"
+#include "placed.hpp"
 
 namespace mobee {
 
@@ -22,8 +23,6 @@ struct RobotTables {
 };
 
 namespace robots {
-
-constexpr double margin = 1e-9;  // m and relative: above the rounding of places; the narrow phase decides
 
 Frame columns(Vec3 x, Vec3 y, Vec3 z, Vec3 shift) { return Frame{four(x), four(y), four(z), four(shift)}; }
 
@@ -106,7 +105,7 @@ void set_pairs(Robot& robot, const RobotTables& from) {
     robot.reach.resize(shapes * shapes);
     for (std::int64_t i = 0; i < shapes; ++i) {
         for (std::int64_t j = 0; j < shapes; ++j) {
-            const double near = (robot.shape[i].volume.bound + robot.shape[j].volume.bound) * (1.0 + margin) + margin;
+            const double near = roomy(robot.shape[i].volume.bound + robot.shape[j].volume.bound);
             robot.reach[i * shapes + j] = from.tested[i * shapes + j] != 0 ? near * near : -1.0;
         }
     }
