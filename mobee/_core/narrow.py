@@ -72,6 +72,12 @@ class Volumes:
             row["starts"], row["edges"] = address(starts), address(edges)
             self._kept += [starts, edges]
 
+    def taken(self, at: NDArray[np.int64]) -> Volumes:
+        """Some of them, in this order."""
+        taken = Volumes(0)
+        taken.table, taken._kept = self.table[at], self._kept
+        return taken
+
     def __len__(self) -> int:
         return len(self.table)
 

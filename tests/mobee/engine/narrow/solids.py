@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 
-from mobee._core.narrow import KINDS, Volumes, distances, overlaps
+from mobee._core.narrow import Volumes, distances, overlaps
 from mobee.kinematics.quaternion import to_matrix
+
 
 @dataclass
 class Solid:
