@@ -30,7 +30,7 @@ inline void sine_cosine(Lanes angle, Lanes& sine, Lanes& cosine) {
     const Lanes big = odd ? 1.0 - c : s;
     const Lanes small = odd ? s : 1.0 - c;
     sine = turn >= 2 ? -big : big;
-    cosine = turn == 0 ? c : 1.0 - ((turn ^ (turn >> 1)) == 1 ? -small : small);
+    cosine = turn == 0 ? c : 1.0 - (((turn ^ (turn >> 1)) & 1) == 1 ? -small : small);
 }
 
 void set_large_ones(const double* angles, std::int64_t count, double* sines, double* cosines) {
