@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mobee.control import Controller, Forces
 from mobee.control.layout import FEEDFORWARD, MODALITY, POSITION, REFERENCE, TORQUE
-from mobee.engine import engine_of
-from mobee.engine.hands import Hand, hands
-from mobee.engine.track import Neighbours
+from mobee.engine.numba_engine import engine_of
+from mobee.engine.numba_hands import Hand, hands
+from mobee.engine.numba_track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array, Ints
 from mobee.simulation.load import compiled_loop
