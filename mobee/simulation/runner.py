@@ -12,9 +12,15 @@ from mobee._core import plant as core
 from mobee._core.law import TERMS
 from mobee._core.tables import Table, View, view
 from mobee.control import Controller, Forces
+from mobee.engine import engine_of
+from mobee.engine.hands import NOBODY, Hand, Hands
+from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array
 from mobee.simulation.motors import Motors
+from mobee.simulation.rigid import stiffened
+
+SKIN = 0.04  # m
 
 
 class Runner:
@@ -23,7 +29,12 @@ class Runner:
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
         """`parts`: the actions, see `mobee._core.plant.PART`."""
         n = len(alive)
-        self._controller, self._motors, self._dt = controller, motors, dt
+        self._controller, self._motors, self._alive, self._dt = controller, motors, alive, dt
+        self._cut = controller.propagate == "part"
+        self._fields = self._neighbours(solids=False)
+        self._solids: Neighbours | None = None  # where they are asked for
+        self._whole: Neighbours | None = None
+        self._reaching: dict[tuple[Hands, bool], tuple[Neighbours, Hands]] = {}  # for hands that have reached, with these
         substeps = motors.parameters.substeps(dt)
         self._substep = dt / substeps
         self._commands = np.zeros((command_age, n))
@@ -59,13 +70,41 @@ class Runner:
         record = np.zeros((most if kept else 0, 3 * len(self.q) + core.RECORD_DEPTHS))
         struct.record = address(record) if kept else None
         struct.reaches = View(controller.reaches.address, len(controller.reaches))
-        struct.near = None
+        struct.near = self._near(solids) if controller.contact_forces or solids else None
         struct.ticks, struct.most = ticks, most
         self._core.run(self._address)
         done: int = struct.done
         if done:
             controller.last_forces = Forces(*self._forces.copy())
         return record[:done], done, struct.end == core.STATE_LOST
+
+    def _near(self, solids: bool) -> int:
+        """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
+        model = self._controller.model
+        snapshot = model.world.snapshot
+        near, reaching = self._fields, NOBODY
+        if snapshot.attached:
+            near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN, self._cut)
+            reaching = model.hands
+        elif model.hands:
+            near, reaching = self._sparing(model.hands, solids)
+        elif solids:
+            near = self._solids = self._solids or self._neighbours(solids=True)
+        return near.enter(snapshot, reaching)
+
+    def _neighbours(self, solids: bool) -> Neighbours:
+        return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN, self._cut)
+
+    def _sparing(self, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
+        """Those of a robot whose hands are apart from what carries them, and their hands."""
+        known = self._reaching.get((reaching, solids))
+        if known is None:
+            robot = self._controller.robot
+            stiff = stiffened(robot, self._alive, self._cut, solids, apart=[link for hand in reaching for link in (hand.link, hand.fields)])
+            new = {robot.links.index(name): index for index, name in enumerate(stiff.links)}
+            hands = tuple(Hand(new[hand.link], new[hand.fields]) for hand in reaching)
+            known = self._reaching[reaching, solids] = Neighbours(engine_of(stiff), SKIN, self._cut), hands
+        return known
 
     def _pose_forces(self, q: Array) -> Array:
         """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""
