@@ -24,7 +24,7 @@ LEVELS = {"x86_64": ("x86-64-v2", "x86-64-v3", "x86-64-v4")}
 # Strict arithmetic: every level, every compiler and any number of threads give the same bits.
 FLAGS = (
     "-std=c++20", "-O3", "-fPIC", "-fno-exceptions", "-fno-rtti", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
-    "-fvisibility=hidden", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror",
+    "-fvisibility=hidden", "-Wno-psabi", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror",
 )  # fmt: skip
 
 

@@ -19,7 +19,6 @@ MODULES = (
     "mobee.learning.gains",
     "mobee.learning.reaching.sums",
     "mobee.engine.descent",
-    "mobee.engine.sweep",
     "mobee.engine.evaluate",
 )
 ENGINE = ("mobee.engine.scene", "mobee.engine.neighbours", "mobee.engine.evaluate")  # what a model needs
