@@ -170,7 +170,8 @@ class Following:
     def enter(self, scene: Handle, hands: list[int]) -> None:
         """Be among another world, or let others reach."""
         self._scene = scene  # before the core lets go of the last one: nobody else uses this
-        _neighbours_enter(self.at, scene.at, ctypes.addressof((INTEGER * 4)(*hands)))
+        numbers = (INTEGER * 4)(*hands)  # alive during the call
+        _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
         """As `Room.evaluate`, of poses q (B, n) one after the other."""
