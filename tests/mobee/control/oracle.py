@@ -6,7 +6,7 @@ import numpy as np
 
 from mobee.control import Forces, Gains
 from mobee.control.clauses import stack_clauses
-from mobee.control.pack import pack
+from mobee.control.law import Law as Compiled
 from mobee.robot.robot import Array, Robot
 
 
@@ -92,7 +92,4 @@ class Law:
 
 def compiled_forces(robot: Robot, gains: Gains, q: Array, torque: Array | None = None) -> Forces:
     """The same of the compiled law."""
-    from mobee.control.load import law
-
-    packed = pack(robot, gains)
-    return Forces(*law().forces_at(packed.integers, packed.floats, q, np.zeros(len(q)) if torque is None else torque))
+    return Forces(*Compiled(robot, gains).forces(q, np.zeros(len(q)) if torque is None else torque))

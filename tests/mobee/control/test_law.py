@@ -8,9 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control import Controller, Gains
-from mobee.control.layout import ACTIVE, FELT, OWN_VELOCITY, REFERENCE
-from mobee.control.load import law
-from mobee.control.pack import pack
+from mobee.control.law import Law
 from mobee.model import Model
 from mobee.robot.load import load_robot
 from tests.mobee.control import oracle
@@ -59,22 +57,22 @@ def test_only_motors_that_live_and_have_weight_are_moved_and_only_those_that_liv
     arm = ICUB.part("left_arm")
     alive = np.zeros(len(ICUB.motors), dtype=bool)
     alive[arm.slice] = True
-    packed = pack(ICUB, Gains.published_2014(), alive=alive)
-    assert (packed.integers[ACTIVE], packed.integers[FELT]) == (7, 16)
+    law = Law(ICUB, Gains.published_2014(), alive=alive)
+    assert (len(law.active), len(law.felt)) == (7, 16)
     beyond = ICUB.limits[:, 1] + 0.1
-    limits, constraints, collision = law().forces_at(packed.integers, packed.floats, beyond, np.ones(len(beyond)))
+    limits, constraints, collision = law.forces(beyond, np.ones(len(beyond)))
     assert np.all(limits[alive] < 0) and not limits[~alive].any()
     assert constraints[alive].any()
     assert np.all(collision[alive] > 0) and not collision[~alive].any()
-    state = law().at_rest(packed.integers, packed.floats, beyond)
-    law().step(packed.integers, packed.floats, beyond, 0.01, ICUB.home.copy(), limits, state)
-    assert np.flatnonzero(state[OWN_VELOCITY]).tolist() == list(range(arm.start, arm.start + 7))
+    state = law.at_rest(beyond)
+    law.step(beyond, 0.01, ICUB.home, limits, state)
+    assert np.flatnonzero(state["velocity"]).tolist() == list(range(arm.start, arm.start + 7))
 
 
 def test_the_reference_of_a_motor_that_is_never_moved_is_within_its_limits() -> None:
-    packed = pack(ICUB, replace(Gains.default(), weights=(("*", 0.0),)))
-    state = law().at_rest(packed.integers, packed.floats, ICUB.limits[:, 1] + 0.1)
-    assert state[REFERENCE] == pytest.approx(ICUB.limits[:, 1])
+    law = Law(ICUB, replace(Gains.default(), weights=(("*", 0.0),)))
+    state = law.at_rest(ICUB.limits[:, 1] + 0.1)
+    assert state["reference"] == pytest.approx(ICUB.limits[:, 1])
 
 
 def test_all_that_the_default_law_pulls_with_together_is_weaker_than_a_limit() -> None:

@@ -11,8 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control import Controller, Gains, Settle
-from mobee.control import reach_layout as at
-from mobee.control.load import reach_law
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.reach import ReachTarget
@@ -36,7 +34,7 @@ def poses(robot: Robot, seed: int, count: int = 3) -> Array:
 def felt(controller: Controller, q: Array) -> Array:
     """What the reaches add to the acceleration at q, their attractor, (n,) rad/s^2."""
     total = np.zeros(len(q))
-    reach_law().add_reaches(controller.law.integers, controller.law.floats, q.copy(), q.copy(), 0.01, total, *controller.reaches)
+    controller.reaches.add_forces(q, q, 0.01, total)
     return total
 
 
@@ -89,11 +87,13 @@ def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> No
             some = rng.random(len(q)) < 0.4
             q[some] = poses(robot, int(rng.integers(2**32)), 1)[0][some]
             controller.step(q, 1e-3)
-            real, motors = controller.reaches[3][0], controller.reaches[5][0]
+            found = controller.reaches["body"]
+            columns = np.zeros((6, len(q)))
+            columns[:, found.motors["motor"]] = found.motors["column"].T
             pose = model.evaluate(q)
-            assert real[at.AT : at.AT + 3] == pytest.approx(pose.position(marker), abs=1e-12)
-            assert real[at.FACING : at.FACING + 3] == pytest.approx(pose.normal(marker), abs=1e-12)
-            assert motors[at.COLUMN : at.COLUMN + 6] == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
+            assert list(found.struct.at) == pytest.approx(pose.position(marker), abs=1e-12)
+            assert list(found.struct.facing) == pytest.approx(pose.normal(marker), abs=1e-12)
+            assert columns == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
 
 
 @BOTH
@@ -112,9 +112,12 @@ def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> N
         fresh = Controller(model, gains)
         fresh.reach_toward("right_arm", "right_palm", target)
         fresh.step(q, 0.01)
-        for row in (slice(at.AT, at.MISSING + 1),):
-            assert np.array_equal(old.reaches[3][0][row], fresh.reaches[3][0][row])
-        assert np.array_equal(old.reaches[5][0][: at.EASE], fresh.reaches[5][0][: at.EASE])
+        one, other = old.reaches["right_arm"], fresh.reaches["right_arm"]
+        for name in ("at", "facing", "error"):
+            assert list(getattr(one.struct, name)) == list(getattr(other.struct, name))
+        assert one.struct.missing == other.struct.missing
+        for name in ("column", "slope"):
+            assert np.array_equal(one.motors[name], other.motors[name])
 
 
 @BOTH

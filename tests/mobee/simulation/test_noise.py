@@ -5,14 +5,17 @@ import pytest
 
 from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors
-from mobee.simulation.load import compiled
 
 MASK = 2**64 - 1
-MOTORS = np.arange(41)
+ROBOT = load_robot("icub")
+MOTORS = np.arange(len(ROBOT.motors))
 
 
 def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
-    return np.array([compiled().noise.encoder_noise(np.uint64(seed), k, motors) for k in ticks])
+    """What is added to the encoders where the standard deviation is 1."""
+    alive = np.isin(MOTORS, motors)
+    drawn = Motors(ROBOT, MotorParameters(encoder_noise=1.0), seed, np.zeros(len(MOTORS)), alive)
+    return np.array([drawn.encoders(k, 0.02)[motors] for k in ticks])
 
 
 def splitmix(x: int) -> int:
@@ -60,7 +63,7 @@ def test_ticks_motors_and_seeds_are_uncorrelated(lag: int) -> None:
 
 
 def test_a_part_is_read_with_the_noise_that_the_whole_robot_is_read_with() -> None:
-    robot = load_robot("icub")
+    robot = ROBOT
     motors = Motors(robot, MotorParameters(), seed=9, q=robot.home)
     where = robot.parts["right_arm"].slice
     assert np.array_equal(motors.encoders(4, 0.01)[where], motors.encoders(4, 0.01, where))
