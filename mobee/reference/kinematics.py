@@ -1,4 +1,4 @@
-"""Where links and markers are at a pose, and how they move with each motor (thesis 2.3.1, eq. 5.1).
+"""Where links and markers are at a pose, how they move with each motor (thesis 2.3.1, eq. 5.1), and what they weigh.
 
 The robot is given in zero-position form: axes and points of all joints in the root frame, every joint at zero (Gupta 1986).
 `mobee.kinematics` computes the same for many poses at once.
@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.robot.robot import Array, Joint, Robot
+
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, root frame
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:
@@ -94,3 +96,12 @@ def marker_jacobian(robot: Robot, q: Array, name: str) -> Array:
     """The same of a marker, at q (n,) rad."""
     frames = link_frames(robot, q)
     return jacobian(robot, frames, robot.marker(name).link, marker_at(robot, frames, name)[0])
+
+
+def weight_torque(robot: Robot, q: Array) -> Array:
+    """What the motors need to carry the robot's weight, (n,) N m: -sum of J^T m g over the masses; zeros where the file names none."""
+    frames, torque = link_frames(robot, q), np.zeros(len(q))
+    for body in robot.bodies:
+        centre = moved(frames[body.link], body.centre)
+        torque -= jacobian(robot, frames, body.link, centre)[:3].T @ (body.mass * GRAVITY)
+    return torque

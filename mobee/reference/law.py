@@ -18,8 +18,8 @@ import numpy as np
 
 from mobee.control.gains import Gains
 from mobee.control.modality import FRICTION, INERTIA
-from mobee.kinematics.gravity import gravity_torque
 from mobee.reference.forces import State, clause_force, config_force, contact_force, damping, limit_force, spring, work_force
+from mobee.reference.kinematics import weight_torque
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
 
@@ -88,7 +88,7 @@ def hold(robot: Robot, motion: Motion, part: str) -> Motion:
 def torque(robot: Robot, motion: Motion, q: Array) -> Array:
     """The torque command (n,) N m: what gives a motor its velocity and acceleration, and what carries the weight at q (n,) rad."""
     most = np.array([motor.max_torque for motor in robot.motor_table])
-    wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + gravity_torque(robot, q)
+    wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + weight_torque(robot, q)
     return np.clip(wanted, -most, most)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
-from mobee.control import Gains, constraint_forces
+from mobee.control import Gains
 from mobee.model import Model
 from mobee.reference.contact_forces import projected
 from mobee.reference.forces import (
@@ -30,6 +30,7 @@ from mobee.reference.forces import (
 )
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Array, Clause, Robot
+from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching
 from tests.mobee.planar import planar_arm
 from tests.mobee.reference.drawn import apart, drawn_gains, drawn_pose, drawn_robot
@@ -118,25 +119,12 @@ def test_a_clients_force_keeps_its_direction_in_each_part_where_the_gains_say_so
         assert bounded[part.slice] * f[part.start] == pytest.approx(f[part.slice] * bounded[part.start], rel=1e-9)
 
 
-@dataclass
-class Felt:
-    """What of a pose the forces are made of, with contacts as one likes."""
-
-    robot: Robot
-    q: Array
-    projection: Array
-
-    @property
-    def projection_of_part(self) -> Array:
-        return self.projection
-
-
 @given(SEEDS)
 def test_the_controllers_forces_are_these(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot, gains = drawn_robot(rng), drawn_gains(rng)
     q, torque = drawn_pose(rng, robot), rng.normal(size=len(robot.motors)) * 10.0 ** rng.uniform(-6, 1)
-    found = constraint_forces(Felt(robot, q, torque), gains)
+    found = forces_at(robot, gains, q, torque)
     assert apart(found.limits, limit_force(at(robot, gains, q))) < ROUNDING
     assert apart(found.constraints, clause_force(at(robot, gains, q))) < ROUNDING
     assert apart(found.collision, bounded_contact(robot, gains, torque)) < ROUNDING

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee import kinematics
+from mobee.kinematics.gravity import gravity_torque
 from mobee.model import Model
-from mobee.reference.kinematics import cross_matrix, jacobian, link_frames, marker_at, marker_jacobian, moved, rotation
+from mobee.reference.kinematics import cross_matrix, jacobian, link_frames, marker_at, marker_jacobian, moved, rotation, weight_torque
 from mobee.robot.load import load_robot
 from tests.mobee.planar import LENGTH, planar_arm
 from tests.mobee.reference.drawn import drawn_pose, drawn_robot
@@ -78,3 +79,4 @@ def test_shipped_robots_are_where_the_definition_puts_them(name: str, rng: np.ra
     batch = Model(robot).evaluate(q)
     for one, links in zip(q, batch.transforms, strict=True):
         assert links == pytest.approx(link_frames(robot, one), abs=1e-14)
+        assert gravity_torque(robot, one) == pytest.approx(weight_torque(robot, one), abs=1e-10)  # N m, of some ten

@@ -1,4 +1,4 @@
-"""The sum of the forces and its steps: the controller's motion is that of the definition; a force of one's own goes in beside the others."""
+"""The sum of the forces and its steps: the controller moves as the definition says, and a force of one's own goes in beside the others."""
 
 from __future__ import annotations
 

@@ -60,17 +60,19 @@ def test_the_transition_model_counts_and_pays_this(observed: list[tuple[int, int
         assert counts == pytest.approx(np.array(list(known[s, a].values())), rel=0.0 if forgetting == 1.0 else 1e-12)
         believed = list(reference.probabilities(known[s, a]).values())
         assert model.probabilities[s, a, : len(believed)] == pytest.approx(believed, abs=1e-15)
+    assert model.tries.sum() == len(observed)
     untried = next((s, a) for s in range(6) for a in range(3) if (s, a) not in known)
     assert model.reward[untried] == pytest.approx(imagined(*untried, initial)[1], abs=1e-15)
 
 
-@given(OBSERVED)
-def test_plain_kl_pays_this(observed: list[tuple[int, int, int]]) -> None:
-    model = TransitionModel(SPACE, divergence="kl")
+@given(OBSERVED, st.sampled_from([1.0, 0.9, 0.5]))
+def test_plain_kl_pays_this(observed: list[tuple[int, int, int]], forgetting: float) -> None:
+    model = TransitionModel(SPACE, divergence="kl", forgetting=forgetting)
     counts = np.ones((6, 2, len(SPACE)))
     for s, a, outcome in observed:
-        counts[s, a], reward = reference.observe_among_all(counts[s, a], outcome)
+        counts[s, a], reward = reference.observe_among_all(1.0 + forgetting * (counts[s, a] - 1.0), outcome)
         assert model.observe(s, a, outcome) == pytest.approx(reward, abs=1e-12)
+        assert model.totals[s, a] == pytest.approx(counts[s, a].sum())
 
 
 @pytest.mark.parametrize("seed", range(40))
