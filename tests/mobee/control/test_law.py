@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.control import Controller, Gains
+from mobee.control import Gains
 from mobee.control.law import Law
-from mobee.model import Model
 from mobee.robot.load import load_robot
 
 ICUB = load_robot("icub")
