@@ -29,17 +29,17 @@ class PackedReaches:
     def __init__(self, robot: Robot, law: Ints) -> None:
         """`law`: its integers, see `layout`."""
         self._robot, self._law = robot, law
-        self._known: dict[tuple[str, str], Arrays] = {}  # by part and marker
-        self._markers: dict[str, str] = {}  # of each part that reaches, in the order of the arrays' rows
+        self._known: dict[tuple[str | None, str], Arrays] = {}  # by part and marker
+        self._markers: dict[str | None, str] = {}  # of each part that reaches, None the whole body, in the order of the arrays' rows
         self.arrays: Arrays = self._stacked([])
 
     def __bool__(self) -> bool:
         return bool(self._markers)
 
-    def begin(self, part: str, marker: str) -> None:
-        """Let a part draw a marker, to nowhere yet; the part's reach before is forgotten.
+    def begin(self, part: str | None, marker: str) -> None:
+        """Let a part draw a marker, None: the whole body, to nowhere yet; its reach before is forgotten.
 
-        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        Raises InvalidValue if none of its motors that may be moved moves the marker; UnknownName.
         """
         known = self._known.get((part, marker))
         if known is None:
@@ -49,7 +49,7 @@ class PackedReaches:
         self._markers[part] = marker
         self.arrays = self._stacked([*self._rows(), known])
 
-    def aim(self, part: str, target: ReachTarget) -> None:
+    def aim(self, part: str | None, target: ReachTarget) -> None:
         """Tell a part's reach where to."""
         row = list(self._markers).index(part)
         whole, real = self.arrays[0][row], self.arrays[3][row]
@@ -57,27 +57,28 @@ class PackedReaches:
         real[at.TARGET : at.TARGET + 3], real[at.RADIUS] = target.position, target.radius
         real[at.WANTED : at.WANTED + 3] = 0.0 if target.normal is None else target.normal
 
-    def end(self, part: str) -> None:
+    def end(self, part: str | None) -> None:
         """Forget a part's reach, if there is one."""
         if part in self._markers:
             rows = self._rows()
             del rows[list(self._markers).index(part)], self._markers[part]
             self.arrays = self._stacked(rows)
 
-    def marker(self, part: str) -> str | None:
+    def marker(self, part: str | None) -> str | None:
         """The marker that a part draws."""
         return self._markers.get(part)
 
-    def _drawn(self, part: str, marker: str) -> Ints:
-        """The motors of a part that may be moved and that move a marker."""
+    def _drawn(self, part: str | None, marker: str) -> Ints:
+        """The motors of a part, or of the whole body, that may be moved and that move a marker."""
         robot, law = self._robot, self._law
-        link, where = robot.marker(marker).link, robot.part(part).slice
+        link, where = robot.marker(marker).link, slice(0, None) if part is None else robot.part(part).slice
         moving = np.zeros(len(robot.motors), dtype=bool)
         moving[law[law[I_ACTIVE] :][: law[ACTIVE]]] = True
         moving &= (robot.coupling[0][tables(robot).ancestry[link]] != 0.0).any(axis=0)
         motors: Ints = where.start + np.flatnonzero(moving[where])
         if not len(motors):
-            raise InvalidValue(f"{part} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does")
+            who = "the robot" if part is None else part
+            raise InvalidValue(f"{who} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does")
         return motors
 
     def _rows(self) -> list[Arrays]:
@@ -107,11 +108,13 @@ def _drives(robot: Robot) -> int:
     return int((robot.coupling[0] != 0.0).sum(axis=1).max(initial=1))
 
 
-def _packed(robot: Robot, part: str, marker: Marker, motors: Ints) -> Arrays:
+def _packed(robot: Robot, part: str | None, marker: Marker, motors: Ints) -> Arrays:
     """The arrays of one reach, without a target."""
     links = tables(robot).ancestry[marker.link]
     matrix, offset = robot.coupling
-    drives, own, n = _drives(robot), robot.part(part).slice, len(robot.motors)
+    drives, n = _drives(robot), len(robot.motors)
+    # The whole body is no part that begins with a motor: no part's action waits for its reach.
+    first, stop = (-1, -1) if part is None else (robot.part(part).slice.start, robot.part(part).slice.stop)
     driven = np.zeros((len(links), at.DRIVEN_BY + drives), dtype=np.int64)
     chain = np.zeros((len(links), at.LINK + 2 * drives))
     chain[:, at.ANGLE] = np.nan  # no pose yet
@@ -125,7 +128,7 @@ def _packed(robot: Robot, part: str, marker: Marker, motors: Ints) -> Arrays:
         chain[k, at.LINK + drives : at.LINK + drives + len(by)] = matrix[j, by] * motor_units(robot)[by] * pulled
     chain[:1, at.FRAME : at.FRAME + 9] = np.eye(3).ravel()
     used = 1 + int(np.flatnonzero(driven[:, at.PULLED])[-1])
-    whole = np.array([own.start, own.stop, len(motors), len(links), used, 0, 0], dtype=np.int64)
+    whole = np.array([first, stop, len(motors), len(links), used, 0, 0], dtype=np.int64)
     real = np.zeros(at.REAL)
     real[at.POINT : at.POINT + 3], real[at.NORMAL : at.NORMAL + 3] = marker.position, marker.normal
     return whole, np.pad(motors, (0, n - len(motors))).astype(np.int64), driven, real, chain, np.zeros((at.ROWS + len(motors), n))
