@@ -1,6 +1,6 @@
 """Build the native core: one shared library for each level of x86-64 processors, one in all elsewhere.
 
-    python core/build.py [--only x86-64-v3] [--into FOLDER] [--sanitize] [--lenient] [--force] [--check]
+    python core/build.py [--only x86-64-v3] [--into FOLDER] [--sanitize] [--no-strict] [--force] [--check]
 
 The compiler is $CXX, else the system's g++ or clang++ where it knows C++20, else that of the `ziglang` package.  Nothing is linked
 but the C library, so that the result runs wherever the C library is at least as old.  A library that was built from the same
@@ -82,49 +82,39 @@ def main() -> None:
     parser.add_argument("--only", choices=levels, help="one level instead of all")
     parser.add_argument("--into", type=Path, help="another folder than the library's")
     parser.add_argument("--sanitize", action="store_true", help="one build that stops at wrong addresses and undefined operations")
-    parser.add_argument("--lenient", action="store_true", help="warnings are no errors: for compilers that the project has not seen")
+    parser.add_argument("--strict", action=argparse.BooleanOptionalAction, default=True, help="whether warnings are errors")
     parser.add_argument("--force", action="store_true", help="build anew what is current, too")
-    parser.add_argument("--check", action="store_true", help=f"exit code: 0 all current, 1 to be built, {NO_COMPILER} no compiler")
+    parser.add_argument("--check", action="store_true", help="only look: exit code 1 if something is to be built")
     given = parser.parse_args()
     wanted = (knowledge().SANITIZED,) if given.sanitize else (given.only,) if given.only else levels
+    into = given.into or knowledge().FOLDER
     try:
-        if given.check:
-            sys.exit(check(wanted, given.into))
+        stale = [level for level in wanted if given.force or not is_current(level, into, strict=given.strict)]
+        if given.check or not stale:
+            sys.exit(1 if stale else 0)
         start = time.monotonic()
-        for library in build(wanted, given.into, strict=not given.lenient, force=given.force):
+        compiler = compiler_for(stale)
+        sys.stderr.write(f"core: compiling {', '.join(stale)} with {compiler.name} ...\n")
+        for library in build(stale, compiler, into, strict=given.strict):
             print(f"{library.name}: {library.stat().st_size / 1024:.0f} kB, after {time.monotonic() - start:.1f} s", flush=True)
+    except OSError as error:
+        sys.exit(f"core: cannot write {error.filename or into}: {error.strerror}")
     except BuildFailed as failure:
         sys.stderr.write(f"{failure}\n")
         sys.exit(NO_COMPILER if isinstance(failure, CompilerMissing) else 1)
 
 
-def build(levels: Sequence[str], into: Path | None = None, strict: bool = True, force: bool = False) -> Iterator[Path]:
-    """Build those levels that are not current, all processors at work, and give each file when it is there; raises BuildFailed."""
-    into = into or knowledge().FOLDER
-    stale = [level for level in levels if force or not is_current(level, into, strict)]
-    if not stale:
-        return
+def build(levels: Sequence[str], compiler: Compiler, into: Path, strict: bool) -> Iterator[Path]:
+    """Build levels, all processors at work, and give each file when it is there; raises BuildFailed."""
     into.mkdir(parents=True, exist_ok=True)
-    compiler = sanitizing_compiler() if knowledge().SANITIZED in stale else find_compiler()
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        made = [pool.submit(_build_one, compiler, level, into, strict) for level in stale]
+        made = [pool.submit(_build_one, compiler, level, into, strict) for level in levels]
         try:
             for future in concurrent.futures.as_completed(made):
                 yield future.result()
         finally:
             for future in made:
                 future.cancel()
-
-
-def check(levels: Sequence[str], into: Path | None = None) -> int:
-    """0: all are current; 1: to be built, here is a compiler; NO_COMPILER: here is none."""
-    if all(is_current(level, into or knowledge().FOLDER, strict=False) for level in levels):
-        return 0
-    try:
-        find_compiler()
-    except CompilerMissing:
-        return NO_COMPILER
-    return 1
 
 
 def is_current(level: str, into: Path, strict: bool) -> bool:
@@ -137,8 +127,12 @@ def is_current(level: str, into: Path, strict: bool) -> bool:
     return found is not None and found[1].decode() == knowledge().fingerprint() and (not strict or found[2] == b"strict")
 
 
-def find_compiler() -> Compiler:
-    """The first that compiles C++20 for this machine's levels; raises CompilerMissing."""
+def compiler_for(levels: Sequence[str]) -> Compiler:
+    """The first that compiles C++20 for this machine; for the sanitizers g++, whose libraries Python can load.  Raises BuildFailed."""
+    if knowledge().SANITIZED in levels:
+        if sys.platform == "linux" and shutil.which("g++"):
+            return Compiler(("g++",))
+        raise BuildFailed("core: the sanitizers need g++ on Linux, with its libasan and libubsan")
     if asked := os.environ.get("CXX"):
         return Compiler(tuple(shlex.split(asked)))
     for name in ("g++", "clang++"):
@@ -147,13 +141,6 @@ def find_compiler() -> Compiler:
     if importlib.util.find_spec("ziglang"):
         return Compiler((sys.executable, "-m", "ziglang"), zig=True)
     raise CompilerMissing
-
-
-def sanitizing_compiler() -> Compiler:
-    """g++, whose sanitizers can be loaded into a Python that was built without them."""
-    if sys.platform == "linux" and shutil.which("g++"):
-        return Compiler(("g++",))
-    raise BuildFailed("core: the sanitizers need g++ on Linux, with its libasan and libubsan")
 
 
 def zig_requirement() -> str:
@@ -209,9 +196,7 @@ def _processor(level: str, zig: bool) -> list[str]:
 
 def _with_system(compiler: Compiler, flags: list[str], source: Path, library: Path) -> None:
     """In one go.  The compiler's own libraries are named by its driver; --as-needed drops those of which nothing is used."""
-    linked = [f"-mmacosx-version-min={macos_version()}"] if sys.platform == "darwin" else ["-Wl,--as-needed", "-Wl,-z,defs"]
-    if "-fsanitize=address,undefined" in flags and "-Wl,-z,defs" in linked:
-        linked.remove("-Wl,-z,defs")  # the sanitizers' functions come with the process
+    linked = [f"-mmacosx-version-min={macos_version()}"] if sys.platform == "darwin" else ["-Wl,--as-needed"]
     _run([*compiler.command, *flags, str(source), "-shared", *linked, "-o", str(library), "-lm"], compiler)
 
 

@@ -21,14 +21,19 @@ class CoreHook(BuildHookInterface[Any]):
 
     def dependencies(self) -> list[str]:
         """What the build needs beyond hatchling: a compiler, where the system has none."""
-        return [core.zig_requirement()] if core.check(core.knowledge().machine_levels()) == core.NO_COMPILER else []
+        try:
+            stale = self._stale()
+            return [] if not stale or not core.compiler_for(stale).zig else [core.zig_requirement()]
+        except core.CompilerMissing:
+            return [core.zig_requirement()]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build, and tell hatchling what to pack and for which machines; ends with the compiler's words if it fails."""
         levels = core.knowledge().machine_levels()
         try:
-            for library in core.build(levels, strict=False):
-                self.app.display_info(f"built {library.name}")
+            if stale := self._stale():
+                for library in core.build(stale, core.compiler_for(stale), core.knowledge().FOLDER, strict=False):
+                    self.app.display_info(f"built {library.name}")
         except core.BuildFailed as failure:
             sys.exit(str(failure))
         libraries = [core.knowledge().library_file(level) for level in levels]
@@ -36,6 +41,9 @@ class CoreHook(BuildHookInterface[Any]):
         build_data["tag"] = f"py3-none-{wheel_platform(libraries)}"
         if version == "standard":
             build_data["force_include"].update({str(path): f"mobee/_core/{path.name}" for path in libraries})
+
+    def _stale(self) -> list[str]:
+        return [level for level in core.knowledge().machine_levels() if not core.is_current(level, core.knowledge().FOLDER, strict=False)]
 
 
 def wheel_platform(libraries: list[Path]) -> str:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 
-from build import BuildFailed, build, knowledge, sanitizing_compiler
+from build import BuildFailed, Compiler, build, compiler_for, is_current, knowledge
 
 RUNTIMES = ("libasan.so", "libubsan.so")
 SETTINGS = {
@@ -28,20 +28,23 @@ def main() -> None:
     if not command:
         sys.exit(f"usage: {__doc__.splitlines()[2].strip()}")  # type: ignore[union-attr]
     try:
-        list(build([knowledge().SANITIZED]))
-        loaded = " ".join(_runtime(name) for name in RUNTIMES)
+        level, folder = knowledge().SANITIZED, knowledge().FOLDER
+        compiler = compiler_for([level])
+        if not is_current(level, folder, strict=False):
+            list(build([level], compiler, folder, strict=False))
+        loaded = " ".join(_runtime(compiler, name) for name in RUNTIMES)
     except BuildFailed as failure:
         sys.exit(str(failure))
-    environment = {**os.environ, **SETTINGS, "LD_PRELOAD": loaded, "MOBEE_CORE": knowledge().SANITIZED}
+    environment = {**os.environ, **SETTINGS, "LD_PRELOAD": loaded, "MOBEE_CORE": level}
     try:
         os.execvpe(command[0], command, environment)
     except OSError as error:
         sys.exit(f"core: {command[0]} could not be started: {error.strerror}")
 
 
-def _runtime(name: str) -> str:
+def _runtime(compiler: Compiler, name: str) -> str:
     """Where the compiler keeps one of its libraries; it answers with the bare name when there is none."""
-    asked = [*sanitizing_compiler().command, f"-print-file-name={name}"]
+    asked = [*compiler.command, f"-print-file-name={name}"]
     found = subprocess.run(asked, capture_output=True, check=True, text=True).stdout.strip()
     if found == name:
         raise BuildFailed(f"core: g++ has no {name}: install it (Debian: apt install libasan8 libubsan1, of g++'s version)")

@@ -17,7 +17,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from mobee._core.levels import FOLDER, SANITIZED, SOURCES, fingerprint, library_file, machine_levels, missing, processor_flags
-from mobee.errors import InvalidValue, MobeeError, UnknownName
+from mobee.errors import NotInstalled, UnknownName
 
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
@@ -30,8 +30,8 @@ FORCED = "MOBEE_CORE"
 """The environment variable that names the build to use."""
 
 
-class CoreMissing(MobeeError):
-    """There is no native library for this machine, or not of these sources; the message holds the remedy."""
+class CoreUnavailable(NotInstalled):
+    """There is no native library for this machine, or not of these sources, or the one asked for does not run here."""
 
 
 @cache
@@ -47,33 +47,33 @@ def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
     possible = [level for level in known if not missing(level, flags)]
     if forced:
         if forced == SANITIZED and "asan" not in os.environ.get("LD_PRELOAD", ""):
-            raise InvalidValue(f"{FORCED}={forced} needs the sanitizers in the process before it: run python core/sanitize.py COMMAND.")
+            raise CoreUnavailable(f"{FORCED}={forced} needs the sanitizers in the process before it: run python core/sanitize.py COMMAND.")
         if forced not in (*known, SANITIZED):
-            raise UnknownName(f"build of the core in {FORCED}:", forced, known)
+            raise CoreUnavailable(str(UnknownName(f"level in {FORCED}:", forced, known)))
         if lacks := missing(forced, flags):
             rest = f"Valid here: {', '.join(possible)}; or leave {FORCED} out." if possible else "None of the builds runs here."
-            raise InvalidValue(f"{FORCED}={forced}: this processor lacks {', '.join(lacks)}. {rest}")
+            raise CoreUnavailable(f"{FORCED}={forced}: this processor lacks {', '.join(lacks)}. {rest}")
         return forced
     if not possible:
         lacks = missing(known[0], flags)
-        raise CoreMissing(f"MoBeE needs a processor of level {known[0]}, of about 2009 or later: this one lacks {', '.join(lacks)}.")
+        raise CoreUnavailable(f"MoBeE needs a processor of level {known[0]}, of about 2009 or later: this one lacks {', '.join(lacks)}.")
     return next((level for level in reversed(possible) if library_file(level, folder).exists()), possible[-1])
 
 
 def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
-    """A build, after a look whether it is of the sources beside it and of these declarations; raises CoreMissing."""
+    """A build, after a look whether it is of the sources beside it and of these declarations; raises CoreUnavailable."""
     file = library_file(level, folder)
     if not file.exists():
-        raise CoreMissing(f"there is no {file}: {_remedy(level)}")
+        raise CoreUnavailable(f"there is no {file}: {_remedy(level)}")
     try:
         found = ctypes.CDLL(str(file))
     except OSError as error:
-        raise CoreMissing(f"{file} cannot be loaded ({error}): {_remedy(level)}") from None
+        raise CoreUnavailable(f"{file} cannot be loaded ({error}): {_remedy(level)}") from None
     found.mobee_sources.restype = ctypes.c_char_p
     if _is_checkout() and fingerprint() not in found.mobee_sources().decode():
-        raise CoreMissing(f"{file} was built from other sources than those in {SOURCES}: {_remedy(level)}")
+        raise CoreUnavailable(f"{file} was built from other sources than those in {SOURCES}: {_remedy(level)}")
     if (abi := found.mobee_abi()) != ABI:
-        raise CoreMissing(f"{file} has the interface {abi}, this version of mobee calls {ABI}: {_remedy(level)}")
+        raise CoreUnavailable(f"{file} has the interface {abi}, this version of mobee calls {ABI}: {_remedy(level)}")
     return found
 
 
@@ -99,4 +99,4 @@ def _remedy(level: str) -> str:
     return f"run {Path(sys.executable).name} {SOURCES / 'build.py'}" + (" --sanitize" if level == SANITIZED else "")
 
 
-__all__ = ["ADDRESS", "BYTES", "INTEGER", "REAL", "CoreMissing", "address", "function", "library"]
+__all__ = ["ADDRESS", "BYTES", "INTEGER", "REAL", "CoreUnavailable", "address", "function", "library"]
