@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from mobee.robot.robot import Array
+from services.vision.blobs import Picture, enclosed_area, outer_borders, red_pixels
 
-Picture = NDArray[np.uint8]
-
-HUE_SPREAD, MIN_SATURATION, MIN_VALUE = 8, 130, 50  # OpenCV's units: hue 0..180, the rest 0..255
 MIN_AREA = 40.0  # px
 INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: still on it; certainly not of the ball
 MIN_ARC = 0.6  # of the outline must be seen
@@ -54,12 +50,9 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
 
 
 def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
-    """Border pixels (m, 2) as column, row, and area [px] of each connected red region."""
-    hsv = cv2.cvtColor(picture, cv2.COLOR_RGB2HSV)
-    low = cv2.inRange(hsv, (0, MIN_SATURATION, MIN_VALUE), (HUE_SPREAD, 255, 255))
-    high = cv2.inRange(hsv, (180 - HUE_SPREAD, MIN_SATURATION, MIN_VALUE), (180, 255, 255))
-    contours, _ = cv2.findContours(cv2.bitwise_or(low, high), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return [(contour[:, 0, :].astype(np.float64), cv2.contourArea(contour)) for contour in contours]
+    """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough."""
+    borders = outer_borders(red_pixels(picture), int(MIN_AREA))
+    return [(border.astype(np.float64), enclosed_area(border)) for border in borders]
 
 
 def _rays(points: Array, intrinsics: Array) -> Array:
