@@ -52,28 +52,32 @@ make_venv() { # interpreter
 
 # Byte code is written when a module is first imported: most never are.
 install_packages() { # lock file, its size in words
-  local log="$venv/pip.log" code=0
+  local log="$venv/pip.log" code=0 counter=""
   say "1 of 3: $(grep -c '^[a-z].*==' "$1") packages into .venv, $2 ..."
-  pip install --progress-bar off --no-compile --require-hashes -r "$1" >"$log" 2>&1 &
-  if [[ -t 2 ]]; then count_packages $! "$log"; fi
-  wait $! || code=$?
+  : >"$log"
+  if [[ -t 2 ]]; then count_packages "$log" & counter=$!; fi
+  pip install --progress-bar off --no-compile --require-hashes -r "$1" >"$log" 2>&1 || code=$?
+  if [[ -n "$counter" ]]; then
+    kill "$counter" 2>/dev/null || true
+    wait "$counter" 2>/dev/null || true
+    printf '\r\033[K' >&2
+  fi
   ((code == 0)) || grep -v '^WARNING' "$log" | tail -n 12 >&2
   return "$code"
 }
 
-count_packages() { # process of pip, what it says
+count_packages() { # what pip says
   local before all
   before="$(installed_packages)"
-  while kill -0 "$1" 2>/dev/null; do
-    all="$(sed -n 's/^Installing collected packages: //p' "$2" | wc -w)"
+  while kill -0 $$; do # a Ctrl-C does not come here
+    all="$(sed -n 's/^Installing collected packages: //p' "$1" | wc -w)"
     if ((all > 0)); then
       printf '\r  unpacked: %d of %d   ' $(($(installed_packages) - before)) "$all" >&2
     else
-      printf '\r  downloaded: %d   ' "$(grep -c '^Collecting' "$2")" >&2
+      printf '\r  downloaded: %d   ' "$(grep -c '^Collecting' "$1")" >&2
     fi
     sleep 0.3
   done
-  printf '\r\033[K' >&2
 }
 
 installed_packages() { find "$venv" -maxdepth 5 -name '*.dist-info' | wc -l; }
@@ -102,10 +106,13 @@ install_environment() {
   if ! is_current "stamp-$kind" "$packages"; then
     is_current stamp-run "$run" || make_venv "$python" || return 1
     rm -f "$venv"/stamp-*
+    # What was cut down to run is whole again to test.
+    if [[ -s "$venv/trimmed" ]]; then xargs "$venv/bin/python" -m pip uninstall --quiet --quiet --yes <"$venv/trimmed"; fi
     if ! install_packages "$root/$lock" "$size"; then
       say "the installation failed, see above; .venv is marked unfinished and will be made anew by the next call."
       return 1
     fi
+    if [[ "$kind" == run ]]; then "$venv/bin/python" "$root/scripts/trim.py" >"$venv/trimmed"; else rm -f "$venv/trimmed"; fi
     echo "$run" >"$venv/stamp-run"
     echo "$packages" >"$venv/stamp-$kind"
   fi
