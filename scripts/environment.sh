@@ -105,7 +105,7 @@ install_environment() {
   local start=$SECONDS
   if ! is_current "stamp-$kind" "$packages"; then
     is_current stamp-run "$run" || make_venv "$python" || return 1
-    rm -f "$venv"/stamp-*
+    rm -f "$venv/stamp-run" "$venv/stamp-dev"
     # What was cut down to run is whole again to test.
     if [[ -s "$venv/trimmed" ]]; then xargs "$venv/bin/python" -m pip uninstall --quiet --quiet --yes <"$venv/trimmed"; fi
     if ! install_packages "$root/$lock" "$size"; then
