@@ -15,17 +15,10 @@ from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 MODULES = (
     "mobee.engine.scene",
     "mobee.engine.neighbours",
-    "mobee.control.law",
-    "mobee.control.reach_law",
-    "mobee.simulation.noise",
-    "mobee.simulation.drive",
-    "mobee.simulation.loop",
-    "mobee.simulation.braking",
     "mobee.learning.sweeps",
     "mobee.learning.gains",
     "mobee.learning.reaching.sums",
     "mobee.engine.descent",
-    "mobee.engine.sweep",
     "mobee.engine.evaluate",
 )
 ENGINE = ("mobee.engine.scene", "mobee.engine.neighbours", "mobee.engine.evaluate")  # what a model needs

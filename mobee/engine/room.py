@@ -46,7 +46,7 @@ class Room:
         self.flags = at_least(self.flags, flags)
         self.numbers = at_least(self.numbers, NUMBERS * max(ROWS, most))
         self.reals = at_least(self.reals, REALS * max(ROWS, most))
-        settle(header, packed.floats, scene.integers, scene.snapshot.rows.reshape(-1), self.slots)
+        settle(header, packed.floats, scene.integers, scene.rows, self.slots)
         self.scene = scene
 
 

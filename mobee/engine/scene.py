@@ -31,6 +31,7 @@ class Scene:
     """A robot among the free objects of one snapshot.  It never changes."""
 
     snapshot: Snapshot
+    rows: Array  # (N ROW,)
     packed: Packed
     integers: UInts
     floats: Array
@@ -43,8 +44,11 @@ def scene(packed: Packed, snapshot: Snapshot, carried: Ints) -> Scene:
     side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
     integers = np.zeros(W_START + side**3 + 1 + 2 * count, dtype=np.uint64)
     floats = np.zeros(W_COLUMNS + 4 * count)
-    sort_objects(snapshot.rows.ravel(), snapshot.roles, side, integers, floats)
-    return Scene(snapshot, packed, integers, floats, carried)
+    rows = np.zeros((count, ROW))
+    for row, volume in zip(rows, snapshot.rows, strict=True):
+        row[:] = [volume["kind"], *volume["position"], *volume["rotation"].ravel(), *volume["half"], volume["bound"]]
+    sort_objects(rows.ravel(), snapshot.roles, side, integers, floats)
+    return Scene(snapshot, rows.ravel(), packed, integers, floats, carried)
 
 
 @inner

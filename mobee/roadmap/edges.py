@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee.engine import engine_of
-from mobee.engine.hands import hands
 from mobee.errors import InvalidValue
 from mobee.model import Model
 from mobee.roadmap.ik.solids import solid_model
@@ -59,9 +57,7 @@ def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
     free: Flags = stands[ends[:, 0]] & stands[ends[:, 1]]
     left = np.flatnonzero(free)
     poses = between(solid, q, ends[left], step, marker)
-    passed = np.empty(len(left), dtype=np.bool_)
-    looked = _sweep(solid, q, ends[left], poses, passed)
-    free[left] = passed
+    free[left], looked = _sweep(solid, q, ends[left], poses)
     return Checked(free, len(vertices) + looked)
 
 
@@ -92,15 +88,9 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, free: Flags) -> int:
-    from mobee.engine.track import Neighbours  # compiled: not before somebody asks
+def _sweep(model: Model, q: Array, edges: Ints, poses: Ints) -> tuple[Flags, int]:
+    from mobee.engine.track import Neighbours  # loads the core: not before somebody asks
 
     neighbours = Neighbours(engine_of(model.robot), SKIN)
-    here = neighbours.scene(model.world.snapshot, hands(*model.hands))
-    return int(_compiled().sweep(*here, *neighbours.memory, q, np.ascontiguousarray(edges), poses, free))
-
-
-def _compiled() -> ModuleType:
-    from mobee.engine.load import load_only
-
-    return load_only("mobee.engine.sweep")
+    neighbours.enter(model.world.snapshot, model.hands)
+    return neighbours.sweep(q, np.ascontiguousarray(edges, dtype=np.int64), poses)

@@ -9,31 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mobee
+from mobee._core.narrow import Volumes, overlaps
 from mobee.collision.tested_pairs import tested_pairs
-from mobee.collision.world_object import Role
-from mobee.engine.compiled import entry
-from mobee.engine.layout import (
-    BOUND,
-    BOX,
-    CAPSULE,
-    CENTER,
-    CORE,
-    CYLINDER,
-    HALF,
-    INVERSE,
-    KIND,
-    LENGTH,
-    RADIUS,
-    ROTATION,
-    ROW_BOUND,
-    ROW_HALF,
-    ROW_KIND,
-    ROW_POSITION,
-    ROW_ROTATION,
-    SLOT,
-)
-from mobee.engine.narrow.dispatch import overlap
-from mobee.engine.pack import _rows
+from mobee.collision.world_object import Role, WorldObject
+from mobee.engine.hands import NOBODY, Hands
 from mobee.kinematics import link_transforms
 from mobee.robot.robot import Array, Ints, Joint, Motor, Part, Robot, Shape
 
@@ -134,44 +113,31 @@ def _geometry(rng: Rng, factor: float) -> Any:
     return (mobee.sphere(x), mobee.capsule(x, y), mobee.cylinder(x, y), mobee.box(x, y, z))[rng.integers(4)]
 
 
-@entry("void(float64[::1], float64[::1], int64[::1], int64[::1], float64[:,::1])")
-def overlaps(slots: Array, vertices: Array, first: Ints, second: Ints, found: Array) -> None:
-    """Fill depth, normal and point, (p, 7), of all given pairs."""
-    out = np.zeros(6)
-    for p in range(len(first)):
-        found[p, 0] = overlap(slots, first[p] * SLOT, second[p] * SLOT, vertices, out)
-        found[p, 1:] = out
-
-
-def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: int = 0) -> tuple[NDArray[np.int64], Array]:
+def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NOBODY) -> tuple[NDArray[np.int64], Array]:
     """Numbers (c, 3), kind, first and second, and reals (c, 7) of one pose, in the order of a contact table."""
     transforms, snapshot = link_transforms(robot, q), world.snapshot
-    rows, vertices = _rows(robot.shapes)
-    slots = [placed(row, transforms[shape.link]) for row, shape in zip(rows, robot.shapes, strict=True)]
-    for row, thing in zip(snapshot.rows, snapshot.objects.values(), strict=True):
-        slots.append(placed(row, np.eye(4) if thing.link is None else transforms[robot.links.index(thing.link)]))
+    where = [transforms[shape.link] for shape in robot.shapes]
+    for thing in snapshot.objects.values():
+        where.append(np.eye(4) if thing.link is None else transforms[robot.links.index(thing.link)])
     first, second, kind = (np.array(column, dtype=np.int64) for column in tested_pairs(robot, snapshot, reaching))
-    found = np.zeros((len(first), 7))
-    overlaps(np.concatenate([*slots, np.zeros(0)]), vertices, first, second, found)
-    touching = np.flatnonzero(found[:, 0] > 0.0)
+    volumes = solids([*robot.shapes, *snapshot.objects.values()], where)
+    depth, touch = overlaps(volumes.taken(first), volumes.taken(second))
+    touching = np.flatnonzero(depth > 0.0)
     touching = touching[np.lexsort((second[touching], first[touching], kind[touching]))]
+    found = np.column_stack([depth, touch["normal"], touch["point"]])
     return np.stack([kind, first, second], axis=1)[touching], found[touching]
 
 
-def placed(row: Array, transform: Array) -> Array:
-    """The slot of a volume (ROW,) in the frame of a link at (4, 4)."""
-    slot = np.zeros(SLOT)
-    turn = transform[:3, :3] @ row[ROW_ROTATION : ROW_ROTATION + 9].reshape(3, 3)
-    slot[CENTER : CENTER + 3] = transform[:3, :3] @ row[ROW_POSITION : ROW_POSITION + 3] + transform[:3, 3]
-    slot[ROTATION : ROTATION + 9] = turn.reshape(9)
-    slot[HALF : HALF + 3] = row[ROW_HALF : ROW_HALF + 3]
-    if row[ROW_KIND] in (CAPSULE, CYLINDER):
-        slot[CORE : CORE + 3] = turn[:, 2] * row[ROW_HALF + 1]
-        slot[LENGTH] = row[ROW_HALF + 1] ** 2
-        slot[INVERSE] = 1.0 / slot[LENGTH] if slot[LENGTH] > 0.0 else 0.0
-    slot[RADIUS] = row[ROW_HALF] if row[ROW_KIND] < BOX else 0.0
-    slot[BOUND], slot[KIND] = row[ROW_BOUND], row[ROW_KIND]
-    return slot
+def solids(volumes: list[Shape | WorldObject], transforms: list[Array]) -> Volumes:
+    """Shapes and objects, each in the frame of its link at (4, 4), as the core reads them."""
+    made = Volumes(len(volumes))
+    for at, (volume, transform) in enumerate(zip(volumes, transforms, strict=True)):
+        turn, shift = transform[:3, :3], transform[:3, 3]
+        half = np.array(volume.size) / (2.0 if volume.kind == "box" else np.array([1.0, 2.0])[: len(volume.size)])
+        made.place(at, volume.kind, half, turn @ volume.position + shift, turn @ volume.rotation)
+        if isinstance(volume, Shape) and volume.vertices is not None:
+            made.hull(at, volume.vertices)
+    return made
 
 
 def posed(rng: Rng, robot: Robot, *shape: int) -> Array:

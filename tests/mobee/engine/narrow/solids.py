@@ -7,22 +7,8 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 
-from mobee.engine.compiled import entry
-from mobee.engine.layout import BOUND, CENTER, CODES, CORE, HALF, KIND, RADIUS, ROTATION, SLOT
-from mobee.engine.narrow import dispatch
+from mobee._core.narrow import Volumes, distances, overlaps
 from mobee.kinematics.quaternion import to_matrix
-
-KINDS = tuple(CODES)
-
-
-@entry("float64(float64[::1], int64, int64, float64[::1], float64[::1])")
-def _overlap(P, a, b, V, out):
-    return dispatch.overlap(P, a, b, V, out)
-
-
-@entry("float64(float64[::1], int64, int64, float64[::1])")
-def _distance(P, a, b, V):
-    return dispatch.distance(P, a, b, V)
 
 
 @dataclass
@@ -64,34 +50,25 @@ class Found:
     point: np.ndarray
 
 
-def _packed(a, b):
-    slots, vertices, first = np.zeros((2, SLOT)), [np.zeros((0, 3))], 0
-    for slot, item in zip(slots, (a, b), strict=True):
-        half = item.half
+def placed(items) -> Volumes:
+    """Solids as the core reads them."""
+    volumes = Volumes(len(items))
+    for at, item in enumerate(items):
+        volumes.place(at, item.kind, () if item.kind == "convex" else item.half, item.position, item.rotation)
         if item.kind == "convex":
-            vertices.append(half)
-            slot[BOUND] = np.linalg.norm(half, axis=1).max()
-            half, first = np.array([first, len(half)]), first + len(half)
-        else:
-            slot[BOUND] = half.sum() if item.kind == "capsule" else np.linalg.norm(half)
-        slot[KIND], slot[CENTER : CENTER + 3], slot[ROTATION : ROTATION + 9] = CODES[item.kind], item.position, item.rotation.ravel()
-        slot[HALF : HALF + len(half)] = half
-        if item.kind in ("capsule", "cylinder"):
-            slot[CORE : CORE + 3] = item.rotation[:, 2] * half[1]
-        slot[RADIUS] = 0.0 if item.kind in ("box", "convex") else half[0]
-    return slots.ravel(), np.concatenate(vertices).ravel()
+            volumes.hull(at, item.half)
+    return volumes
 
 
 def overlap(a, b) -> Found:
     """The engine's answer."""
-    out, (slots, vertices) = np.full(6, np.nan), _packed(a, b)
-    depth = _overlap(slots, 0, SLOT, vertices, out)
-    return Found(depth, out[:3], out[3:])
+    (depth,), (touch,) = overlaps(placed([a]), placed([b]))
+    return Found(float(depth), touch["normal"], touch["point"])
 
 
 def distance(a, b) -> float:
-    slots, vertices = _packed(a, b)
-    return _distance(slots, 0, SLOT, vertices)
+    (apart,) = distances(placed([a]), placed([b]))
+    return float(apart)
 
 
 def farthest(item, directions) -> np.ndarray:

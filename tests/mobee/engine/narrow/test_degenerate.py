@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.mobee.engine.narrow.solids import KINDS, Solid, distance, overlap, overlap_along, random_turn, sampled_depth, solid
+from mobee._core.narrow import KINDS
+from tests.mobee.engine.narrow.solids import Solid, distance, overlap, overlap_along, random_turn, sampled_depth, solid
 
 PAIRS = [(first, second) for i, first in enumerate(KINDS) for second in KINDS[i:]]
 SIZES = st.sampled_from([1e-4, 1e-2, 1.0, 10.0])

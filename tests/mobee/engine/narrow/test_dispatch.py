@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mobee._core.narrow import KINDS
 from tests.mobee.engine.narrow.solids import (
-    KINDS,
     coal_distance,
     distance,
     overlap,

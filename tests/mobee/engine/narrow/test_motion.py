@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.mobee.engine.narrow.solids import KINDS, overlap, random_solid
+from mobee._core.narrow import KINDS
+from tests.mobee.engine.narrow.solids import overlap, random_solid
 
 SEEDS = st.integers(0, 1_000_000)
 PAIRS = [(first, second) for i, first in enumerate(KINDS) for second in KINDS[i:]]

@@ -1,0 +1,227 @@
+// The shortest way out of a Minkowski difference that holds the origin: an expanding polytope inside it.
+//
+// Each step takes the face of the polytope that is closest to the origin (below it, where the polytope does not yet hold the
+// origin) and adds the farthest point along its normal, until there is none.  How far the difference reaches along any direction
+// tried is a true way out, whatever rounding did to the polytope, and the shortest of these is the answer.  It is exact for
+// polytopes.  With cylinders it is better than 1e-9 m, but where ways out all round an axis are nearly as short and the steps end
+// first: there it may be too long by 1e-6 of the size.
+#include <limits>
+
+#include "difference.hpp"
+
+namespace mobee::narrow {
+
+namespace epa {
+
+constexpr int most_corners = 128, most_faces = 2 * most_corners;
+constexpr int full = most_faces - 8;  // which is sooner than there are too many corners
+constexpr double exact = 1e-12;       // m, for volumes of up to a metre: the bounds have met
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Against the clock, seen from outside.
+struct Face {
+    int corner[3];
+};
+
+struct Plane {
+    double x, y, z, low;  // the unit normal and how far out the face is
+};
+
+struct Edge {
+    int from, to;
+};
+
+// Plain numbers that nobody sets to zero: there are more of them than most polytopes use.
+struct Point {
+    double x, y, z;
+    operator Vec3() const { return {x, y, z}; }
+};
+
+struct Polytope {
+    Point corner[most_corners];
+    Face face[most_faces];
+    Plane plane[most_faces];
+    int faces = 0;
+
+    // One without area is never the closest.
+    void add(Face added) {
+        const Vec3 a = corner[added.corner[0]], b = corner[added.corner[1]], c = corner[added.corner[2]];
+        const Vec3 u = b - a, v = c - a, n = cross(u, v);
+        const double squared = dot(n, n);
+        Plane made = {n.x, n.y, n.z, infinity};
+        if (squared > 1e-28 * dot(u, u) * dot(v, v)) {
+            const Vec3 normal = over(n, std::sqrt(squared));
+            made = {normal.x, normal.y, normal.z, dot(normal, a)};
+        }
+        face[faces] = added;
+        plane[faces++] = made;
+    }
+
+    // The face that is closest to the origin.
+    int least() const {
+        int found = 0;
+        double low = infinity;
+        for (int k = 0; k < faces; ++k)
+            if (plane[k].low < low - 0.01 * exact) found = k, low = plane[k].low;
+        return found;
+    }
+
+    // Take away the faces that see the new corner, and span new ones from it to the edge of the hole.
+    void expand(int added, double tolerance);
+};
+
+// Add an edge, or take it away if the other face along it is taken away too; how many then.
+int toggle(Edge* rim, int count, Edge edge) {
+    for (int k = 0; k < count; ++k) {
+        if (rim[k].from == edge.to && rim[k].to == edge.from) {
+            rim[k] = rim[count - 1];
+            return count - 1;
+        }
+    }
+    rim[count] = edge;
+    return count + 1;
+}
+
+void Polytope::expand(int added, double tolerance) {
+    const Vec3 p = corner[added];
+    Edge rim[3 * most_faces];
+    int edges = 0;
+    for (int k = 0; k < faces;) {
+        const Plane& side = plane[k];
+        if (!(side.x * p.x + side.y * p.y + side.z * p.z - side.low > tolerance)) {
+            ++k;
+            continue;
+        }
+        const int* c = face[k].corner;
+        edges = toggle(rim, edges, {c[0], c[1]});
+        edges = toggle(rim, edges, {c[1], c[2]});
+        edges = toggle(rim, edges, {c[2], c[0]});
+        --faces;
+        face[k] = face[faces];
+        plane[k] = plane[faces];
+    }
+    for (int k = 0; k < edges && faces < most_faces; ++k) add({{rim[k].from, rim[k].to, added}});
+}
+
+Vec3 normalized(Vec3 v) { return over(v, length(v)); }
+
+// Unit vectors square to u, and to u and the first.
+void square_to(Vec3 u, Vec3& one, Vec3& two) {
+    const Vec3 a = absolute(u);
+    if (a.x <= a.y && a.x <= a.z)
+        one = normalized({0.0, -u.z, u.y});
+    else if (a.y <= a.z)
+        one = normalized({u.z, 0.0, -u.x});
+    else
+        one = normalized({-u.y, u.x, 0.0});
+    two = normalized(cross(u, one));
+}
+
+struct Start {
+    double size;  // how far the fourth corner is from the plane of the others; 0: the difference is flat
+    Vec3 normal;  // of the difference, where it is flat
+};
+
+// Set four corners of the difference, 0 1 2 against the clock seen from outside.
+Start tetrahedron(Difference& difference, Point* corner) {
+    Vec3 axis[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    Vec3 found[4];
+    double width = 0.0, turned = 0.0;
+    constexpr int tried[4] = {2, 6, 4, 2};
+    for (int count = 0; count < 4; ++count) {
+        // Each the farthest from the first along the directions square to those that there are.
+        width = count == 0 ? -1.0 : tie;
+        found[count] = found[0];
+        for (int which = 0; which < tried[count]; ++which) {
+            const double turn = which % 2 == 0 ? 1.0 : -1.0;
+            const Vec3 way = turn * axis[which / 2], p = difference.farthest(way);
+            const double off = dot(way, p - found[0]);
+            if (count == 0 ? which == 0 || off > width : off > width) width = off, turned = turn, found[count] = p;
+        }
+        if (width == tie) return {0.0, axis[0]};
+        corner[count] = {found[count].x, found[count].y, found[count].z};
+        const Vec3 u = found[1] - found[0];
+        if (count == 1) square_to(u, axis[0], axis[1]);
+        if (count == 2) axis[0] = normalized(cross(u, found[2] - found[0]));
+    }
+    // With the last in front of 0 1 2, those turn round.
+    if (turned > 0.0) std::swap(corner[0], corner[1]);
+    return {width, axis[0]};
+}
+
+}  // namespace epa
+
+// A last search around a way out of curved volumes that the expanding polytope could not end, because many are nearly as short.
+namespace polish {
+
+constexpr int ring = 64;  // directions tried all round the axis of either
+constexpr int rounds = 100;
+constexpr double gain = 1e-13;    // m: more than rounding
+constexpr double finest = 1e-8;   // rad; the reach is then within its square of a smooth minimum
+constexpr double pi = 3.14159265358979323846;
+
+bool improve(Difference& difference, Way& best, Vec3 direction, double by) {
+    const double reach = dot(direction, difference.farthest(direction));
+    if (!(reach < best.reach - by)) return false;
+    best = {reach, direction};
+    return true;
+}
+
+// A direction near the known one, or square to the axis of either volume, along which the difference reaches least.  The search
+// turns about the axes of both volumes: where a least reach of cylinders or boxes is a crease, it is square to one of them.
+Way search(Difference& difference, Way best) {
+    for (int which = 0; which < 2 * ring; ++which) {
+        const double angle = 2.0 * pi * which / ring;
+        const Vec3 round = {std::cos(angle), std::sin(angle), 0.0};
+        improve(difference, best, which < ring ? round : out_of(difference.turn, round), tie);
+    }
+    double step = 0.1;
+    for (int round = 0; round < rounds && step >= finest; ++round) {
+        bool better = false;
+        for (int which = 0; which < 12; ++which) {
+            Vec3 axis;
+            if (which < 6)
+                axis[which / 2] = 1.0;
+            else
+                axis = difference.turn.column(which / 2 - 3);
+            const double sine = which % 2 == 0 ? std::sin(step) : -std::sin(step), cosine = std::cos(step);
+            const Vec3 n = best.direction;
+            const Vec3 turned = cosine * n + sine * cross(axis, n) + ((1.0 - cosine) * dot(axis, n)) * axis;
+            better |= improve(difference, best, epa::normalized(turned), gain);
+        }
+        if (!better) step *= 0.5;
+    }
+    return best;
+}
+
+}  // namespace polish
+
+Way way_out(Difference& difference, Way known) {
+    epa::Polytope polytope;
+    const epa::Start start = epa::tetrahedron(difference, polytope.corner);
+    const double exact = epa::exact * most(start.size, 1.0);
+    for (const epa::Face face : {epa::Face{{0, 1, 2}}, {{2, 1, 3}}, {{0, 2, 3}}, {{1, 0, 3}}}) polytope.add(face);
+    Way best = {epa::infinity, known.direction};
+    double low = -epa::infinity;
+    Vec3 n = start.normal;
+    for (int count = 4; count < epa::most_corners; ++count) {
+        if (start.size > 0.0) {
+            const epa::Plane& plane = polytope.plane[polytope.least()];
+            n = {plane.x, plane.y, plane.z};
+            low = plane.low;
+        }
+        const Vec3 p = difference.farthest(n);
+        const double reach = dot(n, p);
+        if (reach < best.reach) best = {reach, n};
+        if (start.size == 0.0 || best.reach <= 0.0 || least(least(best.reach, known.reach - tie), reach) - low <= exact) break;
+        if (polytope.faces > epa::full) {
+            best = polish::search(difference, best.reach < known.reach - tie ? best : known);
+            break;
+        }
+        polytope.corner[count] = {p.x, p.y, p.z};
+        polytope.expand(count, 0.1 * exact);
+    }
+    return best.reach < known.reach - tie ? best : known;
+}
+
+}  // namespace mobee::narrow

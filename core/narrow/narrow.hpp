@@ -1,0 +1,44 @@
+// The narrow phase: two volumes at a time.  A function for each pair of kinds; `overlap` in overlap.cpp chooses.
+#pragma once
+
+#include <cmath>
+#include <utility>
+
+#include "volume.hpp"
+
+namespace mobee::narrow {
+
+constexpr double touching = 1e-10;  // m: below it a distance is no direction
+constexpr double tie = 1e-9;        // m: a way out must be shorter by more than this to be preferred to an earlier one
+constexpr double flat = 1e-9;       // sine of the angle below which a line counts as parallel to a face
+constexpr double aligned = 1e-6;    // sine of the angle below which a direction counts as square to an edge or a face
+
+// -1 or 1; next to zero always 1, so that rounding cannot choose.
+inline double sign(double value) { return value < -tie ? -1.0 : 1.0; }
+
+inline Vec3 over(Vec3 v, double s) { return {v.x / s, v.y / s, v.z / s}; }
+
+inline Vec3 absolute(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
+
+// By how much a volume is larger than its core.
+inline double rounding(const Volume& v) { return v.kind <= Kind::capsule ? v.radius : 0.0; }
+
+// See `overlap` for these; the order of the kinds is that of their names.
+double sphere_sphere(const Volume& a, const Volume& b, Touch& touch);
+double sphere_capsule(const Volume& a, const Volume& b, Touch& touch);
+double capsule_capsule(const Volume& a, const Volume& b, Touch& touch);
+double sphere_box(const Volume& a, const Volume& b, Touch& touch);
+double capsule_box(const Volume& a, const Volume& b, Touch& touch);
+double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double box_box(const Volume& a, const Volume& b, Touch& touch);
+
+// See `distance`.
+double capsule_box_distance(const Volume& a, const Volume& b);
+
+// The s, t in [-1, 1] that bring w + s u and t v closest; the middle of the span if they are parallel.
+std::pair<double, double> closest_parameters(Vec3 w, Vec3 u, Vec3 v);
+
+// The contact of two volumes of any kind, given the way out of the first (unit vector, root frame) and its length.
+Touch touch_along(const Volume& a, const Volume& b, Vec3 normal, double depth);
+
+}  // namespace mobee::narrow

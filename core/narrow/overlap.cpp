@@ -1,0 +1,104 @@
+// Any two volumes: the function for their kinds; with a cylinder or a hull, iterations over the difference of their cores.
+#include <limits>
+
+#include "difference.hpp"
+#include "narrow.hpp"
+
+namespace mobee {
+
+namespace narrow {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch) {
+    const Vec3 c = into(b.rotation, a.center - b.center);
+    const double side = std::sqrt(c.x * c.x + c.y * c.y), across = side - b.half.x, along = std::fabs(c.z) - b.half.y;
+    const double dx = most(across, 0.0), dz = most(along, 0.0), distance = std::sqrt(dx * dx + dz * dz);
+    if (distance >= a.radius) return a.radius - distance;
+    const Vec3 outward = side > touching ? Vec3{c.x / side, c.y / side, 0.0} : Vec3{1.0, 0.0, 0.0};
+    Vec3 n = {0.0, 0.0, sign(c.z)};
+    double apart = n.z * c.z - b.half.y;
+    if (distance > touching) {
+        n = (dx / distance) * outward + (dz / distance) * n;
+        apart = distance;
+    } else if (across > along + tie) {
+        n = outward;
+        apart = across;
+    }
+    touch = {out_of(b.rotation, n), b.center + out_of(b.rotation, c - 0.5 * (a.radius + apart) * n)};
+    return a.radius - apart;
+}
+
+// The shortest way out along the axes of either volume, across two axes, or straight away from the axis of either.
+Way natural(Difference& difference) {
+    const Vec3 first = {0.0, 0.0, 1.0}, second = difference.turn.column(2), shift = difference.shift;
+    const Vec3 tried[9] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 0.0, 0.0},
+                           difference.turn.column(2), difference.turn.column(0), difference.turn.column(1),
+                           {shift.x, shift.y, 0.0}, shift - dot(shift, second) * second, cross(first, second)};
+    Way best = {infinity, first};
+    for (const Vec3 axis : tried) {
+        const double size = length(axis);
+        if (size <= tie) continue;
+        for (const double turn : {1.0, -1.0}) {
+            const Vec3 n = over(turn * axis, size);
+            const double reach = dot(n, difference.farthest(n));
+            if (reach < best.reach - tie) best = {reach, n};
+        }
+    }
+    return best;
+}
+
+double general(const Volume& a, const Volume& b, Touch& touch) {
+    const double apart = length(a.center - b.center) - a.bound - b.bound;
+    if (apart >= 0.0) return -apart;
+    Difference difference(a, b);
+    const double round_off = rounding(a) + rounding(b);
+    const auto [distance, point] = closest(difference, round_off);
+    if (distance >= round_off && distance > 0.0) return round_off - distance;
+    const Way way = distance > touching ? Way{-distance, over(-point, distance)} : way_out(difference, natural(difference));
+    const double depth = way.reach + round_off;
+    if (depth > 0.0) touch = touch_along(a, b, out_of(a.rotation, way.direction), depth);
+    return depth;
+}
+
+double overlap_in_order(const Volume& a, const Volume& b, Touch& touch) {
+    if (b.kind <= Kind::capsule) {
+        if (a.kind == Kind::capsule) return capsule_capsule(a, b, touch);
+        return b.kind == Kind::capsule ? sphere_capsule(a, b, touch) : sphere_sphere(a, b, touch);
+    }
+    if (b.kind == Kind::box && a.kind <= Kind::capsule) return a.kind == Kind::sphere ? sphere_box(a, b, touch) : capsule_box(a, b, touch);
+    if (a.kind == Kind::box && b.kind == Kind::box) return box_box(a, b, touch);
+    if (a.kind == Kind::sphere && b.kind == Kind::cylinder) return sphere_cylinder(a, b, touch);
+    return general(a, b, touch);
+}
+
+}  // namespace narrow
+
+double overlap(const Volume& a, const Volume& b, Touch& touch) {
+    if (a.kind <= b.kind) return narrow::overlap_in_order(a, b, touch);
+    const double depth = narrow::overlap_in_order(b, a, touch);
+    if (depth > 0.0) touch.normal = -touch.normal;
+    return depth;
+}
+
+double distance(const Volume& a, const Volume& b) {
+    if (a.kind > b.kind) return distance(b, a);
+    Touch unused;
+    double apart = 0.0;
+    if (a.kind == Kind::sphere && b.kind == Kind::box) {
+        apart = -narrow::sphere_box(a, b, unused);
+    } else if (a.kind == Kind::sphere && b.kind == Kind::cylinder) {
+        apart = -narrow::sphere_cylinder(a, b, unused);
+    } else if (b.kind <= Kind::capsule) {
+        // A sphere is a capsule without length.
+        apart = -narrow::capsule_capsule(a, b, unused);
+    } else if (a.kind == Kind::capsule && b.kind == Kind::box) {
+        apart = narrow::capsule_box_distance(a, b);
+    } else {
+        narrow::Difference difference(a, b);
+        apart = narrow::closest(difference, narrow::infinity).distance - narrow::rounding(a) - narrow::rounding(b);
+    }
+    return most(apart, 0.0);
+}
+
+}  // namespace mobee

@@ -1,0 +1,161 @@
+// Spheres and capsules with boxes: a point or a segment c + s h, |s| <= 1, inflated by a radius, seen from the box.
+#include "narrow.hpp"
+
+namespace mobee::narrow {
+
+namespace rounded_box {
+
+constexpr double far = 2.0;  // a parameter beyond every segment's end
+
+struct Span {
+    double low, high;
+};
+
+// Between which s the coordinate x + s h is within [-k, k]; all if the line is parallel to these faces.
+inline Span span_within(double x, double h, double k, double least_square) {
+    if (h * h <= least_square) return {-far, far};
+    const double middle = -x / h, reach = std::fabs(k / h);
+    return {middle - reach, middle + reach};
+}
+
+inline double outer(double s, Span span) { return most(s - span.high, 0.0) - most(span.low - s, 0.0); }
+
+// Half the derivative of the squared distance along the segment never falls, and is linear between the ends of the spans.
+struct Slope {
+    Span x, y, z;
+    Vec3 weight;
+    double left = -1.0, under = -1.0, right = 1.0, over = 1.0;  // where it changes sign, and its values there
+
+    // Draw in to the knot s if it is nearer.
+    void narrow_to(double s) {
+        const double slope = weight.x * outer(s, x) + weight.y * outer(s, y) + weight.z * outer(s, z);
+        if (slope <= 0.0 && s >= left) left = s, under = slope;
+        if (slope >= 0.0 && s <= right) right = s, over = slope;
+    }
+};
+
+// The s that brings the segment closest to the box of half edges k about the origin: the middle of all such s.
+double closest_to_box(Vec3 c, Vec3 h, Vec3 k) {
+    const double least_square = flat * flat * dot(h, h);
+    const Span x = span_within(c.x, h.x, k.x, least_square), y = span_within(c.y, h.y, k.y, least_square),
+               z = span_within(c.z, h.z, k.z, least_square);
+    const double low = most(most(x.low, y.low), most(z.low, -1.0)), high = least(least(x.high, y.high), least(z.high, 1.0));
+    if (low <= high) return (low + high) / 2.0;
+    Slope slope{x, y, z, {h.x * h.x, h.y * h.y, h.z * h.z}};
+    for (const double knot : {-1.0, x.low, x.high, y.low, y.high, z.low, z.high, 1.0}) slope.narrow_to(unit(knot));
+    if (slope.left >= slope.right) return slope.right;
+    return slope.left + (slope.right - slope.left) * (slope.under / (slope.under - slope.over));
+}
+
+inline double beyond(double x, double k) { return x - clamp(x, -k, k); }
+inline Vec3 beyond(Vec3 p, Vec3 k) { return {beyond(p.x, k.x), beyond(p.y, k.y), beyond(p.z, k.z)}; }
+
+// A lower bound of the distance of the core from the box: along the box's axes, and across the core and one of them.
+double distance_bound(Vec3 c, Vec3 h, Vec3 k) {
+    const Vec3 a = absolute(h), m = cross(c, h);
+    const Vec3 d = {most(std::fabs(c.x) - a.x - k.x, 0.0), most(std::fabs(c.y) - a.y - k.y, 0.0), most(std::fabs(c.z) - a.z - k.z, 0.0)};
+    double squared = dot(d, d);
+    double gap = most(std::fabs(m.x) - k.y * a.z - k.z * a.y, 0.0), length = a.y * a.y + a.z * a.z;
+    if (gap * gap > squared * length) squared = gap * gap / length;
+    gap = most(std::fabs(m.y) - k.z * a.x - k.x * a.z, 0.0), length = a.z * a.z + a.x * a.x;
+    if (gap * gap > squared * length) squared = gap * gap / length;
+    gap = most(std::fabs(m.z) - k.x * a.y - k.y * a.x, 0.0), length = a.x * a.x + a.y * a.y;
+    if (gap * gap > squared * length) squared = gap * gap / length;
+    return std::sqrt(squared);
+}
+
+// A contact given in the box's own axes.
+Touch from_box(const Volume& box, Vec3 normal, Vec3 point) {
+    return {out_of(box.rotation, normal), box.center + out_of(box.rotation, point)};
+}
+
+// The contact of a point p of the core that is outside the box, at d from the nearest point of it.
+double outside(const Volume& a, const Volume& box, Vec3 p, Vec3 d, double apart, Touch& touch) {
+    const Vec3 normal = over(d, apart);
+    touch = from_box(box, normal, p - 0.5 * (a.radius + apart) * normal);
+    return a.radius - apart;
+}
+
+// A way out of the box, or of the box swept along the core: through a face, or across the core and the edge along one axis.
+struct Exit {
+    double sink = 0.0;
+    Vec3 normal;
+    int edge = -1;
+};
+
+void try_face(Exit& exit, double c, double a, double k, int axis) {
+    const double turn = sign(c), sink = k + a - turn * c;
+    if (axis > 0 && !(sink < exit.sink - tie)) return;
+    exit = {sink, {}, -1};
+    exit.normal[axis] = turn;
+}
+
+void try_edge(Exit& exit, Vec3 c, Vec3 h, Vec3 k, int axis, double least_square) {
+    const int one = axis == 2 ? 0 : axis + 1, two = axis == 0 ? 2 : axis - 1;
+    const double square = h[one] * h[one] + h[two] * h[two];
+    if (!(square > least_square)) return;
+    const double length = std::sqrt(square), off = (c[two] * h[one] - c[one] * h[two]) / length, turn = sign(off);
+    const double sink = (k[one] * std::fabs(h[two]) + k[two] * std::fabs(h[one])) / length - turn * off;
+    if (!(sink < exit.sink - tie)) return;
+    exit = {sink, {}, axis};
+    exit.normal[one] = -turn * h[two] / length;
+    exit.normal[two] = turn * h[one] / length;
+}
+
+// Where on the core the deepest point is, on the way out of the box: an end, or above the middle of what meets.
+double deepest(Vec3 c, Vec3 h, Vec3 k, const Exit& exit, double least_square) {
+    const Vec3 n = exit.normal;
+    if (exit.edge >= 0) {
+        // Moved out by normal * sink, the core crosses the box's edge.
+        Vec3 across = h;
+        across[exit.edge] = 0.0;
+        const Vec3 corner = {std::copysign(k.x, n.x), std::copysign(k.y, n.y), std::copysign(k.z, n.z)};
+        return unit(dot(across, corner - c - exit.sink * n) / dot(across, across));
+    }
+    const double slope = dot(n, h);
+    if (slope * slope > least_square) return slope > 0.0 ? -1.0 : 1.0;
+    const Span x = span_within(c.x, h.x, k.x, least_square), y = span_within(c.y, h.y, k.y, least_square),
+               z = span_within(c.z, h.z, k.z, least_square);
+    return unit((most(most(x.low, y.low), most(z.low, -1.0)) + least(least(x.high, y.high), least(z.high, 1.0))) / 2.0);
+}
+
+// The contact of a core that meets the box.
+double pierced(const Volume& a, const Volume& box, Vec3 c, Vec3 h, Touch& touch) {
+    const Vec3 k = box.half, reach = absolute(h);
+    const double least_square = flat * flat * dot(h, h);
+    Exit exit;
+    for (int axis = 0; axis < 3; ++axis) try_face(exit, c[axis], reach[axis], k[axis], axis);
+    for (int axis = 0; axis < 3; ++axis) try_edge(exit, c, h, k, axis, least_square);
+    const double s = deepest(c, h, k, exit, least_square);
+    touch = from_box(box, exit.normal, c + s * h - 0.5 * (a.radius - exit.sink) * exit.normal);
+    return a.radius + exit.sink;
+}
+
+}  // namespace rounded_box
+
+double sphere_box(const Volume& a, const Volume& b, Touch& touch) {
+    const Vec3 c = into(b.rotation, a.center - b.center), d = rounded_box::beyond(c, b.half);
+    const double squared = dot(d, d);
+    if (squared >= a.radius * a.radius) return a.radius - std::sqrt(squared);
+    if (squared > touching * touching) return rounded_box::outside(a, b, c, d, std::sqrt(squared), touch);
+    return rounded_box::pierced(a, b, c, Vec3{}, touch);
+}
+
+double capsule_box(const Volume& a, const Volume& b, Touch& touch) {
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    const double bound = rounded_box::distance_bound(c, h, b.half);
+    if (bound >= a.radius) return a.radius - bound;
+    const Vec3 p = c + rounded_box::closest_to_box(c, h, b.half) * h, d = rounded_box::beyond(p, b.half);
+    const double squared = dot(d, d);
+    if (squared >= a.radius * a.radius) return a.radius - std::sqrt(squared);
+    if (squared > touching * touching) return rounded_box::outside(a, b, p, d, std::sqrt(squared), touch);
+    return rounded_box::pierced(a, b, c, h, touch);
+}
+
+double capsule_box_distance(const Volume& a, const Volume& b) {
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    const Vec3 p = c + rounded_box::closest_to_box(c, h, b.half) * h;
+    return most(length(rounded_box::beyond(p, b.half)) - a.radius, 0.0);
+}
+
+}  // namespace mobee::narrow

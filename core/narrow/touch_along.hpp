@@ -1,0 +1,17 @@
+// Polygons of the plane across a contact's normal.
+#pragma once
+
+namespace mobee::narrow {
+
+struct Point {
+    double x, y;
+};
+
+// Keep, in order, the corners of the convex hull of points; how many (Jarvis's march).
+int outline(Point* points, int count, double near);
+
+// Write the part of a convex polygon that is not beyond a line, given by a point on it and the inward normal; how many corners.
+// Corners that `out` has no room for are left out: a polygon that is convex only within rounding may be cut more than twice.
+int cut(const Point* points, int count, Point on, Point inward, Point* out, int room);
+
+}  // namespace mobee::narrow

@@ -1,0 +1,134 @@
+"""Pairs of volumes, one call for many: what tests and benchmarks ask of the narrow phase."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core import ADDRESS, INTEGER, address, function
+
+Reals = NDArray[np.float64]
+
+KINDS = ("sphere", "capsule", "cylinder", "box", "convex")
+
+VOLUME = np.dtype(
+    [
+        ("center", np.float64, 3),
+        ("rotation", np.float64, (3, 3)),
+        ("half", np.float64, 3),
+        ("core", np.float64, 3),
+        ("radius", np.float64),
+        ("bound", np.float64),
+        ("squared", np.float64),
+        ("inverse", np.float64),
+        ("kind", np.int32),
+        ("corners", np.uint64),
+        ("count", np.int32),
+        ("starts", np.uint64),
+        ("edges", np.uint64),
+    ],
+    align=True,
+)
+"""`Volume` of core/volume.hpp; the last four are its hull."""
+
+TOUCH = np.dtype([("normal", np.float64, 3), ("point", np.float64, 3)])
+
+
+class Volumes:
+    """Volumes placed in the root frame, which the core reads where they are; hulls keep their corners alive here."""
+
+    def __init__(self, count: int) -> None:
+        self.table = np.zeros(count, dtype=VOLUME)
+        self._kept: list[NDArray[Any]] = []
+        if VOLUME.itemsize != _volume_size()():
+            raise RuntimeError("the library's volumes have another layout than these")
+
+    def place(self, at: int, kind: str, half: Sequence[float] | Reals, position: Reals, rotation: Reals) -> None:
+        """Set one; `half`: (radius,), (radius, half height) or half edges (3,); of a hull nothing, see `hull`."""
+        row = self.table[at]
+        size = np.zeros(3)
+        size[: len(half)] = half
+        row["kind"], row["half"], row["center"], row["rotation"] = KINDS.index(kind), size, position, rotation
+        row["radius"] = 0.0 if kind in ("box", "convex") else size[0]
+        row["bound"] = size[0] + size[1] if kind in ("sphere", "capsule") else np.linalg.norm(size)
+        if kind in ("capsule", "cylinder"):
+            row["core"] = np.asarray(rotation)[:, 2] * size[1]
+            row["squared"] = size[1] ** 2
+            row["inverse"] = 1.0 / row["squared"] if row["squared"] > 0.0 else 0.0
+
+    def hull(self, at: int, corners: Reals, neighbours: Sequence[Sequence[int]] | None = None) -> None:
+        """Give a hull its corners (v, 3) m and, if `neighbours` are given, which others an edge joins each one to."""
+        corners = np.ascontiguousarray(corners, dtype=np.float64)
+        row = self.table[at]
+        row["corners"], row["count"], row["bound"] = address(corners), len(corners), np.linalg.norm(corners, axis=1).max()
+        self._kept.append(corners)
+        if neighbours is not None:
+            starts = np.cumsum([0, *map(len, neighbours)]).astype(np.int32)
+            edges = np.concatenate([np.asarray(one, dtype=np.int32) for one in neighbours])
+            row["starts"], row["edges"] = address(starts), address(edges)
+            self._kept += [starts, edges]
+
+    def taken(self, at: NDArray[np.int64]) -> Volumes:
+        """Some of them, in this order."""
+        taken = Volumes(0)
+        taken.table, taken._kept = self.table[at], self._kept
+        return taken
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+
+def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
+    """The depths (p,) and touches (p,) TOUCH, NaN where they do not touch, of each of the first with the same of the second."""
+    depth, touch = np.empty(len(first)), np.zeros(len(first), dtype=TOUCH)
+    touch["normal"] = touch["point"] = np.nan
+    _overlap()(*_pairs(first, second), address(depth), address(touch))
+    return depth, touch
+
+
+def distances(first: Volumes, second: Volumes) -> Reals:
+    """How far they are apart (p,) m."""
+    apart = np.empty(len(first))
+    _distance()(*_pairs(first, second), address(apart))
+    return apart
+
+
+def cut(points: Reals, line: Reals, room: int) -> Reals:
+    """What is left of a convex polygon (n, 2) in front of a line (a point on it, its inward normal), in `room` corners at most."""
+    points, line, out = np.ascontiguousarray(points, float), np.ascontiguousarray(line, float), np.full((room + 8, 2), np.nan)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or line.shape != (4,):
+        raise ValueError(f"a polygon is (n, 2) and a line (4,), not {points.shape} and {line.shape}")
+    left = _cut()(address(points), len(points), address(line), address(out), room)
+    if not np.isnan(out[room:]).all():
+        raise RuntimeError("the core wrote beyond its memory")
+    return out[:left]
+
+
+def _pairs(first: Volumes, second: Volumes) -> tuple[int, int, int]:
+    if len(first) != len(second):
+        raise ValueError(f"{len(first)} volumes cannot be paired with {len(second)}")
+    return address(first.table), address(second.table), len(first)
+
+
+@cache
+def _volume_size() -> Any:
+    return function("volume_size", result=INTEGER)
+
+
+@cache
+def _overlap() -> Any:
+    return function("overlap", ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS)
+
+
+@cache
+def _distance() -> Any:
+    return function("distance", ADDRESS, ADDRESS, INTEGER, ADDRESS)
+
+
+@cache
+def _cut() -> Any:
+    return function("cut", ADDRESS, INTEGER, ADDRESS, ADDRESS, INTEGER, result=INTEGER)
