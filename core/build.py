@@ -1,6 +1,6 @@
 """Build the native core: one shared library for each level of x86-64 processors, one in all elsewhere.
 
-    python core/build.py [--only x86-64-v3] [--into FOLDER] [--sanitize] [--no-strict] [--force] [--check]
+    python core/build.py [--only x86-64-v3 | --here] [--into FOLDER] [--sanitize] [--no-strict] [--force] [--check]
 
 The compiler is $CXX, else the system's g++ or clang++ where it knows C++20, else that of the `ziglang` package.  Nothing is linked
 but the C library, so that the result runs wherever the C library is at least as old.  A library that was built from the same
@@ -80,15 +80,16 @@ def main() -> None:
     levels = knowledge().machine_levels()
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--only", choices=levels, help="one level instead of all")
+    parser.add_argument("--here", action="store_true", help="the widest level that this processor runs, instead of all")
     parser.add_argument("--into", type=Path, help="another folder than the library's")
     parser.add_argument("--sanitize", action="store_true", help="one build that stops at wrong addresses and undefined operations")
     parser.add_argument("--strict", action=argparse.BooleanOptionalAction, default=True, help="whether warnings are errors")
     parser.add_argument("--force", action="store_true", help="build anew what is current, too")
     parser.add_argument("--check", action="store_true", help="only look: exit code 1 if something is to be built")
     given = parser.parse_args()
-    wanted = (knowledge().SANITIZED,) if given.sanitize else (given.only,) if given.only else levels
     into = given.into or knowledge().FOLDER
     try:
+        wanted = [knowledge().SANITIZED] if given.sanitize else [given.only] if given.only else level_here() if given.here else levels
         stale = [level for level in wanted if given.force or not is_current(level, into, strict=given.strict)]
         if given.check or not stale:
             sys.exit(1 if stale else 0)
@@ -102,6 +103,11 @@ def main() -> None:
     except BuildFailed as failure:
         sys.stderr.write(f"{failure}\n")
         sys.exit(NO_COMPILER if isinstance(failure, CompilerMissing) else 1)
+
+
+def level_here() -> list[str]:
+    """The widest level that this processor runs; none, where it is too old for all, which the library says when it is loaded."""
+    return list(knowledge().possible_levels(knowledge().processor_flags())[-1:])
 
 
 def build(levels: Sequence[str], compiler: Compiler, into: Path, strict: bool) -> Iterator[Path]:

@@ -82,7 +82,7 @@ count_packages() { # what pip says
 
 installed_packages() { find "$venv" -maxdepth 5 -name '*.dist-info' | wc -l; }
 
-core_is_current() { "$venv/bin/python" "$root/core/build.py" --check "$strict"; }
+core_is_current() { "$venv/bin/python" "$root/core/build.py" --check "${core[@]}"; }
 
 # Builds the core by the system's compiler; where there is none, by one that is fetched for it and removed again.
 build_core() { # options of core/build.py
@@ -118,7 +118,7 @@ install_environment() {
   fi
   if ! core_is_current; then
     say "2 of 3: building the native core, some seconds ..."
-    build_core "$strict" || return 1
+    build_core "${core[@]}" || return 1
   fi
   if ! is_current stamp-project "$project"; then
     say "3 of 3: the project itself ..."
@@ -134,7 +134,7 @@ install_environment() {
 
 # Leaves a complete .venv behind, with what ./test needs too if told "dev", or returns non-zero with one line that says why.
 ensure_environment() {
-  local kind="${1:-run}" python version run dev project packages lock size strict
+  local kind="${1:-run}" python version run dev project packages lock size core=()
   python="$(find_python)" || return 1
   read -r version run dev project < <(fingerprints "$python")
   if [[ "$version" != 3.11 ]]; then
@@ -142,9 +142,9 @@ ensure_environment() {
   fi
   # Sizes are those on Linux with Python 3.11.  Whoever only runs MoBeE may have a compiler whose warnings the project has not seen.
   if [[ "$kind" == dev ]]; then
-    packages="$dev" lock=requirements-dev.lock strict=--strict size="1 GB to download and 3 GB on disk, one or two minutes"
+    packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one or two minutes"
   else
-    packages="$run" lock=requirements.lock strict=--no-strict size="480 MB to download and 1 GB on disk, about half a minute"
+    packages="$run" lock=requirements.lock core=(--here --no-strict) size="480 MB to download and 1 GB on disk, about half a minute"
   fi
   if is_current "stamp-$kind" "$packages" && is_current stamp-project "$project" && core_is_current; then
     return

@@ -16,7 +16,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from mobee._core.levels import FOLDER, SANITIZED, SOURCES, fingerprint, library_file, machine_levels, missing, processor_flags
+from mobee._core.levels import (
+    FOLDER,
+    SANITIZED,
+    SOURCES,
+    fingerprint,
+    library_file,
+    machine_levels,
+    missing,
+    possible_levels,
+    processor_flags,
+)
 from mobee.errors import NotInstalled, UnknownName
 
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
@@ -43,8 +53,7 @@ def library() -> ctypes.CDLL:
 def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
     """The build to load: the one asked for, else the widest of those in a folder that a processor with these flags runs."""
     flags = frozenset(flags)
-    known = machine_levels()
-    possible = [level for level in known if not missing(level, flags)]
+    known, possible = machine_levels(), possible_levels(flags)
     if forced:
         if forced == SANITIZED and "asan" not in os.environ.get("LD_PRELOAD", ""):
             raise CoreUnavailable(f"{FORCED}={forced} needs the sanitizers in the process before it: run python core/sanitize.py COMMAND.")

@@ -40,6 +40,12 @@ def missing(level: str, flags: Iterable[str]) -> list[str]:
     return sorted(set(needed) - set(flags))
 
 
+def possible_levels(flags: Iterable[str]) -> list[str]:
+    """The builds that a processor with these flags runs, the narrowest first."""
+    flags = frozenset(flags)
+    return [level for level in machine_levels() if not missing(level, flags)]
+
+
 def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
     """What this processor can do; where the kernel does not tell, what every x86-64 since 2010 can."""
     try:
