@@ -40,9 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.bench.mujoco_peer import MujocoMissing
     from experiments.bench.vi_peers import QuanteconMissing
     from experiments.launched import LaunchFailed
+    from mobee.errors import NotInstalled
 
     try:
         code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
-    except (CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed) as error:
+    except (CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed, NotInstalled) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     return code
