@@ -9,20 +9,29 @@
 namespace mobee {
 
 struct Motion {
-    Array<bool> moved;   // (links,): since the last pose
-    Array<double> last;  // (joints,): the angles of the last pose
+    std::int64_t pose = 0;               // number of the present pose
+    Array<bool> moved;                   // (links,): since the last pose
+    Array<double> last;                  // (joints,): the angles of the last pose
+    Array<std::int64_t> moved_in;        // (links,): the pose in which each has moved last
+    Array<std::int64_t> placed_in;       // (shapes,): the pose in which each has been placed last, see `place_shapes`
 
     // The earlier pose.
     Array<double> angles;   // (joints,)
     Array<Frame> frame;     // (links,)
     Array<double> x, y, z;  // (shapes,)
+    Array<Vec3> then;       // (links,): where the middles were
 
     Array<double> arm;                // (shapes,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
-    Array<double> way;                // (shapes,), see `measure`
-    Array<double> turned;             // (links,), see `measure`
+    Array<std::int64_t> number;       // (links,): of shapes
+    Array<Vec3> middle;               // (links,): of the centres of a link's shapes, at zero pose
+    Array<double> spread;             // (links,): how far from the middle centres are, each with its arm [m]
+    Array<double> turned;             // (links,): by which a point 1 m from a centre that turns with the link has moved [m]
+    Array<double> far;                // (links,), see `measure_links`
+    Array<double> way;                // (shapes,), see `way_of`
     Array<double> bend, sway, chain;  // (links,), see `bend_links`
 
     void fit(const Robot& robot);
+    void find_middles(const Robot& robot);
 };
 
 // Mark the links that a joint carries whose angle differs from the last, all of them if `fresh`, and remember the angles.
@@ -31,10 +40,17 @@ void find_moved(const Robot& robot, const double* angles, bool fresh, Motion& mo
 // Let the pose be the earlier one: from now on `way` counts from here.
 void remember(const Placed& placed, Motion& motion);
 
-// Fill how far any point of a shape that moved may be from where it was, `way` [m]; returns the most of all.
-//
-// Stops as soon as it is `enough` [m]; what is filled is then of no use.
-double measure(const Robot& robot, const Placed& placed, double enough, Motion& motion);
+// Fill how far any point of any shape of a link may be from where it was at most, `far` [m]; returns the most of all.
+double measure_links(const Robot& robot, const Links& links, Motion& motion);
+
+// How far any point of a shape may be from where it was [m], after `measure_links`; places the shape if its link has moved.
+double way_of(const Robot& robot, std::int64_t shape, Placed& placed, Motion& motion);
+
+// The most of all ways; places all shapes.
+double measure_shapes(const Robot& robot, Placed& placed, Motion& motion);
+
+// Place the shapes that have moved since they were placed.
+void place_shapes(const Robot& robot, Placed& placed, Motion& motion);
 
 // Fill for every link three sums over the joints that carry it, from the base on, see `swung`.
 //
