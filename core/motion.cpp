@@ -7,34 +7,67 @@
 
 namespace mobee {
 
-void Motion::fit(const Robot& robot) {
-    const std::int64_t shapes = robot.shapes();
-    for (Array<std::int64_t>* of_links : {&moved_in, &number}) of_links->resize(robot.links);
-    moved.resize(robot.links);
-    placed_in.resize(shapes);
-    for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
-    for (Array<double>* of_links : {&spread, &turned, &far, &bend, &sway, &chain}) of_links->resize(robot.links);
-    for (Array<double>* of_shapes : {&x, &y, &z, &arm, &way}) of_shapes->resize(shapes);
-    for (Array<Vec3>* of_links : {&then, &middle}) of_links->resize(robot.links);
-    frame.resize(robot.links);
-    find_middles(robot);
+namespace motion {
+
+constexpr std::int64_t most_groups = 4;  // of a link
+
+// Give the shapes of a link to groups, by where they are along the longest side of the box that holds their centres.
+void group_link(const Robot& robot, std::int64_t link, Motion& to) {
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    std::int64_t number = 0;
+    for (const Shape& shape : robot.shape) {
+        if (shape.link != link) continue;
+        ++number;
+        for (int k = 0; k < 3; ++k) {
+            low[k] = least(low[k], shape.volume.center[k]);
+            high[k] = most(high[k], shape.volume.center[k]);
+        }
+    }
+    int longest = 0;
+    for (int k = 1; k < 3; ++k)
+        if (high[k] - low[k] > high[longest] - low[longest]) longest = k;
+    const std::int64_t groups = std::min(number, most_groups), first = static_cast<std::int64_t>(to.group.size());
+    to.group.resize(to.group.size() + groups);
+    for (std::int64_t g = 0; g < groups; ++g) to.group[first + g].link = link;
+    const double length = high[longest] - low[longest];
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        const Shape& shape = robot.shape[i];
+        if (shape.link != link) continue;
+        const double share = length > 0.0 ? (shape.volume.center[longest] - low[longest]) / length : 0.0;
+        to.group_of[i] = first + std::min(static_cast<std::int64_t>(share * static_cast<double>(groups)), groups - 1);
+    }
 }
 
-void Motion::find_middles(const Robot& robot) {
-    std::fill(number.begin(), number.end(), 0);
-    std::fill(middle.begin(), middle.end(), Vec3{});
-    std::fill(spread.begin(), spread.end(), 0.0);
-    for (const Shape& shape : robot.shape) {
-        middle[shape.link] = middle[shape.link] + shape.volume.center;
-        ++number[shape.link];
+}  // namespace motion
+
+void Motion::fit(const Robot& robot) {
+    const std::int64_t shapes = robot.shapes();
+    moved.resize(robot.links);
+    moved_in.resize(robot.links);
+    for (Array<std::int64_t>* of_shapes : {&placed_in, &group_of}) of_shapes->resize(shapes);
+    for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
+    for (Array<double>* of_links : {&turned, &bend, &sway, &chain}) of_links->resize(robot.links);
+    for (Array<double>* of_shapes : {&x, &y, &z, &arm, &way}) of_shapes->resize(shapes);
+    frame.resize(robot.links);
+    if (serial == robot.serial) return;
+    serial = robot.serial;
+    make_groups(robot);
+}
+
+void Motion::make_groups(const Robot& robot) {
+    group.clear();
+    for (std::int64_t link = 0; link < robot.links; ++link) motion::group_link(robot, link, *this);
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        Group& one = group[group_of[i]];
+        one.middle = one.middle + robot.shape[i].volume.center;
+        ++one.number;
     }
-    for (std::int64_t link = 0; link < robot.links; ++link)
-        if (number[link] > 0) middle[link] = 1.0 / static_cast<double>(number[link]) * middle[link];
+    for (Group& one : group) one.middle = 1.0 / most(static_cast<double>(one.number), 1.0) * one.middle;
     for (std::int64_t i = 0; i < robot.shapes(); ++i) {
         const Volume& volume = robot.shape[i].volume;
+        Group& one = group[group_of[i]];
         arm[i] = volume.bound - (volume.kind <= Kind::capsule ? volume.radius : 0.0);
-        double& most_spread = spread[robot.shape[i].link];
-        most_spread = most(most_spread, length(volume.center - middle[robot.shape[i].link]) + arm[i]);
+        one.spread = most(one.spread, length(volume.center - one.middle) + arm[i]);
     }
 }
 
@@ -56,23 +89,26 @@ void remember(const Placed& placed, Motion& motion) {
     copy(placed.x, motion.x);
     copy(placed.y, motion.y);
     copy(placed.z, motion.z);
-    for (std::size_t link = 0; link < motion.then.size(); ++link) motion.then[link] = move(motion.frame[link], motion.middle[link]);
     std::fill(motion.way.begin(), motion.way.end(), 0.0);
-    std::fill(motion.far.begin(), motion.far.end(), 0.0);
+    for (Group& one : motion.group) {
+        one.then = move(motion.frame[one.link], one.middle);
+        one.far = 0.0;
+    }
 }
 
-double measure_links(const Robot& robot, const Links& links, Motion& motion) {
-    double farthest = 0.0;
+double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
     for (std::int64_t link = 0; link < robot.links; ++link) {
-        if (motion.moved[link] && motion.number[link] > 0) {
-            const Frame &now = links.frame[link], &before = motion.frame[link];
-            const Four x = now.x - before.x, y = now.y - before.y, z = now.z - before.z;
-            const Four squares = x * x + y * y + z * z;
-            motion.turned[link] = std::sqrt(0.5 * (squares[0] + squares[1] + squares[2]));  // 2 sin(angle / 2)
-            const Vec3 way = move(now, motion.middle[link]) - motion.then[link];
-            motion.far[link] = length(way) + motion.turned[link] * motion.spread[link];
-        }
-        farthest = most(farthest, motion.far[link]);
+        if (!motion.moved[link]) continue;
+        const Frame &now = links.frame[link], &before = motion.frame[link];
+        const Four x = now.x - before.x, y = now.y - before.y, z = now.z - before.z;
+        const Four squares = x * x + y * y + z * z;
+        motion.turned[link] = std::sqrt(0.5 * (squares[0] + squares[1] + squares[2]));  // 2 sin(angle / 2)
+    }
+    double farthest = 0.0;
+    for (Group& one : motion.group) {
+        if (motion.moved[one.link])
+            one.far = length(move(links.frame[one.link], one.middle) - one.then) + motion.turned[one.link] * one.spread;
+        farthest = most(farthest, one.far);
     }
     return farthest;
 }

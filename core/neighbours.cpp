@@ -69,11 +69,11 @@ double way_of_pair(Neighbours& near, Pair pair) {
     return pair.second < robot.shapes() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
 }
 
-// The same from their links alone: no less, and it places nothing.
-double way_of_links(const Neighbours& near, Pair pair) {
-    const Robot& robot = *near.scene->robot;
-    const double way = near.motion.far[robot.shape[pair.first].link];
-    return pair.second < robot.shapes() ? way + near.motion.far[robot.shape[pair.second].link] : way;
+// The same from their groups alone: no less, and it places nothing.
+double way_of_groups(const Neighbours& near, Pair pair) {
+    const Motion& motion = near.motion;
+    const double way = motion.group[motion.group_of[pair.first]].far;
+    return pair.second < near.scene->robot->shapes() ? way + motion.group[motion.group_of[pair.second]].far : way;
 }
 
 // How far two shapes of the robot may have come nearer, as seen from the link that carries both.
@@ -90,7 +90,7 @@ void gather(Neighbours& near) {
     near.found.clear();
     bool bent = false;
     for (const Neighbour& one : near.list) {
-        if (way_of_links(near, one.pair) < one.gap) continue;
+        if (way_of_groups(near, one.pair) < one.gap) continue;
         const double between = way_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
@@ -159,7 +159,7 @@ std::int64_t find(Neighbours& near, const double* q) {
     joint_angles(robot, q, near.placed.links.angles.data());
     find_moved(robot, near.placed.links.angles.data(), fresh, near.motion);
     place_links(robot, near.motion.moved.data(), near.placed.links);
-    double farthest = fresh ? 0.0 : measure_links(robot, near.placed.links, near.motion);
+    double farthest = fresh ? 0.0 : measure_groups(robot, near.placed.links, near.motion);
     if (!fresh && !following::holds(near, farthest)) farthest = measure_shapes(robot, near.placed, near.motion);
     if (following::holds(near, farthest)) {
         ++near.served;
