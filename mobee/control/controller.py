@@ -147,21 +147,22 @@ class Controller:
         self._client = np.zeros(len(self.robot.motors))
         self._pushes: dict[str, Array] = {}
 
-    def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
+    def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
         """Draw a marker to a target with the motors of one part, against its attractor, until the next or `end_reach` (8.2).
 
-        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        `part` None: with all motors that move the marker.  Raises InvalidValue if there are none that may be moved; UnknownName.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
         self._reaches[part].aim(target)
 
-    def end_reach(self, part: str) -> None:
-        """End the pull on a part's marker, if there is one."""
-        self.robot.part(part)
+    def end_reach(self, part: str | None) -> None:
+        """End the pull on a part's marker, or on that of the whole body (None), if there is one."""
+        if part is not None:
+            self.robot.part(part)
         self._reaches.end(part)
 
-    def still_nears(self, part: str) -> bool:
+    def still_nears(self, part: str | None) -> bool:
         """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
         return self._reaches.go_on(part)
 

@@ -4,53 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from mobee.control import Controller, Gains
+from mobee.control import Gains
 from mobee.control.law import Law
-from mobee.model import Model
 from mobee.robot.load import load_robot
-from tests.mobee.control import oracle
 
-SETS = [
-    Gains.default(),
-    Gains.published_2014(),
-    Gains.default().with_motors("*_elbow", stiffness=50.0, damping=30.0, max_limit=60.0, limit_width=0.1, max_spring=9.0),
-]
-EACH = pytest.mark.parametrize("gains", SETS, ids=["default", "published_2014", "per motor"])
 ICUB = load_robot("icub")
-
-
-@EACH
-@given(seed=st.integers(0, 10_000))
-def test_the_forces_are_those_of_the_formulas(gains: Gains, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    q = rng.uniform(ICUB.limits[:, 0] - 0.2, ICUB.limits[:, 1] + 0.2)
-    torque = rng.normal(size=len(q)) * 10.0 ** rng.uniform(-6, 1) * (rng.random(len(q)) < 0.5)
-    expected, found = oracle.forces(ICUB, gains, q, torque), oracle.compiled_forces(ICUB, gains, q, torque)
-    assert found.limits == pytest.approx(expected.limits, rel=1e-12, abs=1e-12)
-    assert found.constraints == pytest.approx(expected.constraints, rel=1e-11, abs=1e-11)
-    assert found.collision == pytest.approx(expected.collision, rel=1e-12, abs=1e-12)
-
-
-@EACH
-@pytest.mark.parametrize("dt", [0.002, 0.02])
-def test_the_motion_is_that_of_the_formulas(gains: Gains, dt: float) -> None:
-    rng = np.random.default_rng(3)
-    controller = Controller(Model(ICUB), gains, speed_scale=0.5)
-    q = rng.uniform(*ICUB.limits.T)
-    controller.reset(q)
-    slow = oracle.Law(ICUB, gains, 0.5, q)
-    for _ in range(50):
-        controller.attractor = goal = rng.uniform(*ICUB.limits.T)
-        forces = controller.forces(controller.model.evaluate(q))
-        command = controller.step(q, dt, forces)
-        slow.step(q, dt, goal, forces.total)
-        assert command.velocity == pytest.approx(slow.velocity, rel=1e-12, abs=1e-12)
-        assert command.position == pytest.approx(slow.reference, rel=1e-12, abs=1e-12)
-        assert controller.acceleration == pytest.approx(slow.acceleration, rel=1e-11, abs=1e-11)
-        q = q + command.velocity * dt + rng.normal(size=len(q)) * 1e-3
 
 
 def test_only_motors_that_live_and_have_weight_are_moved_and_only_those_that_live_feel() -> None:

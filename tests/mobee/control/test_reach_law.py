@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +13,8 @@ from mobee.control import Controller, Gains, Settle
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.reach import ReachTarget
+from mobee.reference import reach
+from mobee.reference.forces import State
 from mobee.robot.load import load_robot
 from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array, Part, Robot
@@ -36,36 +37,6 @@ def felt(controller: Controller, q: Array) -> Array:
     total = np.zeros(len(q))
     controller.reaches.add_forces(q, q, 0.01, total)
     return total
-
-
-def reference(model: Model, part: str, marker: str, target: ReachTarget, q: Array) -> Array:
-    """The published law in NumPy: J^T f of the part's motors, bounded by its norm (degrees as in the 2014 program)."""
-    pose, where = model.evaluate(q), model.robot.part(part).slice
-    jacobian = model.jacobian(q, marker)[:, where] * (Gains.published_2014().weight(model.robot.motors)[where] > 0)
-    error = target.position - pose.position(marker)
-    if target.aim == "surface":
-        error *= max(0.0, 1.0 - target.radius / np.linalg.norm(error))
-    f = 5000.0 * jacobian[:3].T @ error
-    if target.normal is not None:
-        normal = pose.normal(marker)
-        turn = 5000.0 * np.linalg.norm(error) * (1.0 - normal @ target.normal) / 2.0 * np.cross(normal, target.normal)
-        f += jacobian[3:].T @ turn
-    found = np.zeros(len(q))
-    found[where] = np.deg2rad(1000.0 / (1000.0 / 50.0 + np.linalg.norm(f)) * f)
-    return found
-
-
-@given(seed=SEEDS, aim=st.sampled_from(["centre", "surface"]), turned=st.booleans())
-def test_the_published_force_is_the_transposed_jacobian_times_the_way_to_the_target(seed: int, aim: Any, turned: bool) -> None:
-    rng = np.random.default_rng(seed)
-    part, marker = (("right_arm", "right_palm"), ("left_arm", "left_elbow"), ("torso", "left_palm"))[rng.integers(3)]
-    normal = rng.normal(size=3) if turned else None
-    target = ReachTarget(rng.uniform(-0.4, 0.4, 3), float(rng.uniform(0.01, 0.2)), aim, normal)
-    model = Model(ICUB)
-    controller = Controller(model, PUBLISHED)
-    controller.reach_toward(part, marker, target)
-    for q in poses(ICUB, seed):
-        assert felt(controller, q) == pytest.approx(reference(model, part, marker, target, q), abs=1e-8)
 
 
 @given(seed=SEEDS)
@@ -189,7 +160,8 @@ def test_the_published_reach_rests_where_pull_and_spring_are_equal() -> None:
     error = np.array([0.6, 0.8]) - outcome.q
     spring = long.max_spring * error / (long.max_spring / long.stiffness + np.abs(error))
     assert outcome.settled and 0.01 < outcome.missing < 0.1
-    assert reference(plant.model, "arm", "tip", target, q)[1:] == pytest.approx(-spring, abs=1e-3)
+    pull = reach.begin(plant.robot, long, "arm", "tip", target)
+    assert reach.reach_force(pull, State(plant.robot, long, q, 0.0 * q, q), 0.01, 0.0 * q)[1:] == pytest.approx(-spring, abs=1e-3)
 
 
 def one_part(robot: Robot) -> Model:

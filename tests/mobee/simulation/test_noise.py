@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mobee.reference.motors import normal
 from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors
 
-MASK = 2**64 - 1
 ROBOT = load_robot("icub")
 MOTORS = np.arange(len(ROBOT.motors))
 
@@ -18,21 +18,9 @@ def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
     return np.array([drawn.encoders(k, 0.02)[motors] for k in ticks])
 
 
-def splitmix(x: int) -> int:
-    """As published by Vigna, in whole numbers of any length."""
-    x = (x + 0x9E3779B97F4A7C15) & MASK
-    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & MASK
-    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & MASK
-    return x ^ (x >> 31)
-
-
 @pytest.mark.parametrize(("seed", "k", "motor"), [(0, 0, 0), (7, 1, 1), (2**64 - 1, 10**9, 40)])
 def test_a_normal_is_box_muller_of_splitmix(seed: int, k: int, motor: int) -> None:
-    one = splitmix(splitmix(splitmix(seed) ^ k) ^ splitmix(motor // 2))
-    radius = np.sqrt(-2.0 * np.log(((one >> 11) + 1) * 2.0**-53))
-    angle = 2.0 * np.pi * ((splitmix(one) >> 11) * 2.0**-53)
-    expected = radius * (np.sin(angle) if motor % 2 else np.cos(angle))
-    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(expected, rel=1e-12)
+    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(normal(seed, k, motor), rel=1e-12)
 
 
 def test_it_is_a_pure_function_of_seed_tick_and_motor() -> None:
