@@ -1,4 +1,4 @@
-// Cylinders with spheres, capsules and boxes: closed forms, and smooth minima along the outlines of their difference.
+// A cylinder with a sphere, a capsule or a box: closed forms, and smooth minima along the outlines of their difference.
 #include <limits>
 
 #include "difference.hpp"
@@ -11,105 +11,133 @@ namespace cylinder {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// The difference of a solid made of segments along its own axes (a box, or the core of a capsule) and of a cylinder, in the axes of
-// the first.  Its shortest way out is along the cylinder's axis c, across c and a segment, along an axis of a box, or a smooth minimum
-// among the directions square to c or to a segment.  (Where the cylinder's rim meets a corner, the reach has no minimum.)
+inline int after(int axis) { return axis == 2 ? 0 : axis + 1; }
+inline int before(int axis) { return axis == 0 ? 2 : axis - 1; }
+
+// The difference of segments along three axes (a box, or the core of a capsule) and a cylinder, seen along those axes.
+// Its shortest way out is along the cylinder's axis c, along an axis of a box, across c and a segment, or a smooth minimum among the
+// directions square to c or to a segment.  (Where the rim meets a corner, the reach has no minimum.)
 struct Swept {
-    Vec3 shift;  // from the cylinder's centre to that of the other
+    Vec3 shift;  // from the cylinder's centre to that of the segments
     Vec3 half;   // of the segments
     Vec3 axis;   // c
     double radius, height;
+    Vec3 beside;  // of c, how much is beside each segment: the length of their cross product
+    Vec3 moment;  // shift x c
 
+    Swept(const Volume& round, const Volume& other, Vec3 halves)
+        : shift(into(other.rotation, other.center - round.center)), half(halves), axis(into(other.rotation, round.rotation.column(2))),
+          radius(round.half.x), height(round.half.y) {
+        const Vec3 c = axis;
+        beside = {std::sqrt(c.y * c.y + c.z * c.z), std::sqrt(c.z * c.z + c.x * c.x), std::sqrt(c.x * c.x + c.y * c.y)};
+        moment = cross(shift, c);
+    }
+
+    // The shortest reach along c, along the axes of a box, and across c and a segment.
+    double along_cylinder() const { return dot(half, absolute(axis)) + height - std::fabs(dot(shift, axis)); }
+    Vec3 along_box() const { return half + height * absolute(axis) + radius * beside - absolute(shift); }
+    double across(int i) const {
+        const int j = after(i), k = before(i);
+        const double reach = half[j] * std::fabs(axis[k]) + half[k] * std::fabs(axis[j]) - std::fabs(moment[i]);
+        return beside[i] > flat ? reach / beside[i] + radius : infinity;
+    }
+
+    // The reach along a unit vector.
     double reach(Vec3 n) const {
-        const Vec3 around = cross(n, axis);
-        return dot(n, shift) + dot(half, absolute(n)) + height * std::fabs(dot(n, axis)) + radius * length(around);
+        return dot(n, shift) + dot(half, absolute(n)) + height * std::fabs(dot(n, axis)) + radius * length(cross(n, axis));
     }
 };
 
-// The shorter of the two ways along a unit vector, if it is shorter than what there is.
-void improve(Way& best, const Swept& swept, Vec3 axis) {
-    const Vec3 n = sign(-dot(axis, swept.shift)) * axis;
+inline double smallest(Vec3 v) { return least(least(v.x, v.y), v.z); }
+
+// The way along a unit vector that leads apart sooner.
+inline Vec3 outward(const Swept& swept, Vec3 n) { return sign(-dot(n, swept.shift)) * n; }
+
+void prefer(Way& best, const Swept& swept, double reach, Vec3 axis) {
+    if (reach < best.reach - tie) best = {reach, outward(swept, axis)};
+}
+
+inline Vec3 axis_of(int i) {
+    Vec3 e;
+    e[i] = 1.0;
+    return e;
+}
+
+void prefer_across(Way& best, const Swept& swept, int i, double reach) {
+    if (reach < best.reach - tie) best = {reach, outward(swept, over(cross(axis_of(i), swept.axis), swept.beside[i]))};
+}
+
+// Square to c: away from the corner of the segments' outline that is closest to c.
+void prefer_away_from_corner(Way& best, const Swept& swept) {
+    const Vec3 c = swept.axis, half = swept.half;
+    double nearest = infinity;
+    Vec3 corner;
+    for (int k = 0; k < 8; ++k) {
+        const Vec3 p = swept.shift + Vec3{k & 1 ? half.x : -half.x, k & 2 ? half.y : -half.y, k & 4 ? half.z : -half.z};
+        const Vec3 q = p - dot(p, c) * c;
+        if (dot(q, q) < nearest) corner = q, nearest = dot(q, q);
+    }
+    const double size = std::sqrt(nearest);
+    if (size <= touching) return;
+    const Vec3 n = over(-corner, size);
     const double reach = swept.reach(n);
     if (reach < best.reach - tie) best = {reach, n};
 }
 
-// Along c, and across c and a segment.
-Way across_faces(const Swept& swept, bool box) {
-    const Vec3 c = swept.axis;
-    Way best = {infinity, {}};
-    improve(best, swept, c);
-    for (int i = 2; i < 5; ++i) {
-        Vec3 e;
-        e[i % 3] = 1.0;
-        if (box) improve(best, swept, e);
-    }
-    for (int i = 0; i < 3; ++i) {
-        if (!box && swept.half[i] == 0.0) continue;
-        Vec3 e;
-        e[i] = 1.0;
-        const Vec3 n = cross(e, c);
-        const double size = length(n);
-        if (size > flat) improve(best, swept, over(n, size));
-    }
-    return best;
-}
-
-// Square to c: away from the corner of the segments' outline that is closest to c.
-void away_from_corner(Way& best, const Swept& swept) {
-    const Vec3 c = swept.axis, shift = swept.shift - dot(swept.shift, c) * c;
-    double nearest = infinity;
-    Vec3 corner;
-    for (int k = 0; k < 4; ++k) {
-        for (const double z : {swept.half.z, -swept.half.z}) {
-            const Vec3 p = {k & 1 ? swept.half.x : -swept.half.x, k & 2 ? swept.half.y : -swept.half.y, z};
-            const Vec3 q = shift + p - dot(p, c) * c;
-            if (dot(q, q) < nearest) corner = q, nearest = dot(q, q);
-        }
-    }
-    const double size = std::sqrt(nearest);
-    if (size > touching) improve(best, swept, over(corner, size));
-}
-
 // Square to the segment along axis i.
-void around_segment(Way& best, const Swept& swept, int i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
+void prefer_around(Way& best, const Swept& swept, int i) {
+    const int j = after(i), k = before(i);
     const Vec3 c = swept.axis;
-    const Disc disc = {swept.radius, {-c[k], c[j]}, c[i] * c[i], 0.0};
-    if (disc.lean <= flat * flat) return;
-    const Point shift = {swept.shift[j], swept.shift[k]}, across = {c[j], c[k]};
-    Point kink[6], swell[6];
-    int kinks = 0;
-    const double size = std::sqrt(dot(across, across));
-    const bool leans = size > flat;
-    const bool down = disc.beside.y < 0.0 || (disc.beside.y == 0.0 && disc.beside.x < 0.0);
-    const Point beside = ((down ? -1.0 : 1.0) / (leans ? size : 1.0)) * disc.beside;
-    kink[kinks++] = {1.0, 0.0};
-    if (leans && beside.x > 0.0) kink[kinks++] = beside;
-    kink[kinks++] = {0.0, 1.0};
-    if (leans && !(beside.x > 0.0)) kink[kinks++] = beside;
-    for (int m = 0; m < kinks; ++m) {
-        swell[m] = bulge(disc, kink[m]);
-        kink[kinks + m] = -kink[m];
-        swell[kinks + m] = -swell[m];
-    }
+    const Disc disc = {swept.radius, swept.height, {c[j], c[k]}, c[i] * c[i], 0.0};
     Exit exit = {best.reach, {}};
-    for (int m = 0; m < 2 * kinks; ++m) {
-        const int next = m + 1 < 2 * kinks ? m + 1 : 0;
-        const Point from = kink[m], to = kink[next], middle = from + to;
-        // The opposite ones are shorter.
-        if (dot(shift, from) > 0.0 && dot(shift, to) > 0.0) continue;
-        const Point segments = {std::copysign(swept.half[j], middle.x), std::copysign(swept.half[k], middle.y)};
-        const Point corner = shift + segments + std::copysign(swept.height, dot(middle, across)) * across;
-        const Point first = corner + swell[m], chord = swell[next] - swell[m];
-        const double limit = exit.reach - tie, apart = cross(first, chord);
-        if (apart > 0.0 && apart * apart >= limit * limit * dot(chord, chord)) continue;
-        improve_between(disc, corner, from, to, exit);
-    }
+    improve_around(disc, {swept.shift[j], swept.shift[k]}, {swept.half[j], swept.half[k]}, exit);
     if (!(exit.reach < best.reach)) return;
     best.reach = exit.reach;
     best.direction[i] = 0.0;
     best.direction[j] = exit.n.x;
     best.direction[k] = exit.n.y;
+}
+
+bool holds(const Volume& v, Vec3 point) {
+    const Vec3 p = into(v.rotation, point - v.center);
+    if (v.kind == Kind::box) return std::fabs(p.x) < v.half.x && std::fabs(p.y) < v.half.y && std::fabs(p.z) < v.half.z;
+    return p.x * p.x + p.y * p.y < v.half.x * v.half.x && std::fabs(p.z) < v.half.y;
+}
+
+// A segment c + s h, |s| <= 1, and a cylinder about the z axis: how far apart they are at s, and half the slope of the square.
+struct Apart {
+    Vec3 way;  // from the cylinder
+    double distance, slope, rise;
+
+    Apart(Vec3 c, Vec3 h, double radius, double height, double s) {
+        const Vec3 p = c + s * h;
+        const double side = std::sqrt(p.x * p.x + p.y * p.y), beyond = most(side - radius, 0.0), share = beyond > 0.0 ? beyond / side : 0.0;
+        way = {share * p.x, share * p.y, p.z - clamp(p.z, -height, height)};
+        distance = std::sqrt(beyond * beyond + way.z * way.z);
+        slope = dot(way, h);
+        const double across = beyond > 0.0 ? (p.x * h.x + p.y * h.y) / side : 0.0;
+        rise = across * across + share * (h.x * h.x + h.y * h.y - across * across) + (way.z != 0.0 ? h.z * h.z : 0.0);
+        if (beyond <= 0.0) rise = way.z != 0.0 ? h.z * h.z : 0.0;
+    }
+    // No point of the segment is nearer than this: beyond the plane across the way, which touches the cylinder.
+    double bound(double s) const { return distance > 0.0 ? distance - std::fabs(slope) / distance * (slope > 0.0 ? 1.0 + s : 1.0 - s) : 0.0; }
+};
+
+// The closest that the two come; once that is known to be more than `limit`, a lower bound that is more, too.
+Apart closest_to_cylinder(Vec3 c, Vec3 h, const Volume& round, double inverse, double limit, double& bound) {
+    double low = -1.0, high = 1.0, s = unit(-dot(c, h) * inverse);
+    Apart here(c, h, round.half.x, round.half.y, s);
+    for (int step = 0; step < 60; ++step) {
+        bound = here.bound(s);
+        if (bound >= limit || here.distance <= touching) break;
+        (here.slope > 0.0 ? high : low) = s;
+        double next = here.rise > 0.0 ? s - here.slope / here.rise : here.slope > 0.0 ? -1.0 : 1.0;
+        if (!(next > low && next < high)) next = next <= low && low == -1.0 ? -1.0 : next >= high && high == 1.0 ? 1.0 : (low + high) / 2.0;
+        if (std::fabs(next - s) < 1e-15) break;
+        s = next;
+        here = Apart(c, h, round.half.x, round.half.y, s);
+    }
+    return here;
 }
 
 }  // namespace cylinder
@@ -133,32 +161,59 @@ double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     return a.radius - apart;
 }
 
-namespace cylinder {
-
-bool holds_point(const Volume& v, Vec3 point) {
-    const Vec3 p = into(v.rotation, point - v.center);
-    if (v.kind == Kind::box) return std::fabs(p.x) < v.half.x && std::fabs(p.y) < v.half.y && std::fabs(p.z) < v.half.z;
-    return p.x * p.x + p.y * p.y < v.half.x * v.half.x && std::fabs(p.z) < v.half.y;
-}
-
-}  // namespace cylinder
-
 double cylinder_box(const Volume& a, const Volume& b, Touch& touch) {
-    const cylinder::Swept swept = {into(b.rotation, b.center - a.center), b.half, into(b.rotation, a.rotation.column(2)), a.half.x, a.half.y};
-    Way best = cylinder::across_faces(swept, true);
-    if (best.reach <= 0.0) return best.reach;
-    cylinder::away_from_corner(best, swept);
-    for (int i = 0; i < 3; ++i) cylinder::around_segment(best, swept, i);
+    using namespace cylinder;
+    const Swept swept(a, b, b.half);
+    const double along = swept.along_cylinder();
+    const Vec3 box = swept.along_box(), across = {swept.across(0), swept.across(1), swept.across(2)};
+    const double apart = least(along, least(smallest(box), smallest(across)));
+    if (apart <= 0.0) return apart;
+    Way best = {along, outward(swept, swept.axis)};
+    for (const int i : {2, 0, 1}) prefer(best, swept, box[i], axis_of(i));
+    for (int i = 0; i < 3; ++i) prefer_across(best, swept, i, across[i]);
+    // Where the cylinder's axis passes beside the box, a corner may be closest.
+    if (smallest(across) < swept.radius) prefer_away_from_corner(best, swept);
+    for (int i = 0; i < 3; ++i) prefer_around(best, swept, i);
     if (best.reach <= 0.0) return best.reach;
     const Touch found = touch_along(a, b, out_of(b.rotation, best.direction), best.reach);
-    if (!(cylinder::holds_point(a, found.point) && cylinder::holds_point(b, found.point))) {
+    if (!(holds(a, found.point) && holds(b, found.point))) {
         // No point is known yet to be in both.
         Difference difference(a, b);
-        const double apart = closest(difference, 0.0).distance;
-        if (apart > 0.0) return -apart;
+        const double gap = closest(difference, 0.0).distance;
+        if (gap > 0.0) return -gap;
     }
     touch = found;
     return best.reach;
+}
+
+double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch) {
+    using namespace cylinder;
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    double bound = 0.0;
+    const Apart apart = closest_to_cylinder(c, h, b, a.inverse, a.radius, bound);
+    if (bound >= a.radius) return a.radius - bound;
+    if (apart.distance >= a.radius) return a.radius - apart.distance;
+    if (apart.distance > touching) {
+        const double depth = a.radius - apart.distance;
+        touch = touch_along(a, b, out_of(b.rotation, over(apart.way, apart.distance)), depth);
+        return depth;
+    }
+    // The core meets the cylinder.
+    const Swept swept(b, a, {0.0, 0.0, a.half.y});
+    Way best = {swept.along_cylinder(), outward(swept, swept.axis)};
+    for (int i = 2; i >= 0; --i) prefer_across(best, swept, i, swept.across(i));
+    prefer_away_from_corner(best, swept);
+    prefer_around(best, swept, 2);
+    const double depth = a.radius + best.reach;
+    touch = touch_along(a, b, out_of(a.rotation, -best.direction), depth);
+    return depth;
+}
+
+double capsule_cylinder_distance(const Volume& a, const Volume& b) {
+    using namespace cylinder;
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    double bound = 0.0;
+    return most(closest_to_cylinder(c, h, b, a.inverse, infinity, bound).distance - a.radius, 0.0);
 }
 
 }  // namespace mobee::narrow

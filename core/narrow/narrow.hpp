@@ -42,11 +42,13 @@ double capsule_capsule(const Volume& a, const Volume& b, Touch& touch);
 double sphere_box(const Volume& a, const Volume& b, Touch& touch);
 double capsule_box(const Volume& a, const Volume& b, Touch& touch);
 double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch);
 double cylinder_box(const Volume& a, const Volume& b, Touch& touch);
 double box_box(const Volume& a, const Volume& b, Touch& touch);
 
 // See `distance`.
 double capsule_box_distance(const Volume& a, const Volume& b);
+double capsule_cylinder_distance(const Volume& a, const Volume& b);
 
 // The s, t in [-1, 1] that bring w + s u and t v closest; the middle of the span if they are parallel.
 std::pair<double, double> closest_parameters(Vec3 w, Vec3 u, Vec3 v);

@@ -1,32 +1,29 @@
-// The outline of a difference of volumes with one cylinder in it, seen along an edge: where it comes closest to the origin.
+// The outline of a difference of volumes with a cylinder in it, seen along an edge: where it comes closest to the origin.
 //
-// Along directions n square to a unit vector e, a disc of radius r across c reaches as far as an ellipse.  Segments add corners,
-// a ball or another disc across e adds a circle.  Between the directions where the corner changes (kinks) the outline is smooth.
+// Along directions square to a unit vector e, a disc across an axis c reaches as far as an ellipse.  Segments add corners and a disc
+// across e adds a circle.  Between the directions where the corner changes (kinks) the outline is smooth.
 #pragma once
 
 #include "narrow.hpp"
 
 namespace mobee::narrow {
 
-// The plane across e has the axes (1, 0) and (0, 1).
+// A cylinder seen along e, in two axes across it.
 struct Disc {
-    double radius;
-    Point beside;  // e x c
-    double lean;   // the square of e.c
-    double ball;   // radius of the circle that is added
+    double radius, height;  // half
+    Point axis;             // c
+    double lean;            // the square of e.c
+    double ball;            // radius of the circle that is added
 };
 
-// The way that is shortest so far.
+// The shortest way that is known.
 struct Exit {
     double reach;
     Point n;
 };
 
-// The point of the outline that is farthest along n, the disc being about the origin.
-Point bulge(const Disc& disc, Point n);
-
-// Between two directions, less than half a turn apart against the clock, the outline is that of the disc about a corner: take the
-// smooth minimum of its reach there if it is shorter by more than `tie`.  The reach at the two has been considered.
-void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit& best);
+// Take the shortest smooth minimum of how far a cylinder, swept along a rectangle about `shift`, reaches, if it is shorter by more
+// than `tie` than what is known; the reach at the kinks has been considered.
+void improve_around(const Disc& disc, Point shift, Point half, Exit& best);
 
 }  // namespace mobee::narrow

@@ -50,6 +50,7 @@ double overlap_in_order(const Volume& a, const Volume& b, Touch& touch) {
     if (b.kind == Kind::box && a.kind <= Kind::capsule) return a.kind == Kind::sphere ? sphere_box(a, b, touch) : capsule_box(a, b, touch);
     if (a.kind == Kind::box && b.kind == Kind::box) return box_box(a, b, touch);
     if (a.kind == Kind::sphere && b.kind == Kind::cylinder) return sphere_cylinder(a, b, touch);
+    if (a.kind == Kind::capsule && b.kind == Kind::cylinder) return capsule_cylinder(a, b, touch);
     if (a.kind == Kind::cylinder && b.kind == Kind::box) return cylinder_box(a, b, touch);
     return general(a, b, touch);
 }
@@ -76,6 +77,8 @@ double distance(const Volume& a, const Volume& b) {
         apart = -narrow::capsule_capsule(a, b, unused);
     } else if (a.kind == Kind::capsule && b.kind == Kind::box) {
         apart = narrow::capsule_box_distance(a, b);
+    } else if (a.kind == Kind::capsule && b.kind == Kind::cylinder) {
+        apart = narrow::capsule_cylinder_distance(a, b);
     } else {
         narrow::Difference difference(a, b);
         apart = narrow::closest(difference, narrow::infinity).distance - narrow::rounding(a) - narrow::rounding(b);
