@@ -4,7 +4,7 @@
 
 namespace mobee::narrow {
 
-namespace support {
+namespace core_support {
 
 // The corner of a hull that is farthest along v.
 Vec3 of_hull(const Hull& hull, Vec3 v) {
@@ -34,7 +34,7 @@ Vec3 of_core(const Volume& volume, Vec3 v) {
     return of_hull(volume.hull, v);
 }
 
-}  // namespace support
+}  // namespace core_support
 
 Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), shift(into(a.rotation, b.center - a.center)) {
     for (int column = 0; column < 3; ++column) {
@@ -46,7 +46,7 @@ Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), 
 }
 
 Vec3 Difference::farthest(Vec3 n) {
-    return shift + out_of(turn, support::of_core(second, into(turn, n))) - support::of_core(first, -n);
+    return shift + out_of(turn, core_support::of_core(second, into(turn, n))) - core_support::of_core(first, -n);
 }
 
 }  // namespace mobee::narrow
