@@ -18,11 +18,10 @@ def all_passed(requirements: Iterable[Mapping[str, Any]]) -> bool:
     return all(one["passed"] for one in requirements)
 
 
-def lines(requirements: Iterable[Mapping[str, Any]], width: int = 44) -> list[str]:
-    """A line each, that ends with its verdict."""
+def lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
+    """A line each of at most 80 columns, that ends with its verdict."""
     return [
-        f"  {one['name']:<{width}} {one['found']:9.4g} {_bound(one):>9} {_aim(one):<10} {'pass' if one['passed'] else 'SHORT'}"
-        for one in requirements
+        f"  {one['name']:<44}{one['found']:>9.4g} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}" for one in requirements
     ]
 
 
@@ -31,4 +30,4 @@ def _bound(one: Mapping[str, Any]) -> str:
 
 
 def _aim(one: Mapping[str, Any]) -> str:
-    return f"(aim {one['aim']:g})" if "aim" in one else ""
+    return f"aim {one['aim']:g}" if "aim" in one else ""
