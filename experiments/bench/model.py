@@ -136,7 +136,9 @@ def told(measured: Mapping[str, Mapping[int, Rates]]) -> dict[str, Any]:
     return {**tables(measured[ICUB]), "others": {name: tables(found) for name, found in measured.items() if name != ICUB}}
 
 
-def verdict(measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, agree: list[bool]) -> dict[str, Any]:
+def verdict(
+    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, agree: list[bool]
+) -> dict[str, Any]:
     """Whether we are as fast beside the peers as required, and find the same contacts with right depths."""
     required = [
         judged(one.name, _ratio(measured[one.robot][one.objects], one.what, one.peer), at_least=one.least, aim=one.aim)
