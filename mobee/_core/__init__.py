@@ -21,6 +21,8 @@ INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
 """An array that is only read, as its `tobytes()`: for a few numbers this costs less than an address."""
 
+_NOTHING: Any = ctypes.c_char * 0
+
 LEVELS = ("x86-64-v4", "x86-64-v3", "x86-64-v2")
 FORCED = "MOBEE_CORE"
 """The environment variable that names the level to use."""
@@ -43,6 +45,14 @@ def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., An
 
 def address(array: NDArray[Any]) -> int:
     """Where the numbers of a C-contiguous array stand; the caller keeps the array alive."""
+    flags = array.flags
+    if flags.carray:  # may be written to: then this is the same, in a quarter of the time
+        return ctypes.addressof(_NOTHING.from_buffer(array))
+    whole = array.base
+    if isinstance(whole, np.ndarray) and whole.nbytes == array.nbytes and whole.flags.carray and flags.c_contiguous:
+        return ctypes.addressof(_NOTHING.from_buffer(whole))  # of which the array is a view that may not be written to
+    if not (flags.c_contiguous and flags.aligned):
+        raise ValueError("the core needs arrays that are contiguous, row by row, and aligned")
     return array.ctypes.data
 
 

@@ -21,9 +21,6 @@ MODULES = (
     "mobee.simulation.drive",
     "mobee.simulation.loop",
     "mobee.simulation.braking",
-    "mobee.learning.sweeps",
-    "mobee.learning.gains",
-    "mobee.learning.reaching.sums",
     "mobee.engine.descent",
     "mobee.engine.evaluate",
 )
