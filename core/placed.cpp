@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "interface.hpp"
+
 namespace mobee {
 
 Outline outline_of(const Volume& volume) {
@@ -76,6 +78,15 @@ const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t i) 
     }
     placed.whole[i] = true;
     return volume;
+}
+
+// For tests: all shapes (shapes,) at q (motors,), in the order of clusters.
+MOBEE_CALL void mobee_place(const Robot* robot, const double* q, Volume* out) {
+    Placed placed;
+    placed.fit(*robot);
+    joint_angles(*robot, q, placed.links.angles.data());
+    place(*robot, nullptr, placed);
+    for (std::int64_t i = 0; i < robot->shapes(); ++i) out[i] = placed_volume(*robot, placed, i);
 }
 
 }  // namespace mobee

@@ -121,7 +121,7 @@ void sort_objects(Scene& scene, const WorldTables& from, double usual) {
 }  // namespace scenes
 
 bool carried_by(const Robot& robot, std::int64_t link, std::int64_t carrier) {
-    while (link > carrier) link = robot.joint[link - 1].parent;
+    while (link > carrier && link > 0) link = robot.joint[link - 1].parent;
     return link == carrier;
 }
 
@@ -151,5 +151,29 @@ MOBEE_CALL Scene* mobee_scene_new(const Robot* robot, const WorldTables* from) {
 }
 
 MOBEE_CALL void mobee_scene_free(Scene* scene) { discard(scene); }
+
+// For tests: how many objects there are, how many of them are large, and the cells along x, y and z.
+MOBEE_CALL void mobee_scene_counts(const Scene* scene, std::int64_t* counts) {
+    const Grid& grid = scene->grid;
+    counts[0] = scene->objects();
+    counts[1] = grid.large;
+    for (int axis = 0; axis < 3; ++axis) counts[2 + axis] = grid.cells[axis];
+}
+
+// For tests: where each cell begins (cells + 1,); of each object which it is, and whether it is a target, (objects, 2), and its centre.
+MOBEE_CALL void mobee_scene_objects(const Scene* scene, std::int64_t* starts, std::int64_t* objects, Vec3* centers) {
+    for (const std::int64_t start : scene->grid.starts) *starts++ = start;
+    for (std::int64_t k = 0; k < scene->objects(); ++k) {
+        objects[2 * k] = scene->name[k];
+        objects[2 * k + 1] = scene->target[k];
+        centers[k] = {scene->x[k], scene->y[k], scene->z[k]};
+    }
+}
+
+MOBEE_CALL void mobee_span(double offset, double along, double per_metre, std::int64_t cells, std::int64_t* out) {
+    const Span found = span(offset, along, per_metre, cells);
+    out[0] = found.first;
+    out[1] = found.end;
+}
 
 }  // namespace mobee

@@ -10,6 +10,7 @@ import numpy as np
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject
+from mobee.engine.hands import NOBODY
 from mobee.errors import MobeeError
 from mobee.robot.robot import Array, Ints, Robot, Shape
 
@@ -30,7 +31,7 @@ class CoalPeer:
         except ImportError:
             raise CoalMissing("coal is not installed: pip install '.[dev]' in MoBeE's folder") from None
         self._pin, self._coupling = pinocchio, robot.coupling
-        first, second, _ = tested_pairs(robot, snapshot, -1)
+        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
         self.pairs = np.stack([first, second], axis=1)
         self._model = _tree(pinocchio, robot)
         self._geometry = _geometry(pinocchio, coal, robot, snapshot)

@@ -11,7 +11,7 @@ from mobee.collision import Geometry, WorldObject
 from mobee.collision.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
 from mobee.engine.volumes import CODES, VOLUME, Volumes
 from mobee.model import Pose
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 FREE = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
 AGREED = 1e-9  # m, depth of one contact in two evaluations of the same

@@ -6,13 +6,15 @@ Handles are objects of the core; each frees its own, and keeps alive what its ow
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee._core import ADDRESS, BYTES, INTEGER, REAL, address, function
+from mobee._core.narrow import VOLUME
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -83,6 +85,10 @@ _neighbours_state = function("neighbours_state", ADDRESS, ADDRESS)
 _follow = function("follow", ADDRESS, BYTES, INTEGER, ADDRESS, result=INTEGER)
 _sweep = function("sweep", ADDRESS, ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, result=INTEGER)
 _sines_cosines = function("sines_cosines", ADDRESS, INTEGER, ADDRESS, ADDRESS)
+_place = function("place", ADDRESS, ADDRESS, ADDRESS)
+_scene_counts = function("scene_counts", ADDRESS, ADDRESS)
+_scene_objects = function("scene_objects", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+_span = function("span", REAL, REAL, REAL, INTEGER, ADDRESS)
 _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
@@ -170,7 +176,8 @@ class Following:
     def enter(self, scene: Handle, hands: list[int]) -> None:
         """Be among another world, or let others reach."""
         self._scene = scene  # before the core lets go of the last one: nobody else uses this
-        _neighbours_enter(self.at, scene.at, ctypes.addressof((INTEGER * 4)(*hands)))
+        numbers = (INTEGER * 4)(*hands)
+        _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
         """As `Room.evaluate`, of poses q (B, n) one after the other."""
@@ -209,3 +216,38 @@ def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
     return out
+
+
+def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
+    """All shapes (S,), `VOLUME` of mobee._core.narrow, at q (n,), in the order of the robot's tables."""
+    out = np.zeros(shapes, dtype=VOLUME)
+    _place(of.at, address(q), address(out))
+    return out
+
+
+class Grid(NamedTuple):
+    """How a scene sorts its objects: the large ones first, then cell by cell."""
+
+    large: int
+    cells: tuple[int, ...]  # along x, y and z
+    starts: Ints  # (cells + 1,)
+    objects: Ints  # (objects, 2): which of the world's objects each is, and whether it is a target
+    centers: Array  # (objects, 3) m
+
+
+def grid_of(scene: Handle) -> Grid:
+    """The grid of a scene."""
+    counts = np.empty(5, dtype=np.int64)
+    _scene_counts(scene.at, address(counts))
+    objects, large, *cells = counts.tolist()
+    starts, which, centers = np.empty(math.prod(cells) + 1, dtype=np.int64), np.empty((objects, 2), dtype=np.int64), np.empty((objects, 3))
+    _scene_objects(scene.at, address(starts), address(which), address(centers))
+    return Grid(large, tuple(cells), starts, which, centers)
+
+
+def span(offset: float, along: float, per_metre: float, cells: int) -> tuple[int, int]:
+    """The first cell of a row of a grid, and the one past the last, that an object reaches."""
+    out = np.empty(2, dtype=np.int64)
+    _span(offset, along, per_metre, cells, address(out))
+    first, end = out.tolist()
+    return first, end

@@ -17,9 +17,9 @@ SOLID, FIELD = 0, 1
 def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
     """First and second volume, the robot's shapes and then the objects, and kind (0 solid, 1 field) of every tested pair.
 
-    Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares the hands that are `reaching`.  An object on a link meets the shapes of all links that its own is tested
-    against, whatever else such links carry, and the free objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object
-    on no link of the robot.
+    Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares the hands that are `reaching`.
+    An object on a link meets the shapes of all links that its own is tested against, whatever else such links carry, and the free
+    objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object on no link of the robot.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

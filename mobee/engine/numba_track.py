@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
-from mobee.engine.numba_engine import Engine
 from mobee.engine.evaluate import settle
 from mobee.engine.layout import CAPSULE, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, SLOT
 from mobee.engine.memory import HEADER, sizes
 from mobee.engine.neighbours import EMPTY, LIST, PAUSE, RENEW, SERVED, STATE, WORTH, Around, follow
+from mobee.engine.numba_engine import Engine
 from mobee.engine.pack import CLUSTERS, F_AXIS, F_POINT, F_REACH, F_ROW, I_LINK, I_PARENT, JOINTS, LINKS, SHAPES, Flags, Packed, UInts
 from mobee.engine.room import at_least
 from mobee.engine.scene import COUNT, W_COLUMNS, WIDEST, Scene

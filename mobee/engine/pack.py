@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.engine.numba_clusters import clusters
 from mobee.engine.layout import ROW, ROW_BOUND, convex_row, volume_row
+from mobee.engine.numba_clusters import clusters
 from mobee.kinematics.vectors import cross
 from mobee.robot.robot import Array, Ints, LinkPair, Robot, Shape
 

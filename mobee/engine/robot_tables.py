@@ -114,9 +114,13 @@ def _check(robot: Robot) -> None:
             raise InvalidValue(f"joint {joint.name!r} of {robot.name!r} is mounted on link {joint.parent}; it must be one of 0 to {index}.")
     for shape in robot.shapes:
         if not 0 <= shape.link < len(robot.links):
-            raise InvalidValue(f"shape {shape.name!r} of {robot.name!r} is on link {shape.link}; it must be one of 0 to {len(robot.links) - 1}.")
+            raise InvalidValue(
+                f"shape {shape.name!r} of {robot.name!r} is on link {shape.link}; it must be one of 0 to {len(robot.links) - 1}."
+            )
     if len(robot.links) != len(robot.joints) + 1:
-        raise InvalidValue(f"{robot.name!r} has {len(robot.links)} links and {len(robot.joints)} joints; each joint moves a link but the first.")
+        raise InvalidValue(
+            f"{robot.name!r} has {len(robot.links)} links and {len(robot.joints)} joints; each joint moves a link but the first."
+        )
 
 
 def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:

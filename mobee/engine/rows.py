@@ -6,9 +6,9 @@ import numpy as np
 
 from mobee.engine.compiled import inlined, inner
 from mobee.engine.forces import push
-from mobee.engine.numba_hands import BITS
 from mobee.engine.layout import SLOT
 from mobee.engine.narrow.dispatch import overlap
+from mobee.engine.numba_hands import BITS
 from mobee.engine.pack import I_LINK, I_NAME, I_PARENT, I_ROLE, SHAPES, UInts
 from mobee.engine.scene import CELLS, COUNT, W_START
 from mobee.robot.robot import Array, Ints

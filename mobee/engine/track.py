@@ -12,6 +12,7 @@ from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
 from mobee.engine.engine import Engine, Scene
 from mobee.engine.hands import Hands, hand_numbers
+from mobee.engine.robot_tables import Flags
 from mobee.robot.robot import Array, Ints
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class Neighbours:
         numbers, reals, torque = self._core.follow(q)
         return self._engine.table(snapshot, numbers, reals), torque
 
-    def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[Ints, int]:
+    def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[Flags, int]:
         """As `Following.sweep`, in the world and with the hands of the last `enter`."""
         return self._core.sweep(q, edges, between)
 

@@ -59,8 +59,8 @@ class EdgeWatch:
         A shape on its way is never farther from both of its ends than half of that way.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
-        for middles, bound, ways in zip(self._middles, self._bounds, self._half_ways, strict=True):
-            gap = apart(middles, thing) - bound
+        for middles, radius, ways in zip(self._middles, self._bounds, self._half_ways, strict=True):
+            gap = apart(middles, thing) - radius
             found |= np.minimum(gap[self._edges[:, 0]], gap[self._edges[:, 1]]) < ways
         return found
 
