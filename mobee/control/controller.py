@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core.tables import Table
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
-from mobee.control.load import law, reach_law
+from mobee.control.law import Law
 from mobee.control.modality import Command, Modality
-from mobee.control.pack import Law, pack
-from mobee.control.packed_reaches import Arrays, PackedReaches
+from mobee.control.reaches import Reaches
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
@@ -39,8 +38,8 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains",
-        "last_forces", "max_dt", "modality", "model", "propagate", "robot", "weight",
+        "_attractor", "_client", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains", "last_forces", "law", "max_dt",
+        "modality", "model", "propagate", "robot", "weight",
     )  # fmt: skip
 
     def __init__(
@@ -71,10 +70,10 @@ class Controller:
         self.contact_forces = contact_forces
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
-        self._compiled = law()
-        reach_law()  # the first reach is not to wait for it
-        self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
-        self._reaches = PackedReaches(self.robot, self._packed.integers)
+        self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
+        """The law with its numbers."""
+        self._reaches = Reaches(self.robot, self.law)
+        self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
         self.reset(self.robot.home)
 
@@ -85,33 +84,28 @@ class Controller:
 
     @attractor.setter
     def attractor(self, q: Array) -> None:
-        self._attractor = checked("attractor", q, len(self.robot.motors))
+        self._attractor[:] = checked("attractor", q, len(self.robot.motors))
 
     @property
     def velocity(self) -> Array:
         """The law's own velocity, shape (n,), in [rad/s]: a copy."""
-        own: Array = self._state[OWN_VELOCITY].copy()
+        own: Array = self._state["velocity"].copy()
         return own
 
     @property
     def acceleration(self) -> Array:
         """The acceleration of the last step, shape (n,), in [rad/s^2]: a copy."""
-        own: Array = self._state[OWN_ACCELERATION].copy()
+        own: Array = self._state["acceleration"].copy()
         return own
 
     @property
-    def law(self) -> Law:
-        """The law as compiled code reads it."""
-        return self._packed
-
-    @property
-    def state(self) -> Array:
-        """The law's state (STATE, n), see `layout`: what compiled code advances, no copy."""
+    def state(self) -> Table:
+        """The law's state, a row for each motor (see `mobee._core.law.STATE`): always the same array, which a plant advances."""
         return self._state
 
     @property
     def goal(self) -> Array:
-        """The attractor itself, shape (n,), in [rad]: what compiled code reads, no copy."""
+        """The attractor itself, shape (n,), in [rad]: always the same array, no copy."""
         return self._attractor
 
     @property
@@ -120,9 +114,9 @@ class Controller:
         return bool(self._pushes)
 
     @property
-    def reaches(self) -> Arrays:
-        """The reaches as compiled code reads them, and keeps its memory: no copy."""
-        return self._reaches.arrays
+    def reaches(self) -> Reaches:
+        """The reaches under way."""
+        return self._reaches
 
     def client_force(self, q: Array) -> Array:
         """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
@@ -160,7 +154,7 @@ class Controller:
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
-        self._reaches.aim(part, target)
+        self._reaches[part].aim(target)
 
     def end_reach(self, part: str) -> None:
         """End the pull on a part's marker, if there is one."""
@@ -169,13 +163,13 @@ class Controller:
 
     def still_nears(self, part: str) -> bool:
         """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
-        return bool(reach_law().still_nears(self._packed.integers, self.robot.part(part).start, *self._reaches.arrays))
+        return self._reaches.go_on(part)
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
         q = checked("q", q, len(self.robot.motors))
-        self._attractor = q
-        self._state = self._at_rest(q)
+        self._attractor[:] = q
+        self._state[:] = self.law.at_rest(q)
         self.last_forces = Forces(np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
 
     def hold(self, part: str, q: Array) -> None:
@@ -184,7 +178,8 @@ class Controller:
         The commanded velocity follows as fast as the acceleration limit lets it.
         """
         self.set_attractor(part, q)
-        self._state[[OWN_VELOCITY, OWN_ACCELERATION], self.robot.part(part).slice] = 0.0
+        where = self.robot.part(part).slice
+        self._state["velocity"][where] = self._state["acceleration"][where] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
         """Have a part that something else keeps still begin anew, as `reset` does for all; q (n_part,) rad measured.
@@ -193,11 +188,11 @@ class Controller:
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
-        self._state[:, where] = self._at_rest(self._attractor)[:, where]
+        self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
         """The constraint forces at a pose, as `step` computes them when it is given none."""
-        return forces_of(self._packed, pose, self.propagate)
+        return forces_of(self.law, pose, self.propagate)
 
     def step(self, q: Array, dt: float, forces: Forces | None = None) -> Command:
         """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model.
@@ -212,23 +207,17 @@ class Controller:
         if forces is None:
             forces = self.forces(self._track.evaluate(q))
         total = checked_force("forces", forces.total, n) + self.client_force(q)
-        packed = self._packed
         if self._reaches:
-            reach_law().add_reaches(packed.integers, packed.floats, q, self._attractor, dt, total, *self._reaches.arrays)
+            self._reaches.add_forces(q, self._attractor, dt, total)
         if self.modality == "torque":
-            self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
-        commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
+            self._state["feedforward"] = gravity_torque(self.robot, q)
+        commands = self.law.step(q, dt, self._attractor, total, self._state)
         self.last_forces = forces
         return Command(*commands)
 
-    def _at_rest(self, q: Array) -> Array:
-        state: Array = self._compiled.at_rest(self._packed.integers, self._packed.floats, q)
-        return state
-
     def _add_client(self, q: Array, total: Array) -> None:
         """Add f_config and f_work (thesis eqs. 5.9-5.10); of a motor that slides f_work too counts in its unit, as a contact does."""
-        integers, floats = self._packed.integers, self._packed.floats
-        self._compiled.add_client(integers, floats, self._client, total)
+        self.law.add_client(self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
-            self._compiled.add_client(integers, floats, projected * motor_units(self.robot) ** 2, total)
+            self.law.add_client(projected * motor_units(self.robot) ** 2, total)

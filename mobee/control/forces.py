@@ -7,8 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 from mobee.control.gains import Gains
-from mobee.control.load import law
-from mobee.control.pack import Law, pack
+from mobee.control.law import Law
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array, Robot
 
@@ -39,19 +38,19 @@ def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", c
     `propagate`: how far down the body a contact is felt.  `contact_forces` False leaves f_coll
     at zero, for the control experiment in which touching has no effect.
     """
-    return forces_of(_packed(pose.robot, gains, contact_forces), pose, propagate)
+    return forces_of(_law(pose.robot, gains, contact_forces), pose, propagate)
 
 
-def forces_of(packed: Law, pose: Pose, propagate: Propagate) -> Forces:
-    """The constraint forces at one pose, of a packed law."""
+def forces_of(law: Law, pose: Pose, propagate: Propagate) -> Forces:
+    """The constraint forces at one pose, of a law with its numbers."""
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")
     if propagate not in ("tree", "part"):
         raise UnknownName("propagation", propagate, ("tree", "part"))
     torque = pose.projection if propagate == "tree" else pose.projection_of_part
-    return Forces(*law().forces_at(packed.integers, packed.floats, pose.q, torque))
+    return Forces(*law.forces(pose.q, torque))
 
 
 @lru_cache(maxsize=8)
-def _packed(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
-    return pack(robot, gains, contact_forces=contact_forces)
+def _law(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
+    return Law(robot, gains, contact_forces=contact_forces)

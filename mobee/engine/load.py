@@ -15,12 +15,6 @@ from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 MODULES = (
     "mobee.engine.scene",
     "mobee.engine.neighbours",
-    "mobee.control.law",
-    "mobee.control.reach_law",
-    "mobee.simulation.noise",
-    "mobee.simulation.drive",
-    "mobee.simulation.loop",
-    "mobee.simulation.braking",
     "mobee.engine.descent",
     "mobee.engine.evaluate",
 )

@@ -21,6 +21,7 @@ from mobee.simulation.described import described
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
 from mobee.simulation.reaches import ReachesUnderWay
+from mobee.simulation.runner import Runner
 from mobee.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -82,12 +83,10 @@ class OfflinePlant:
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
         self._options = {"gains": self.controller.gains, "motors": parameters, "dt": dt, "propagate": propagate, "modality": modality}
         self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
-        from mobee.simulation.runner import Runner  # machine code, which `import mobee` does not load
-
-        self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
+        self._actions = Actions(self.robot)
+        self._runner = Runner(self._controller, self.motors, alive, dt, command_age, self._actions.parts)
         self._alive = alive
         self._ticks = 0
-        self._actions = Actions(self.robot)
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
@@ -214,7 +213,7 @@ class OfflinePlant:
         kept = traced or self._digest is not None
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
-        rows, done, lost = self._runner.run(self._ticks, most, self._actions.parts, self._actions.tests, kept, traced)
+        rows, done, lost = self._runner.run(self._ticks, most, kept, traced)
         if done:
             self._pose = None
             self._ticks += done

@@ -7,6 +7,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import METHODS, value_iteration
+from mobee.reference.learning import action_values
 from tests.mobee.learning.tables import Table, chain, random_problem
 from tests.mobee.learning.toys import arm
 
@@ -22,9 +23,8 @@ def experienced(neighbours, seed, transitions=400):
 
 def residual(model, reward, discount, values):
     """The largest change of a value by one more sweep, states without actions left out."""
-    exists = model.probabilities.any(axis=-1) & (reward != -np.inf)
-    found = np.where(exists, reward + discount * (model.probabilities * values[model.outcomes]).sum(axis=-1), -np.inf)
-    acting = exists.any(axis=1)
+    found = action_values(model.outcomes, model.probabilities, reward, discount, values)
+    acting = np.isfinite(found).any(axis=1)
     return np.abs(found[acting].max(axis=1) - values[acting]).max(initial=0.0)
 
 
@@ -62,20 +62,6 @@ def test_values_of_an_experienced_model_are_those_of_policy_iteration(neighbours
     exact_v, _ = policy_iteration(model, reward, 0.99)
     assert np.abs(v - exact_v).max() < 1e-9
     assert np.array_equal(q == -np.inf, reward == -np.inf)
-
-
-def test_sweeps_are_those_of_algorithm_7():
-    model = experienced(16, seed=4)
-    exists = model.reward != -np.inf
-    v, before = np.zeros(81), np.where(exists, 0.0, -np.inf)
-    while True:
-        q = np.where(exists, model.reward + 0.9 * (model.probabilities * v[model.outcomes]).sum(axis=-1), -np.inf)
-        change, before, v = np.abs(q[exists] - before[exists]).max(), q, q.max(axis=1)
-        if change < 1e-3:
-            break
-    found_v, found_q = value_iteration(model, model.reward)
-    assert found_v == pytest.approx(v, abs=1e-14)
-    assert found_q[exists] == pytest.approx(q[exists], abs=1e-14)
 
 
 @pytest.mark.parametrize("method", METHODS)

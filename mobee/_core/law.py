@@ -1,0 +1,66 @@
+"""The control law: core/law.hpp says what its numbers are."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+
+import numpy as np
+
+from mobee._core import ADDRESS, INTEGER, REAL, function
+from mobee._core.tables import INTERVAL, WHOLE, View, columns
+
+MOTOR_GAINS = columns(
+    "low", "high", "stiffness", "max_spring", "damping", "limit_width", "max_limit", "below", "above", "client_slope", "max_client",
+    "max_speed", "max_acceleration", "max_torque", "leash", "unit", "fine",
+)  # fmt: skip
+CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])
+CLAUSE_ENTRY = np.dtype([("motor", WHOLE), ("factor", "f8"), ("normal", "f8")])
+STATE = columns("velocity", "acceleration", "sent", "reference", "feedforward")
+"""A motor's state under the law: rad/s, rad/s^2, the velocity commanded last, the position reference, and N m added to a torque."""
+SETTLE = ("speed", "acceleration", "first_look", "interval", "timeout")
+
+MODALITIES = ("position", "velocity", "torque")
+VERDICTS = ("moving", "settled", "timeout")
+TERMS = ("limits", "constraints", "collision")
+"""The forces, in the order in which the core fills and adds them."""
+
+
+class Settle(ctypes.Structure):
+    """The thresholds of the settle test."""
+
+    _fields_ = tuple((name, REAL) for name in SETTLE)
+
+
+class SettleTest(ctypes.Structure):
+    """What a settle test remembers, s."""
+
+    _fields_ = (("begun", REAL), ("next_look", REAL))
+
+
+class Law(ctypes.Structure):
+    """A law with its numbers; whoever makes it keeps the tables."""
+
+    _fields_ = (
+        *((name, View) for name in ("motors", "active", "felt", "parts", "clauses", "rows", "entries")),
+        *((name, INTEGER) for name in ("published", "touching", "direction", "modality")),
+        *((name, REAL) for name in ("max_constraint", "contact_gain", "contact_slope", "max_contact")),
+        ("settle", Settle),
+    )
+
+
+class Calls:
+    """The functions of that file."""
+
+    def __init__(self) -> None:
+        self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+        self.begin = function("law_begin", ADDRESS, ADDRESS, ADDRESS)
+        self.client = function("law_client", ADDRESS, ADDRESS, ADDRESS)
+        self.step = function("law_step", ADDRESS, ADDRESS, REAL, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+        self.look = function("law_look", ADDRESS, ADDRESS, REAL, ADDRESS, INTEGER, result=INTEGER)
+
+
+@cache
+def calls() -> Calls:
+    """Found when they are first asked for."""
+    return Calls()
