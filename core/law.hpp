@@ -20,10 +20,11 @@ constexpr double motor_friction = 5.0;  // N m s/rad
 
 struct MotorGains {
     double low = 0.0, high = 0.0;  // limits
-    double stiffness = 0.0, max_spring = 0.0, damping = 0.0;
-    double limit_width = 0.0, max_limit = 0.0;  // the limit force grows to max_limit over limit_width,
-    double below = 0.0, above = 0.0;            // from these distances to the limits on
-    double client_slope = 0.0, max_client = 0.0;
+    double max_spring = 0.0, spring_knee = 0.0;  // most that the spring pulls, and how far it is from half of that: max_spring / stiffness
+    double damping = 0.0;
+    double limit_slope = 0.0;         // the limit force grows by this
+    double below = 0.0, above = 0.0;  // from these distances to the limits on
+    double client_slope = 0.0, max_client = 0.0, client_knee = 0.0;  // of a client's force, the same as of the spring
     double max_speed = 0.0, max_acceleration = 0.0, max_torque = 0.0;
     double leash = 0.0;  // how far the position reference may run ahead of the motor
     double unit = 1.0;   // what 1 rad of the gains is in the motor's unit, 1 where it turns
@@ -77,6 +78,7 @@ struct LawState {
 struct Moment {
     const double* q = nullptr;
     const double* torque = nullptr;
+    bool touched = true;  // else the torque is zero
 };
 
 // A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.
@@ -106,8 +108,8 @@ double torque_of(const MotorGains& motor, const LawState& state);
 // Judge the motion of some motors at time t [s]; between two looks it is always `moving`.
 Verdict look(const Law& law, Interval motors, const LawState* state, double t, SettleTest& test);
 
-// Eq. 5.8 of one dimension: slope `slope` at 0, `maximum` far out.
-inline double squash(double v, double maximum, double slope) { return maximum * v / (maximum / slope + std::fabs(v)); }
+// Eq. 5.8 of one dimension: `maximum` far out, half of it at the knee, which is maximum / slope.
+inline double squash(double v, double maximum, double knee) { return maximum * v / (knee + std::fabs(v)); }
 
 // Eq. 5.12: the force of one motor that keeps it inside its limits.
 double limit_force(const MotorGains& motor, double q);

@@ -11,7 +11,7 @@ from mobee._core import ADDRESS, INTEGER, REAL, function
 from mobee._core.tables import INTERVAL, WHOLE, View, columns
 
 MOTOR_GAINS = columns(
-    "low", "high", "stiffness", "max_spring", "damping", "limit_width", "max_limit", "below", "above", "client_slope", "max_client",
+    "low", "high", "max_spring", "spring_knee", "damping", "limit_slope", "below", "above", "client_slope", "max_client", "client_knee",
     "max_speed", "max_acceleration", "max_torque", "leash", "unit", "fine",
 )  # fmt: skip
 CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])

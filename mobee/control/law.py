@@ -19,7 +19,7 @@ from mobee.robot.robot import Array, Clause, Ints, Robot
 INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
 LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
 
-_OF_MOTORS = ("stiffness", "max_spring", "damping", "limit_width", "max_limit", "client_slope", "max_client")
+_OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 _SHARED = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
 
 
@@ -91,7 +91,11 @@ def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
     table["low"], table["high"] = robot.limits.T
     for name in _OF_MOTORS:
         table[name] = gains.of_robot(name, robot)
-    table["below"], table["above"] = limit_zones(robot, table["limit_width"]).T
+    width = gains.of_robot("limit_width", robot)
+    table["spring_knee"] = table["max_spring"] / gains.of_robot("stiffness", robot)
+    table["client_knee"] = table["max_client"] / table["client_slope"]
+    table["limit_slope"] = gains.of_robot("max_limit", robot) / width
+    table["below"], table["above"] = limit_zones(robot, width).T
     table["max_speed"] = INSIDE * speed_scale * np.array([m.max_velocity for m in robot.motor_table])
     table["max_acceleration"] = INSIDE * np.array([m.max_acceleration for m in robot.motor_table])
     table["max_torque"] = [m.max_torque for m in robot.motor_table]
