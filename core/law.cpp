@@ -215,8 +215,8 @@ Verdict look(const Law& law, Interval motors, const LawState* state, double t, S
 
 }  // namespace mobee
 
-MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, double* forces) {
-    mobee::constraining_forces(*law, {q, torque, true}, forces);
+MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, const mobee::LawState* state, double* forces) {
+    mobee::constraining_forces(*law, {q, torque, state}, forces);
 }
 
 MOBEE_CALL void mobee_law_begin(const mobee::Law* law, const double* q, mobee::LawState* state) { mobee::begin_at_rest(*law, q, state); }
@@ -245,7 +245,10 @@ MOBEE_CALL std::int64_t mobee_law_look(const mobee::Settle* settle, mobee::Settl
     return mobee::law::unsettled(*settle, *test, t);
 }
 
+// The term of that number: its name, none behind the last, and whether it depends on the state.
 MOBEE_CALL const char* mobee_law_term(std::int64_t index) { return index < mobee::term_count ? mobee::terms[index].name : nullptr; }
+
+MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return mobee::terms[index].moving; }
 
 // Single formulas, for tests.
 MOBEE_CALL double mobee_law_squash(double v, double maximum, double slope) { return mobee::squash(v, maximum, maximum / slope); }

@@ -74,17 +74,20 @@ struct LawState {
     double velocity = 0.0, acceleration = 0.0, sent = 0.0, reference = 0.0, feedforward = 0.0;
 };
 
-// What forces depend on: the measured positions, and the sum of J^T (depth * normal) over the contacts of fields, both (n,).
+// What forces depend on, all of it (n,): the measured positions, the sum of J^T (depth * normal) over the contacts of fields, and the
+// law's state before the step.
 struct Moment {
     const double* q = nullptr;
     const double* torque = nullptr;
+    const LawState* state = nullptr;
     bool touched = true;  // else the torque is zero
 };
 
-// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.
+// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.  Its numbers stand in the law.
 struct Term {
     const char* name;
     void (*add)(const Law& law, const Moment& now, double* force);
+    bool moving = false;  // it depends on the law's state: the model's process, which has none, leaves it to the controller
 };
 
 constexpr std::int64_t term_count = 3;
