@@ -65,7 +65,8 @@ struct Law {
     std::int64_t touching = 0;   // contacts are felt
     std::int64_t direction = 0;  // a client's force is bounded by its norm in each part, not motor by motor
     std::int64_t modality = velocity_modality;
-    double max_constraint = 0.0, contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;
+    double max_constraint = 0.0;                                        // of the clauses' force
+    double contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;  // of the contacts' force
     Settle settle;
 };
 
@@ -90,10 +91,7 @@ struct Term {
     bool moving = false;  // it depends on the law's state: the model's process, which has none, leaves it to the controller
 };
 
-constexpr std::int64_t term_count = 3;
-extern const Term terms[term_count];
-
-// Fill `forces` (term_count, n).
+// Fill `forces` (terms, n), a row for each force that constrains the robot.
 void constraining_forces(const Law& law, const Moment& now, double* forces);
 
 // Add a client's force f, bounded (eqs. 5.9 and 5.10), to `total`, both (n,).

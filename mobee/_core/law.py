@@ -68,14 +68,14 @@ def calls() -> Calls:
 
 
 @cache
-def terms() -> tuple[str, ...]:
+def term_names() -> tuple[str, ...]:
     """The names of the forces, in the order in which the core fills and adds them."""
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
     return tuple(found.decode() for found in takewhile(bool, map(name, count())))
 
 
 @cache
-def moving_terms() -> tuple[str, ...]:
+def moving_names() -> tuple[str, ...]:
     """Those of them that depend on the law's state."""
     moving = function("law_moving", INTEGER, result=INTEGER)
-    return tuple(name for index, name in enumerate(terms()) if moving(index))
+    return tuple(name for index, name in enumerate(term_names()) if moving(index))

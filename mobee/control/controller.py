@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.law import moving_terms, terms
+from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
@@ -124,7 +124,7 @@ class Controller:
     @property
     def force_names(self) -> tuple[str, ...]:
         """The names of all forces in `last_forces`, in the order in which they are added."""
-        return (*terms(), *(term.name for term in self.terms))
+        return (*term_names(), *(term.name for term in self.terms))
 
     @property
     def reaches(self) -> Reaches:
@@ -245,7 +245,7 @@ class Controller:
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
         """With all that it lacks."""
         more = self.own_forces(q, dt, pose)
-        if any(name not in forces for name in moving_terms()):
+        if any(name not in forces for name in moving_names()):
             more |= self.forces(self._track.evaluate(q) if pose is None else pose)
         return Forces(**{**more, **forces})
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from mobee._core.law import moving_terms, terms
+from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
 from mobee.control.gains import Gains
 from mobee.control.law import Law
@@ -33,12 +33,14 @@ class Forces(Mapping[str, Array]):
 
     def __init__(self, *rows: Array, **more: Array) -> None:
         """The law's in their order or by their names, and any others by theirs."""
-        given = {**dict(zip(terms(), rows, strict=False)), **more}
-        if len(rows) > len(terms()) or len(given) < len(rows) + len(more):
-            raise InvalidValue(f"forces: {len(rows)} without a name, {', '.join(more) or 'none'} by name; the law has {', '.join(terms())}")
-        if lacking := [name for name in terms() if name not in given and name not in moving_terms()]:
+        given = {**dict(zip(term_names(), rows, strict=False)), **more}
+        if len(rows) > len(term_names()) or len(given) < len(rows) + len(more):
+            raise InvalidValue(
+                f"forces: {len(rows)} without a name, {', '.join(more) or 'none'} by name; the law has {', '.join(term_names())}"
+            )
+        if lacking := [name for name in told_terms() if name not in given]:
             raise InvalidValue(f"forces: {', '.join(lacking)} lacking")
-        self._rows = {name: given.pop(name) for name in terms() if name in given} | given
+        self._rows = {name: given.pop(name) for name in term_names() if name in given} | given
 
     def __getitem__(self, name: str) -> Array:
         return self._rows[name]
@@ -67,6 +69,16 @@ class Forces(Mapping[str, Array]):
     def total(self) -> Array:
         """Their sum, shape (n,), in [rad/s^2]."""
         return reduce(np.add, self._rows.values())
+
+
+def told_terms() -> tuple[str, ...]:
+    """The names of the law's terms that a pose alone decides: the model tells them, what depends on the law's state it cannot."""
+    return tuple(name for name in term_names() if name not in moving_names())
+
+
+def needs_contacts() -> bool:
+    """Whether the law has terms that the model cannot tell: then it tells the contacts."""
+    return bool(moving_names())
 
 
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:

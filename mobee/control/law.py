@@ -59,12 +59,12 @@ class Law:
         return len(self.motors)
 
     def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
-        """The forces that constrain the robot at q, (len(terms()), n) in rad/s^2.
+        """The forces that constrain the robot at q, (len(term_names()), n) in rad/s^2.
 
         `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.  `state`:
         of the law, before the step; None: it is at rest.
         """
-        found = np.empty((len(core.terms()), len(self)))
+        found = np.empty((len(core.term_names()), len(self)))
         given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
         self._core.forces(self.address, *given, address(found))
         return found

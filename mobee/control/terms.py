@@ -7,9 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from numpy.typing import ArrayLike
-
-from mobee._core.law import terms as terms_of_the_core
+from mobee._core.law import term_names
 from mobee.control.checked import checked_force
 from mobee.control.forces import Forces
 from mobee.errors import InvalidValue
@@ -22,7 +20,7 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 
 
 class State:
-    """What a force may depend on in a tick: `robot`; `q` (n,) rad measured; `velocity` (n,) rad/s, the law's own; the tick `dt` s; `pose`."""
+    """What a force may depend on: `q` (n,) rad measured, `velocity` (n,) rad/s, the law's own, the tick `dt` s, `robot` and `pose`."""
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
 
@@ -48,7 +46,7 @@ class Term:
     """
 
     name: str
-    function: Callable[[State], ArrayLike]
+    function: Callable[[State], Array]
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and _NAME.fullmatch(self.name)):
@@ -74,7 +72,7 @@ def _kept(array: Array) -> Array:
 
 def valid_terms(given: Sequence[Term]) -> tuple[Term, ...]:
     """Terms that can stand beside those of the law and each other; raises InvalidValue."""
-    terms, taken = tuple(given), set(terms_of_the_core())
+    terms, taken = tuple(given), set(term_names())
     for term in terms:
         if not isinstance(term, Term):
             raise InvalidValue(f"terms has {term!r}; each must be a Term, as Term(name, function).")

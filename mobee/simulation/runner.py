@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mobee._core import address
 from mobee._core import plant as core
-from mobee._core.law import terms
+from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
 from mobee.control import Controller, Forces
 from mobee.engine import engine_of
@@ -47,7 +47,8 @@ class Runner:
         """The encoders of the last tick, (n,) rad."""
         self._struct = core.Plant(
             law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
-            client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address, commands=address(self._commands),
+            client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
+            commands=address(self._commands),
             command_age=command_age, substeps=substeps, dt=dt, seed=motors.seed,
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
@@ -111,7 +112,7 @@ class Runner:
         """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
         controller, motors = self._controller, self._motors
         if controller.terms and np.isfinite(q).all():
-            self._forces[len(terms()) :] = list(controller.own_forces(q, self._dt).values())
+            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt).values())
         if controller.modality == "torque":
             controller.state["feedforward"] = gravity_torque(controller.robot, q)
             motors.load = gravity_torque(controller.robot, motors.q)
