@@ -15,6 +15,7 @@ from mobee import Gains, Model
 from mobee.collision.contact import Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
+from mobee.control.forces import needs_contacts, told_terms
 from mobee.engine.hands import MOST
 from mobee.errors import MobeeError
 from mobee.kinematics.quaternion import from_matrix
@@ -40,6 +41,7 @@ class ModelNode:
                 self._model.world.remove(name)
         self._track = self._model.track()
         self._gains = Gains.named(config.gains)
+        self._tells_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
         self._desk = WorldDesk(service, self._model)
         bus = service.bus
@@ -96,11 +98,10 @@ class ModelNode:
             self._targets.put(re_k=tick.k, positions=self._desk.positions({reach.object for reach in self._reaches.values()}))
         self._forces.put(
             re_k=tick.k,
-            limits=forces.limits.tolist(),
-            constraints=forces.constraints.tolist(),
-            collision=forces.collision.tolist(),
+            terms={name: forces[name].tolist() for name in told_terms()},
             part_age={part: tick.t - status.t for part, status in tick.parts.items()},
             touched=touching,
+            contacts=[_item(contact) for contact in pose.contacts] if self._tells_contacts else None,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
         self._participant.done(tick.k, told=tick.k > 0 and bool(self._service.alive.get("controller")))
@@ -155,4 +156,5 @@ class ModelNode:
 
 
 def _item(c: Contact) -> ContactItem:
-    return ContactItem(first=c.first, second=c.second, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
+    shapes = {"first": c.first, "second": c.second, "first_link": c.first_link, "second_link": c.second_link}
+    return ContactItem(**shapes, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
