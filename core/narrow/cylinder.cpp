@@ -14,6 +14,12 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 inline int after(int axis) { return axis == 2 ? 0 : axis + 1; }
 inline int before(int axis) { return axis == 0 ? 2 : axis - 1; }
 
+inline Vec3 axis_of(int i) {
+    Vec3 e;
+    e[i] = 1.0;
+    return e;
+}
+
 // The difference of segments along three axes (a box, or the core of a capsule) and a cylinder, seen along those axes.
 // Its shortest way out is along the cylinder's axis c, along an axis of a box, across c and a segment, or a smooth minimum among the
 // directions square to c or to a segment.  (Where the rim meets a corner, the reach has no minimum.)
@@ -33,14 +39,16 @@ struct Swept {
         moment = cross(shift, c);
     }
 
-    // The shortest reach along c, along the axes of a box, and across c and a segment.
-    double along_cylinder() const { return dot(half, absolute(axis)) + height - std::fabs(dot(shift, axis)); }
-    Vec3 along_box() const { return half + height * absolute(axis) + radius * beside - absolute(shift); }
+    // How far the difference extends from `shift` along c, along the axes of a box, and across c and a segment.
+    double along_cylinder() const { return dot(half, absolute(axis)) + height; }
+    Vec3 along_box() const { return half + height * absolute(axis) + radius * beside; }
     double across(int i) const {
         const int j = after(i), k = before(i);
-        const double reach = half[j] * std::fabs(axis[k]) + half[k] * std::fabs(axis[j]) - std::fabs(moment[i]);
-        return beside[i] > flat ? reach / beside[i] + radius : infinity;
+        return beside[i] > flat ? (half[j] * std::fabs(axis[k]) + half[k] * std::fabs(axis[j])) / beside[i] + radius : infinity;
     }
+    Vec3 normal_across(int i) const { return over(cross(axis_of(i), axis), beside[i]); }
+    // Of the shift along that normal.
+    double shift_across(int i) const { return beside[i] > flat ? -moment[i] / beside[i] : 0.0; }
 
     // The reach along a unit vector.
     double reach(Vec3 n) const {
@@ -50,21 +58,10 @@ struct Swept {
 
 inline double smallest(Vec3 v) { return least(least(v.x, v.y), v.z); }
 
-// The way along a unit vector that leads apart sooner.
-inline Vec3 outward(const Swept& swept, Vec3 n) { return sign(-dot(n, swept.shift)) * n; }
-
-void prefer(Way& best, const Swept& swept, double reach, Vec3 axis) {
-    if (reach < best.reach - tie) best = {reach, outward(swept, axis)};
-}
-
-inline Vec3 axis_of(int i) {
-    Vec3 e;
-    e[i] = 1.0;
-    return e;
-}
-
-void prefer_across(Way& best, const Swept& swept, int i, double reach) {
-    if (reach < best.reach - tie) best = {reach, outward(swept, over(cross(axis_of(i), swept.axis), swept.beside[i]))};
+// Take the way along an axis, or against it, whichever leads apart sooner.
+inline void prefer(Way& best, Vec3 n, double extent, double shift) {
+    const double reach = extent + away(shift) * shift;
+    if (reach < best.reach - tie) best = {reach, away(shift) * n};
 }
 
 // Square to c: away from the corner of the segments' outline that is closest to c.
@@ -98,12 +95,6 @@ void prefer_around(Way& best, const Swept& swept, int i) {
     best.direction[k] = exit.n.y;
 }
 
-bool holds(const Volume& v, Vec3 point) {
-    const Vec3 p = into(v.rotation, point - v.center);
-    if (v.kind == Kind::box) return std::fabs(p.x) < v.half.x && std::fabs(p.y) < v.half.y && std::fabs(p.z) < v.half.z;
-    return p.x * p.x + p.y * p.y < v.half.x * v.half.x && std::fabs(p.z) < v.half.y;
-}
-
 // A segment c + s h, |s| <= 1, and a cylinder about the z axis: how far apart they are at s, and half the slope of the square.
 struct Apart {
     Vec3 way;  // from the cylinder
@@ -129,7 +120,7 @@ Apart closest_to_cylinder(Vec3 c, Vec3 h, const Volume& round, double inverse, d
     Apart here(c, h, round.half.x, round.half.y, s);
     for (int step = 0; step < 60; ++step) {
         bound = here.bound(s);
-        if (bound >= limit || here.distance <= touching) break;
+        if ((bound >= limit && bound > 0.0) || here.distance <= touching) break;
         (here.slope > 0.0 ? high : low) = s;
         double next = here.rise > 0.0 ? s - here.slope / here.rise : here.slope > 0.0 ? -1.0 : 1.0;
         if (!(next > low && next < high)) next = next <= low && low == -1.0 ? -1.0 : next >= high && high == 1.0 ? 1.0 : (low + high) / 2.0;
@@ -164,24 +155,23 @@ double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch) {
 double cylinder_box(const Volume& a, const Volume& b, Touch& touch) {
     using namespace cylinder;
     const Swept swept(a, b, b.half);
-    const double along = swept.along_cylinder();
+    const double along = swept.along_cylinder(), off = dot(swept.shift, swept.axis);
     const Vec3 box = swept.along_box(), across = {swept.across(0), swept.across(1), swept.across(2)};
-    const double apart = least(along, least(smallest(box), smallest(across)));
+    const Vec3 aside = {swept.shift_across(0), swept.shift_across(1), swept.shift_across(2)};
+    const double between = smallest(across - absolute(aside));
+    const double apart = least(least(along - std::fabs(off), between), smallest(box - absolute(swept.shift)));
     if (apart <= 0.0) return apart;
-    Way best = {along, outward(swept, swept.axis)};
-    for (const int i : {2, 0, 1}) prefer(best, swept, box[i], axis_of(i));
-    for (int i = 0; i < 3; ++i) prefer_across(best, swept, i, across[i]);
+    Way best = {infinity, {}};
+    prefer(best, swept.axis, along, off);
+    for (const int i : {2, 0, 1}) prefer(best, axis_of(i), box[i], swept.shift[i]);
+    for (int i = 0; i < 3; ++i) prefer(best, swept.normal_across(i), across[i], aside[i]);
     // Where the cylinder's axis passes beside the box, a corner may be closest.
-    if (smallest(across) < swept.radius) prefer_away_from_corner(best, swept);
+    if (between < swept.radius) prefer_away_from_corner(best, swept);
     for (int i = 0; i < 3; ++i) prefer_around(best, swept, i);
     if (best.reach <= 0.0) return best.reach;
     const Touch found = touch_along(a, b, out_of(b.rotation, best.direction), best.reach);
-    if (!(holds(a, found.point) && holds(b, found.point))) {
-        // No point is known yet to be in both.
-        Difference difference(a, b);
-        const double gap = closest(difference, 0.0).distance;
-        if (gap > 0.0) return -gap;
-    }
+    const double gap = known_to_meet(a, b, found.point) ? 0.0 : Difference(a, b).apart();
+    if (gap > 0.0) return -gap;
     touch = found;
     return best.reach;
 }
@@ -191,17 +181,18 @@ double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
     double bound = 0.0;
     const Apart apart = closest_to_cylinder(c, h, b, a.inverse, a.radius, bound);
-    if (bound >= a.radius) return a.radius - bound;
-    if (apart.distance >= a.radius) return a.radius - apart.distance;
+    if (bound >= a.radius && bound > 0.0) return a.radius - bound;
     if (apart.distance > touching) {
+        if (apart.distance >= a.radius) return a.radius - apart.distance;
         const double depth = a.radius - apart.distance;
         touch = touch_along(a, b, out_of(b.rotation, over(apart.way, apart.distance)), depth);
         return depth;
     }
     // The core meets the cylinder.
     const Swept swept(b, a, {0.0, 0.0, a.half.y});
-    Way best = {swept.along_cylinder(), outward(swept, swept.axis)};
-    for (int i = 2; i >= 0; --i) prefer_across(best, swept, i, swept.across(i));
+    Way best = {infinity, {}};
+    prefer(best, swept.axis, swept.along_cylinder(), dot(swept.shift, swept.axis));
+    for (int i = 2; i >= 0; --i) prefer(best, swept.normal_across(i), swept.across(i), swept.shift_across(i));
     prefer_away_from_corner(best, swept);
     prefer_around(best, swept, 2);
     const double depth = a.radius + best.reach;

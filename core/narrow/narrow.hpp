@@ -16,6 +16,9 @@ constexpr double aligned = 1e-6;    // sine of the angle below which a direction
 // -1 or 1; next to zero always 1, so that rounding cannot choose.
 inline double sign(double value) { return value < -tie ? -1.0 : 1.0; }
 
+// The better side of a plane across an axis to leave by, where `value` is how far the second volume is in front of the first.
+inline double away(double value) { return value > tie ? -1.0 : 1.0; }
+
 // Of a plane.
 struct Point {
     double x, y;
@@ -43,6 +46,7 @@ double sphere_box(const Volume& a, const Volume& b, Touch& touch);
 double capsule_box(const Volume& a, const Volume& b, Touch& touch);
 double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch);
 double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch);
 double cylinder_box(const Volume& a, const Volume& b, Touch& touch);
 double box_box(const Volume& a, const Volume& b, Touch& touch);
 

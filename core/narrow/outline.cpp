@@ -122,10 +122,12 @@ void improve_around(const Disc& disc, Point shift, Point half, Exit& best) {
         const int next = k + 1 < kinks.count ? k + 1 : 0;
         const Point from = kinks.n[k], to = kinks.n[next], middle = from + to;
         // The opposite ones are shorter.
-        if (dot(shift, from) > 0.0 && dot(shift, to) > 0.0) continue;
+        if (dot(shift, from) > tie && dot(shift, to) > tie) continue;
         const Point corner = shift + Point{std::copysign(half.x, middle.x), std::copysign(half.y, middle.y)} +
                              std::copysign(disc.height, dot(middle, disc.axis)) * disc.axis;
         const Point first = corner + kinks.swell[k], chord = kinks.swell[next] - kinks.swell[k];
+        const double reach = dot(from, first);
+        if (reach < best.reach - tie) best = {reach, from};
         const double limit = best.reach - tie, area = cross(first, chord);
         if (area > 0.0 && area * area >= limit * limit * dot(chord, chord)) continue;
         outline_of_disc::improve_between(disc, corner, from, to, best);

@@ -51,6 +51,7 @@ double overlap_in_order(const Volume& a, const Volume& b, Touch& touch) {
     if (a.kind == Kind::box && b.kind == Kind::box) return box_box(a, b, touch);
     if (a.kind == Kind::sphere && b.kind == Kind::cylinder) return sphere_cylinder(a, b, touch);
     if (a.kind == Kind::capsule && b.kind == Kind::cylinder) return capsule_cylinder(a, b, touch);
+    if (a.kind == Kind::cylinder && b.kind == Kind::cylinder) return cylinder_cylinder(a, b, touch);
     if (a.kind == Kind::cylinder && b.kind == Kind::box) return cylinder_box(a, b, touch);
     return general(a, b, touch);
 }
