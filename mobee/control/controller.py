@@ -41,8 +41,8 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains", "last_forces", "law", "max_dt",
-        "modality", "model", "propagate", "robot", "terms", "weight",
+        "_attractor", "_client", "_last_forces", "_pushes", "_reaches", "_state", "_track", "contact_forces", "forced", "gains", "law",
+        "max_dt", "modality", "model", "propagate", "robot", "terms", "weight",
     )  # fmt: skip
 
     def __init__(
@@ -81,6 +81,7 @@ class Controller:
         """The law with its numbers."""
         self.terms = valid_terms(terms)
         self._reaches = Reaches(self.robot, self.law)
+        self._last_forces: Forces | Array
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
         self.reset(self.robot.home)
@@ -117,6 +118,18 @@ class Controller:
         return self._attractor
 
     @property
+    def last_forces(self) -> Forces:
+        """The constraint forces of the last step."""
+        known = self._last_forces
+        if not isinstance(known, Forces):
+            known = self._last_forces = Forces(**dict(zip(self.force_names, known, strict=True)))
+        return known
+
+    def note_forces(self, forces: Array) -> None:
+        """Take the rows for `last_forces`, (forces, n) in the order of `force_names`, a copy."""
+        self._last_forces = forces.copy()
+
+    @property
     def pushed(self) -> bool:
         """Whether forces act on markers, which depend on the pose."""
         return bool(self._pushes)
@@ -134,7 +147,7 @@ class Controller:
     def client_force(self, q: Array) -> Array:
         """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
         total = np.zeros(len(q))
-        if self._pushes or self._client.any():
+        if self._pushes or self.forced:
             self._add_client(q, total)
         return total
 
@@ -146,6 +159,7 @@ class Controller:
     def force(self, f: Array) -> None:
         """Apply a force in configuration space, (n,) rad/s^2 or m/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
         self._client = checked_force("force", f, len(self.robot.motors))
+        self.forced = bool(self._client.any())
 
     def push(self, marker: str, f: Array) -> None:
         """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
@@ -157,24 +171,25 @@ class Controller:
 
     def clear(self) -> None:
         """End all forces of the client; reaches go on."""
-        self._client = np.zeros(len(self.robot.motors))
+        self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 
-    def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
+    def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
         """Draw a marker to a target with the motors of one part, against its attractor, until the next or `end_reach` (8.2).
 
-        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        `part` None: with all motors that move the marker.  Raises InvalidValue if there are none that may be moved; UnknownName.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
         self._reaches[part].aim(target)
 
-    def end_reach(self, part: str) -> None:
-        """End the pull on a part's marker, if there is one."""
-        self.robot.part(part)
+    def end_reach(self, part: str | None) -> None:
+        """End the pull on a part's marker, or on that of the whole body (None), if there is one."""
+        if part is not None:
+            self.robot.part(part)
         self._reaches.end(part)
 
-    def still_nears(self, part: str) -> bool:
+    def still_nears(self, part: str | None) -> bool:
         """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
         return self._reaches.go_on(part)
 
@@ -183,7 +198,7 @@ class Controller:
         q = checked("q", q, len(self.robot.motors))
         self._attractor[:] = q
         self._state[:] = self.law.at_rest(q)
-        self.last_forces = Forces(**{name: np.zeros(len(q)) for name in self.force_names})
+        self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
         """Stay where the part is: own velocity 0 and attractor at its measured q (n_part,) rad.
@@ -239,7 +254,7 @@ class Controller:
         if self.modality == "torque":
             self._state["feedforward"] = gravity_torque(self.robot, q)
         commands = self.law.step(q, dt, self._attractor, total, self._state)
-        self.last_forces = forces
+        self._last_forces = forces
         return Command(*commands)
 
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
