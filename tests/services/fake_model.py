@@ -25,7 +25,7 @@ class FakeModel:
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
         self.touched: dict[str, list[str]] = {}
-        self.contacts: list[ContactItem] | None = None
+        self.contacts: list[ContactItem] | None = []  # which only a controller with terms of its own looks at
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
         rig.listen(keys.TICK, self._answer)
