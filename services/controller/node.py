@@ -86,11 +86,11 @@ class ControllerNode:
             self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
-        acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
-        if max(np.abs(force).max(initial=0.0) for force in (acting.limits, acting.constraints, acting.collision)) > LARGEST_FORCE / 3:
+        rows = np.array((forces.limits, forces.constraints, forces.collision))
+        if np.abs(rows).max(initial=0.0) > LARGEST_FORCE / 3:
             self._service.bus.reject("value", f"forces of tick {forces.re_k}: larger than any law makes them")
             return
-        self._forces, self._acting = forces, acting
+        self._forces, self._acting = forces, Forces(*rows)
         if self._tick is not None and forces.re_k >= self._tick.k:
             self._step()
 
@@ -162,15 +162,14 @@ class ControllerNode:
             before = self._law.state.copy()
             command = self._law.step(self._q, tick.dt / 1e9, self._acting)
         modality: Mode = self._config.modality
-        velocity, acceleration = self._law.velocity, self._law.acceleration
+        velocity, acceleration = self._law.velocity / self._units, self._law.acceleration / self._units
         touched = self._forces.touched if self._forces is not None else {}
         orders = {}
         for part, action in self._actions.items():
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
-                speeds, changes = velocity[where] / self._units[where], acceleration[where] / self._units[where]
-                action.look(tick.k, tick.t * 1e-9, speeds, changes, partial(self._law.still_nears, part))
+                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where], partial(self._law.still_nears, part))
                 self._reaches.look(part, tick, touched.get(part, []))
         self._last = tick, orders, before
         return orders, getattr(command, modality)
