@@ -23,6 +23,7 @@ class Refused(Exception):
         self.reason = reason
 
 
+@cache
 def encoding_of(cls: type[Struct]) -> str:
     """The encoding string that travels with a message of this type."""
     return f"application/msgpack;icub/{cls.__name__}/{VERSION}"

@@ -191,7 +191,9 @@ def report(result: Mapping[str, Any]) -> str:
         quartiles, spread = (f"{low:.2f} - {high:.2f}" for low, high in (one["quartiles"], one["range"]))
         lines.append(f"{case:<20}{one['old_s']:>9.3f}{one['new_s']:>9.3f}{one['ratio']:>8.2f}{quartiles:>15}{spread:>15}")
         if not one["same_work"]:
-            lines += [
-                f"    {which}: " + ", ".join(f"{name} {count:g}" for name, count in work.items()) for which, work in one["work"].items()
-            ]
+            lines += [f"    {which}: {_told(work)}" for which, work in one["work"].items()]
     return "\n".join([*lines, "required", *requirement.lines(result["requirements"])])
+
+
+def _told(work: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {count:g}" for name, count in work.items())

@@ -1,8 +1,8 @@
 """Whether the model and its peers find the same contacts, whether depths are right and minimal, and how far the peers' differ.
 
 Two programs may differ on whether a pair touches that overlaps by less than GRAZE.  A depth is right if it is the way out along its
-normal, and minimal if no peer knows a direction in which the way is shorter; `way_out` is the judge of both, so that a peer whose own depths
-are not minimal (MuJoCo's points of contact, the iterative searches of coal and fcl where cylinders meet) judges all the same.
+normal, and minimal if no peer knows a direction in which the way is shorter; `way_out` is the judge of both, so that a peer whose own
+depths are not minimal (MuJoCo's points of contact, the iterative searches of coal and fcl where cylinders meet) judges all the same.
 """
 
 from __future__ import annotations

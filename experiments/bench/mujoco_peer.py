@@ -68,9 +68,9 @@ class MujocoPeer:
         self._mujoco.mj_step(self.model, self.data, nstep=count)
 
     def touching(self) -> tuple[Ints, Array, Array]:
-        """The pairs (c, 2) of volumes in contact at the last detection, smaller index first, and of the deepest of its points of contact
+        """The pairs (c, 2) of volumes in contact at the last detection, their depths (c,) m and where the first must move (c, 3).
 
-        the depth (c,) m and where the first must move (c, 3).
+        The smaller index is first; of several points of contact of a pair the deepest one counts.
         """
         contact = self.data.contact
         volumes = self._volume[np.array(contact.geom).reshape(-1, 2)]

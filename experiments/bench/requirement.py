@@ -1,4 +1,7 @@
-"""What a benchmark requires: a figure, its bound, and the verdict.  Figures that are judged are ratios, sizes or counts, never bare times."""
+"""What a benchmark requires: a figure, its bound and the verdict.
+
+Figures that are judged are ratios, sizes or counts, or times on the standard machine (calibration.py): never bare times.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Another checkout beside this one, in one run: how many times faster, in processor time, plant, agents, planning, maps and lockstep are."""
+"""Another checkout beside this one, in one run: how much less processor time plant, agents, plans, maps and lockstep cost."""
 
 from __future__ import annotations
 

@@ -181,15 +181,14 @@ class ControllerNode:
             before = self._law.state.copy()
             command = self._step_law(tick)
         modality: Mode = self._config.modality
-        velocity, acceleration = self._law.velocity, self._law.acceleration
+        velocity, acceleration = self._law.velocity / self._units, self._law.acceleration / self._units
         touched = self._forces.touched if self._forces is not None else {}
         orders = {}
         for part, action in self._actions.items():
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
-                speeds, changes = velocity[where] / self._units[where], acceleration[where] / self._units[where]
-                action.look(tick.k, tick.t * 1e-9, speeds, changes, partial(self._law.still_nears, part))
+                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where], partial(self._law.still_nears, part))
                 self._reaches.look(part, tick, touched.get(part, []))
         self._last = tick, orders, before
         return orders, getattr(command, modality)
