@@ -15,7 +15,6 @@ from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 MODULES = (
     "mobee.engine.scene",
     "mobee.engine.neighbours",
-    "mobee.engine.descent",
     "mobee.engine.evaluate",
 )
 ENGINE = ("mobee.engine.scene", "mobee.engine.neighbours", "mobee.engine.evaluate")  # what a model needs
