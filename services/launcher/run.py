@@ -15,6 +15,7 @@ from types import FrameType
 
 from bus_schema import keys
 from bus_schema.rpc import Done
+from mobee._core import CoreUnavailable, library
 from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
@@ -67,6 +68,7 @@ def launch(options: Options) -> int:
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
+        library()  # here in one line what every service would say
         check_gains(scenario)
         check_lockstep(scenario)
         robots = check_robots(scenario)
@@ -81,7 +83,7 @@ def launch(options: Options) -> int:
         session = open_router(endpoint, max(part.config.patience for part in scenario.parts) if scenario.is_locked else LEASE)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before anything was started; what is compiled of the engine so far is kept", INTERRUPTED)

@@ -273,7 +273,6 @@ def missing(monkeypatch: pytest.MonkeyPatch, package: str, *settings: str) -> st
     ("package", "service", "remedy"),
     [
         ("icub_models", "robot_sim", ".[sim]"),
-        ("cv2", "vision", ".[vision]"),
         ("rerun", "monitor", ".[viz]"),
     ],
 )
