@@ -53,7 +53,7 @@ void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& w
         double* torque = request.torque + b * robot.motors;
         std::memset(torque, 0, robot.motors * sizeof(double));
         joint_angles(robot, request.q + b * robot.motors, placed.links.angles.data());
-        place(robot, nullptr, placed);
+        place(robot, placed);
         bound_clusters(robot, placed);
         find_pairs(scene, placed, 0.0, worker.pairs);
         sieve(scene, placed, worker.pairs.list);

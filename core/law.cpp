@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "interface.hpp"
@@ -30,11 +31,23 @@ void add_limit_forces(const Law& law, const Moment& now, double* force) {
     for (const std::int64_t i : law.felt) force[i] = limit_force(law.motors[i], now.q[i]);
 }
 
-// How much a row lacks of being satisfied with margin: 0 where the zone begins, 1 on the boundary, on beyond it (eq. 5.15).
-double lack(const Law& law, const ClauseRow& row, const double* q) {
+// What a row is worth: a.q + b.
+double worth(const Law& law, const ClauseRow& row, const double* q) {
     double value = 0.0;
     for (std::int64_t k = row.entries.first; k < row.entries.end; ++k) value += law.entries[k].factor * q[law.entries[k].motor];
-    return 1.0 - (value + row.offset) / row.zone;
+    return value + row.offset;
+}
+
+// How much a row lacks of being satisfied with margin: 0 where the zone begins, 1 on the boundary, on beyond it (eq. 5.15).
+double lack(const Law& law, const ClauseRow& row, const double* q) { return 1.0 - worth(law, row, q) / row.zone; }
+
+// Whether a clause pushes: no row is satisfied with margin.  The published law also counts where a zone begins, by 0.
+bool pushes(const Law& law, Interval clause, const double* q) {
+    for (std::int64_t r = clause.first; r < clause.end; ++r) {
+        const double value = worth(law, law.rows[r], q), zone = law.rows[r].zone;
+        if (law.published ? value > zone : value >= zone) return false;
+    }
+    return true;
 }
 
 // A push along the unit normal of a row (eq. 5.15).
@@ -47,10 +60,10 @@ void push(const Law& law, const ClauseRow& row, double size, double* force) {
 void add_clause_forces(const Law& law, const Moment& now, double* force) {
     bool pushed = false;
     for (const Interval& clause : law.clauses) {
+        if (!pushes(law, clause, now.q)) continue;
+        pushed = true;
         double least = std::numeric_limits<double>::infinity();
         for (std::int64_t r = clause.first; r < clause.end; ++r) least = std::min(least, lack(law, law.rows[r], now.q));
-        if (law.published ? !(least >= 0.0) : !(least > 0.0)) continue;
-        pushed = true;
         for (std::int64_t r = clause.first; r < clause.end; ++r) {
             const ClauseRow& row = law.rows[r];
             push(law, row, law.published ? lack(law, row, now.q) : law.max_constraint * least, force);
@@ -71,7 +84,7 @@ void square(double* force, std::int64_t count) {
 
 // Eq. 5.11: L(gain * sum of J^T depth), its norm bounded part by part (eq. 5.8).
 void add_collision_forces(const Law& law, const Moment& now, double* force) {
-    if (!law.touching) return;
+    if (!law.touching || !now.touched) return;
     for (const Interval& part : law.parts) {
         bool touched = false;
         for (std::int64_t i = part.first; i < part.end; ++i) {
@@ -86,9 +99,17 @@ void add_collision_forces(const Law& law, const Moment& now, double* force) {
     }
 }
 
+// All forces that constrain the robot, in the order in which they are added.
+constexpr Term terms[] = {
+    {"limits", add_limit_forces},
+    {"constraints", add_clause_forces},
+    {"collision", add_collision_forces},
+};
+constexpr std::int64_t term_count = std::size(terms);
+
 // Eq. 5.7 solved for the acceleration: squashed spring plus forces minus damping.
 double acceleration(double q, double velocity, double attractor, double force, const MotorGains& motor) {
-    return squash(attractor - q, motor.max_spring, motor.stiffness) + force - motor.damping * velocity;
+    return squash(attractor - q, motor.max_spring, motor.spring_knee) + force - motor.damping * velocity;
 }
 
 // The velocity that a motor is told: within its speed, and within `change` of what was sent last.
@@ -122,20 +143,13 @@ Verdict unsettled(const Settle& settle, const SettleTest& test, double t) {
 
 }  // namespace law
 
-const Term terms[term_count] = {
-    {"limits", law::add_limit_forces},
-    {"constraints", law::add_clause_forces},
-    {"collision", law::add_collision_forces},
-};
-
 double limit_force(const MotorGains& motor, double q) {
-    const double slope = motor.max_limit / motor.limit_width;
-    return slope * (std::max(motor.low + motor.below - q, 0.0) - std::max(q - motor.high + motor.above, 0.0));
+    return motor.limit_slope * (std::max(motor.low + motor.below - q, 0.0) - std::max(q - motor.high + motor.above, 0.0));
 }
 
 void constraining_forces(const Law& law, const Moment& now, double* forces) {
-    std::fill_n(forces, term_count * law.motors.size, 0.0);
-    for (const Term& term : terms) {
+    std::fill_n(forces, law::term_count * law.motors.size, 0.0);
+    for (const Term& term : law::terms) {
         term.add(law, now, forces);
         forces += law.motors.size;
     }
@@ -148,7 +162,7 @@ double client_share(const MotorGains& motor, double length) {
 
 void add_client_force(const Law& law, const double* f, double* total) {
     if (!law.direction) {
-        for (const std::int64_t i : law.felt) total[i] += squash(f[i], law.motors[i].max_client, law.motors[i].client_slope);
+        for (const std::int64_t i : law.felt) total[i] += squash(f[i], law.motors[i].max_client, law.motors[i].client_knee);
         return;
     }
     for (const Interval& part : law.parts) {
@@ -204,8 +218,8 @@ Verdict look(const Law& law, Interval motors, const LawState* state, double t, S
 
 }  // namespace mobee
 
-MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, double* forces) {
-    mobee::constraining_forces(*law, {q, torque}, forces);
+MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, const mobee::LawState* state, double* forces) {
+    mobee::constraining_forces(*law, {q, torque, state}, forces);
 }
 
 MOBEE_CALL void mobee_law_begin(const mobee::Law* law, const double* q, mobee::LawState* state) { mobee::begin_at_rest(*law, q, state); }
@@ -234,10 +248,15 @@ MOBEE_CALL std::int64_t mobee_law_look(const mobee::Settle* settle, mobee::Settl
     return mobee::law::unsettled(*settle, *test, t);
 }
 
-MOBEE_CALL const char* mobee_law_term(std::int64_t index) { return index < mobee::term_count ? mobee::terms[index].name : nullptr; }
+// The term of that number: its name, none behind the last, and whether it depends on the state.
+MOBEE_CALL const char* mobee_law_term(std::int64_t index) {
+    return index < mobee::law::term_count ? mobee::law::terms[index].name : nullptr;
+}
+
+MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return mobee::law::terms[index].moving; }
 
 // Single formulas, for tests.
-MOBEE_CALL double mobee_law_squash(double v, double maximum, double slope) { return mobee::squash(v, maximum, slope); }
+MOBEE_CALL double mobee_law_squash(double v, double maximum, double slope) { return mobee::squash(v, maximum, maximum / slope); }
 
 MOBEE_CALL void mobee_law_squash_norm(double* v, std::int64_t count, double maximum, double slope) {
     mobee::law::squash_norm(v, count, maximum, slope);

@@ -20,10 +20,11 @@ constexpr double motor_friction = 5.0;  // N m s/rad
 
 struct MotorGains {
     double low = 0.0, high = 0.0;  // limits
-    double stiffness = 0.0, max_spring = 0.0, damping = 0.0;
-    double limit_width = 0.0, max_limit = 0.0;  // the limit force grows to max_limit over limit_width,
-    double below = 0.0, above = 0.0;            // from these distances to the limits on
-    double client_slope = 0.0, max_client = 0.0;
+    double max_spring = 0.0, spring_knee = 0.0;  // most that the spring pulls, and how far it is from half of that: max_spring / stiffness
+    double damping = 0.0;
+    double limit_slope = 0.0;         // the limit force grows by this
+    double below = 0.0, above = 0.0;  // from these distances to the limits on
+    double client_slope = 0.0, max_client = 0.0, client_knee = 0.0;  // of a client's force, the same as of the spring
     double max_speed = 0.0, max_acceleration = 0.0, max_torque = 0.0;
     double leash = 0.0;  // how far the position reference may run ahead of the motor
     double unit = 1.0;   // what 1 rad of the gains is in the motor's unit, 1 where it turns
@@ -64,7 +65,8 @@ struct Law {
     std::int64_t touching = 0;   // contacts are felt
     std::int64_t direction = 0;  // a client's force is bounded by its norm in each part, not motor by motor
     std::int64_t modality = velocity_modality;
-    double max_constraint = 0.0, contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;
+    double max_constraint = 0.0;                                        // of the clauses' force
+    double contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;  // of the contacts' force
     Settle settle;
 };
 
@@ -73,22 +75,23 @@ struct LawState {
     double velocity = 0.0, acceleration = 0.0, sent = 0.0, reference = 0.0, feedforward = 0.0;
 };
 
-// What forces depend on: the measured positions, and the sum of J^T (depth * normal) over the contacts of fields, both (n,).
+// What forces depend on, all of it (n,): the measured positions, the sum of J^T (depth * normal) over the contacts of fields, and the
+// law's state before the step.
 struct Moment {
     const double* q = nullptr;
     const double* torque = nullptr;
+    const LawState* state = nullptr;
+    bool touched = true;  // else the torque is zero
 };
 
-// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.
+// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.  Its numbers stand in the law.
 struct Term {
     const char* name;
     void (*add)(const Law& law, const Moment& now, double* force);
+    bool moving = false;  // it depends on the law's state: the model's process, which has none, leaves it to the controller
 };
 
-constexpr std::int64_t term_count = 3;
-extern const Term terms[term_count];
-
-// Fill `forces` (term_count, n).
+// Fill `forces` (terms, n), a row for each force that constrains the robot.
 void constraining_forces(const Law& law, const Moment& now, double* forces);
 
 // Add a client's force f, bounded (eqs. 5.9 and 5.10), to `total`, both (n,).
@@ -106,8 +109,8 @@ double torque_of(const MotorGains& motor, const LawState& state);
 // Judge the motion of some motors at time t [s]; between two looks it is always `moving`.
 Verdict look(const Law& law, Interval motors, const LawState* state, double t, SettleTest& test);
 
-// Eq. 5.8 of one dimension: slope `slope` at 0, `maximum` far out.
-inline double squash(double v, double maximum, double slope) { return maximum * v / (maximum / slope + std::fabs(v)); }
+// Eq. 5.8 of one dimension: `maximum` far out, half of it at the knee, which is maximum / slope.
+inline double squash(double v, double maximum, double knee) { return maximum * v / (knee + std::fabs(v)); }
 
 // Eq. 5.12: the force of one motor that keeps it inside its limits.
 double limit_force(const MotorGains& motor, double q);

@@ -56,8 +56,29 @@ double held(const MotorNumbers& numbers, MotorState& state, double dt) {
     return before - within(before, -change, change);
 }
 
+// Advance the motor side by a substep; `now`: the row of the delay line that is written.  Its effort is told by `note_effort`.
+inline void turn(const Motors& motors, std::int64_t i, MotorState& state, std::int64_t now, double dt) {
+    const MotorNumbers& numbers = motors.numbers[i];
+    motors.on_its_way(now, i) = wanted(numbers, state);
+    const std::int64_t then = now - numbers.delay;
+    const double asked = motors.on_its_way(then >= 0 ? then : then + motors.rows, i);
+    const bool torque = state.mode == torque_mode;
+    state.left = torque ? asked : 0.0;
+    state.motor_velocity = state.mode == hold_mode ? held(numbers, state, dt)
+                           : torque                ? turned(numbers, state, asked, dt)
+                                                   : responded(numbers, state, asked);
+    state.motor_q += state.motor_velocity * dt;
+    const double play = torque ? 0.0 : numbers.play;  // who commands torques takes the gear to be rigid
+    state.dragged = within(state.q, state.motor_q - play, state.motor_q + play);
+}
+
+// What the motor exerted in a substep; `before`: its velocity until then.
+inline void note_effort(MotorState& state, double before, double dt) {
+    state.effort = motor_inertia * (state.motor_velocity - before) / dt + motor_friction * state.motor_velocity;
+}
+
 // Take the joint side at the end of a substep; the motor side follows into the play, so that nothing winds up.
-void adopt(const MotorNumbers& numbers, MotorState& state, double q, double dt) {
+inline void adopt(const MotorNumbers& numbers, MotorState& state, double q, double dt) {
     state.velocity = (q - state.q) / dt;
     state.q = q;
     if (state.mode == torque_mode) {
@@ -66,6 +87,12 @@ void adopt(const MotorNumbers& numbers, MotorState& state, double q, double dt) 
     } else {
         state.motor_q = within(state.motor_q, q - numbers.play, q + numbers.play);
     }
+}
+
+// Joint sides that nothing blocks.
+inline void stop_hard(const MotorNumbers& numbers, MotorState& state, double dt) {
+    state.dragged = within(state.dragged, numbers.low, numbers.high);
+    adopt(numbers, state, state.dragged, dt);
 }
 
 // Counters are mixed as by splitmix64 (Steele, Lea, Flood 2014): every bit of x changes each of the result with probability 1/2.
@@ -128,35 +155,32 @@ void enter(const Motors& motors, std::int64_t motor, std::int64_t mode) {
 }
 
 void drive(Motors& motors, double dt) {
-    const std::int64_t now = motors.newest + 1 < motors.rows ? motors.newest + 1 : 0;
-    motors.newest = now;
+    motors.newest = motors.next(motors.newest);
     for (const std::int64_t i : motors.living) {
-        const MotorNumbers& numbers = motors.numbers[i];
-        MotorState& state = motors.state[i];
-        const double before = state.motor_velocity;
-        motors.on_its_way(now, i) = motors::wanted(numbers, state);
-        const std::int64_t then = now - numbers.delay;
-        const double asked = motors.on_its_way(then >= 0 ? then : then + motors.rows, i);
-        const bool torque = state.mode == torque_mode;
-        state.left = torque ? asked : 0.0;
-        const double after = state.mode == hold_mode ? motors::held(numbers, state, dt)
-                             : torque                ? motors::turned(numbers, state, asked, dt)
-                                                     : motors::responded(numbers, state, asked);
-        state.effort = motor_inertia * (after - before) / dt + motor_friction * after;
-        state.motor_velocity = after;
-        state.motor_q += after * dt;
-        const double play = torque ? 0.0 : numbers.play;  // who commands torques takes the gear to be rigid
-        state.dragged = motors::within(state.q, state.motor_q - play, state.motor_q + play);
+        const double before = motors.state[i].motor_velocity;
+        motors::turn(motors, i, motors.state[i], motors.newest, dt);
+        motors::note_effort(motors.state[i], before, dt);
     }
 }
 
 void integrate(const Motors& motors, double dt) {
+    for (const std::int64_t i : motors.living) motors::stop_hard(motors.numbers[i], motors.state[i], dt);
+}
+
+void move(Motors& motors, std::int64_t substeps, double dt) {
     for (const std::int64_t i : motors.living) {
-        const MotorNumbers& numbers = motors.numbers[i];
-        MotorState& state = motors.state[i];
-        state.dragged = motors::within(state.dragged, numbers.low, numbers.high);
-        motors::adopt(numbers, state, state.dragged, dt);
+        MotorState state = motors.state[i];
+        std::int64_t now = motors.newest;
+        for (std::int64_t k = 0; k < substeps; ++k) {
+            now = motors.next(now);
+            const double before = state.motor_velocity;
+            motors::turn(motors, i, state, now, dt);
+            if (k + 1 == substeps) motors::note_effort(state, before, dt);
+            motors::stop_hard(motors.numbers[i], state, dt);
+        }
+        motors.state[i] = state;
     }
+    motors.newest = (motors.newest + substeps) % motors.rows;
 }
 
 void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {

@@ -42,6 +42,7 @@ struct Motors {
     std::int64_t rows = 1;
     std::int64_t newest = 0;  // the row written last
 
+    std::int64_t next(std::int64_t row) const { return row + 1 < rows ? row + 1 : 0; }
     double& on_its_way(std::int64_t row, std::int64_t motor) const { return line[row * numbers.size + motor]; }
 };
 
@@ -53,6 +54,9 @@ void drive(Motors& motors, double dt);
 
 // Joint sides that nothing blocks: go where `drive` dragged, as far as the hard stops.
 void integrate(const Motors& motors, double dt);
+
+// `drive` and `integrate`, that many times.
+void move(Motors& motors, std::int64_t substeps, double dt);
 
 // The encoders' noise is a pure function of seed, tick and motor.  Fill `q` (n,) of the living motors with the joint sides plus noise
 // of these standard deviations (n,).

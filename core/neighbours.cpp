@@ -49,51 +49,64 @@ constexpr double margin = 1e-9;  // m: above the rounding of distances and of wh
 constexpr double short_step = 4.0;   // steps of the present length that a new list must last to be worth making
 constexpr std::int64_t worth = 4;    // poses that a list must have served before an edit of the world to be made again at once, else so many go without
 
-enum class Way { plain, build, use };
+// Whether the list holds in a pose in which a shape may be `farthest` away [m] from the pose remembered.
+bool holds(const Neighbours& near, double farthest) { return near.state == Remembered::list && 2.0 * farthest < near.skin - margin; }
 
-// How to evaluate a pose in which a shape may be `farthest` away [m] from the pose remembered.
-Way choose(Neighbours& near, double farthest) {
-    if (near.state == Remembered::list) {
-        if (2.0 * farthest < near.skin - margin) {
-            ++near.served;
-            return Way::use;
-        }
-        return near.served > 1 ? Way::build : Way::plain;
-    }
+// Whether to make a list where none holds.
+bool pays(Neighbours& near, double farthest) {
+    if (near.state == Remembered::list) return near.served > 1;
     if (near.pause > 0) {
         --near.pause;
-        return Way::plain;
+        return false;
     }
-    const bool worthwhile = near.state == Remembered::pose && short_step * 2.0 * farthest < near.skin;
-    return near.state == Remembered::pose_to_renew || worthwhile ? Way::build : Way::plain;
+    return near.state == Remembered::pose_to_renew || (near.state == Remembered::pose && short_step * 2.0 * farthest < near.skin);
+}
+
+// How far the two of a listed pair may have moved together.
+double way_of_pair(Neighbours& near, Pair pair) {
+    const Robot& robot = *near.scene->robot;
+    const double way = way_of(robot, pair.first, near.placed, near.motion);
+    return pair.second < robot.shapes() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
+}
+
+// The same from their groups alone: no less, and it places nothing.
+double way_of_groups(const Neighbours& near, Pair pair) {
+    const Motion& motion = near.motion;
+    const double way = motion.group[motion.group_of[pair.first]].far;
+    return pair.second < near.scene->robot->shapes() ? way + motion.group[motion.group_of[pair.second]].far : way;
+}
+
+// How far two shapes of the robot may have come nearer, as seen from the link that carries both.
+double approach(const Neighbours& near, Pair pair) {
+    const Robot& robot = *near.scene->robot;
+    const Shape &a = robot.shape[pair.first], &b = robot.shape[pair.second];
+    const std::int64_t base = robot.common[a.link * robot.links + b.link];
+    return swung(near.motion, a.link, base, a.lever) + swung(near.motion, b.link, base, b.lever);
 }
 
 // Collect the listed pairs that may have met, and the contacts of those of which neither has moved.
 void gather(Neighbours& near) {
-    const Robot& robot = *near.scene->robot;
-    const Motion& motion = near.motion;
-    const auto shapes = static_cast<std::int32_t>(robot.shapes());
     near.close.clear();
     near.found.clear();
+    bool bent = false;
     for (const Neighbour& one : near.list) {
-        const std::int32_t i = one.pair.first, j = one.pair.second;
-        const double between = motion.way[i] + (j < shapes ? motion.way[j] : 0.0);
+        if (way_of_groups(near, one.pair) < one.gap) continue;
+        const double between = way_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
             if (one.kept >= 0) near.found.push(near.kept[one.kept]);
             continue;
         }
-        if (one.gap > 0.0 && j < shapes) {
-            const Shape &a = robot.shape[i], &b = robot.shape[j];
-            const std::int64_t base = robot.common[a.link * robot.links + b.link];
-            if (swung(motion, a.link, base, a.lever) + swung(motion, b.link, base, b.lever) < one.gap) continue;
+        if (one.gap > 0.0 && one.pair.second < near.scene->robot->shapes()) {
+            if (!bent) bend_links(*near.scene->robot, near.placed.links.angles.data(), near.motion);
+            bent = true;
+            if (approach(near, one.pair) < one.gap) continue;
         }
         near.close.push(one.pair);
     }
 }
 
 void use_list(Neighbours& near) {
-    bend_links(*near.scene->robot, near.placed.links.angles.data(), near.motion);
     gather(near);
     Touch touch;
     Contact contact;
@@ -145,13 +158,15 @@ std::int64_t find(Neighbours& near, const double* q) {
     const bool fresh = near.state == Remembered::nothing || near.state == Remembered::pose_to_renew;
     joint_angles(robot, q, near.placed.links.angles.data());
     find_moved(robot, near.placed.links.angles.data(), fresh, near.motion);
-    place(robot, near.motion.moved.data(), near.placed);
-    const double farthest = fresh ? 0.0 : measure(robot, near.placed, 0.5 * near.skin, near.motion);
-    const following::Way way = following::choose(near, farthest);
-    if (way == following::Way::use) {
+    place_links(robot, near.motion.moved.data(), near.placed.links);
+    double farthest = fresh ? 0.0 : measure_groups(robot, near.placed.links, near.motion);
+    if (!fresh && !following::holds(near, farthest)) farthest = measure_shapes(robot, near.placed, near.motion);
+    if (following::holds(near, farthest)) {
+        ++near.served;
         following::use_list(near);
     } else {
-        following::start_anew(near, way == following::Way::build);
+        if (fresh) place_shapes(robot, near.placed, near.motion);
+        following::start_anew(near, following::pays(near, farthest));
     }
     return static_cast<std::int64_t>(near.found.size());
 }

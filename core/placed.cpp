@@ -27,21 +27,21 @@ void Placed::fit(const Robot& robot) {
     serial = robot.serial;
 }
 
-void place(const Robot& robot, const bool* moved, Placed& placed) {
-    place_links(robot, moved, placed.links);
-    const std::int64_t shapes = robot.shapes();
-    for (std::int64_t i = 0; i < shapes; ++i) {
-        const Shape& shape = robot.shape[i];
-        if (moved != nullptr && !moved[shape.link]) continue;
-        const Frame& frame = placed.links.frame[shape.link];
-        Outline& outline = placed.outline[i];
-        outline.center = mobee::moved(frame, shape.volume.center);
-        outline.core = turned(frame, shape.volume.core);
-        placed.x[i] = outline.center[0];
-        placed.y[i] = outline.center[1];
-        placed.z[i] = outline.center[2];
-        placed.whole[i] = false;
-    }
+void place_shape(const Robot& robot, std::int64_t i, Placed& placed) {
+    const Shape& shape = robot.shape[i];
+    const Frame& frame = placed.links.frame[shape.link];
+    Outline& outline = placed.outline[i];
+    outline.center = moved(frame, shape.volume.center);
+    outline.core = turned(frame, shape.volume.core);
+    placed.x[i] = outline.center[0];
+    placed.y[i] = outline.center[1];
+    placed.z[i] = outline.center[2];
+    placed.whole[i] = false;
+}
+
+void place(const Robot& robot, Placed& placed) {
+    place_links(robot, nullptr, placed.links);
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) place_shape(robot, i, placed);
 }
 
 void bound_clusters(const Robot& robot, Placed& placed) {
@@ -85,7 +85,7 @@ MOBEE_CALL void mobee_place(const Robot* robot, const double* q, Volume* out) {
     Placed placed;
     placed.fit(*robot);
     joint_angles(*robot, q, placed.links.angles.data());
-    place(*robot, nullptr, placed);
+    place(*robot, placed);
     for (std::int64_t i = 0; i < robot->shapes(); ++i) out[i] = placed_volume(*robot, placed, i);
 }
 

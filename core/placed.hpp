@@ -38,8 +38,11 @@ struct Placed {
     void fit(const Robot& robot);
 };
 
-// Place links and shapes at the angles of the links, those of the links that have `moved` (links,) or of all without it.
-void place(const Robot& robot, const bool* moved, Placed& placed);
+// Place all links and shapes at the angles of the links.
+void place(const Robot& robot, Placed& placed);
+
+// Place one shape where its link is.
+void place_shape(const Robot& robot, std::int64_t shape, Placed& placed);
 
 // Fill the balls.
 void bound_clusters(const Robot& robot, Placed& placed);

@@ -42,13 +42,13 @@ std::int64_t feel_pose(Plant& plant) {
 }
 
 // Form the command of a tick: the forces, and a step of the law.
-void respond(Plant& plant, std::int64_t tick) {
+void respond(Plant& plant, std::int64_t tick, bool touched) {
     const Law& law = *plant.law;
     const std::int64_t n = law.motors.size;
-    constraining_forces(law, {plant.q, plant.torque}, plant.forces);
+    constraining_forces(law, {plant.q, plant.torque, plant.law_state, touched}, plant.forces);
     for (const std::int64_t i : plant.motors->living) {
         double total = plant.forces[i];
-        for (std::int64_t term = 1; term < term_count; ++term) total += plant.forces[term * n + i];
+        for (std::int64_t row = 1; row < plant.rows; ++row) total += plant.forces[row * n + i];
         plant.total[i] = total + plant.client[i];
     }
     add_reaches(law, plant.reaches, plant.q, plant.attractor, plant.dt, plant.total);
@@ -59,14 +59,6 @@ void respond(Plant& plant, std::int64_t tick) {
         command[i] = law.modality == velocity_modality   ? state.velocity
                      : law.modality == position_modality ? state.reference
                                                          : torque_of(law.motors[i], state);
-    }
-}
-
-void move(Plant& plant) {
-    const double step = plant.dt / static_cast<double>(plant.substeps);
-    for (std::int64_t k = 0; k < plant.substeps; ++k) {
-        drive(*plant.motors, step);
-        integrate(*plant.motors, step);
     }
 }
 
@@ -112,8 +104,8 @@ void run(Plant& plant) {
             return;
         }
         const std::int64_t contacts = plant.near != nullptr ? plant::feel_pose(plant) : 0;
-        plant::respond(plant, tick);
-        plant::move(plant);
+        plant::respond(plant, tick, contacts > 0);
+        move(*plant.motors, plant.substeps, plant.dt / static_cast<double>(plant.substeps));
         if (plant.record != nullptr) plant::write(plant, contacts, plant.record + plant.done * width);
         const double sampled = static_cast<double>(tick) * plant.dt - plant.dt;
         if (plant::judge(plant, sampled)) {

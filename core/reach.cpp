@@ -92,7 +92,7 @@ void add_bounded(const Law& law, const Reach& reach, double* total) {
     if (!law.direction) {
         for (const PulledMotor& motor : reach.motors) {
             const MotorGains& gains = law.motors[motor.motor];
-            total[motor.motor] += squash(motor.force * gains.unit, gains.max_client, gains.client_slope);
+            total[motor.motor] += squash(motor.force * gains.unit, gains.max_client, gains.client_knee);
         }
         return;
     }

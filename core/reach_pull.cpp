@@ -342,8 +342,8 @@ void add_release(const Law& law, const Reach& reach, bool nudged, const double* 
     for (const PulledMotor& motor : reach.motors) {
         const std::int64_t i = motor.motor;
         const MotorGains& gains = law.motors[i];
-        total[i] -= squash(attractor[i] - q[i], gains.max_spring, gains.stiffness);
-        if (nudged) total[i] += squash(pull::nudge * motor.way * gains.unit, gains.max_spring, gains.stiffness);
+        total[i] -= squash(attractor[i] - q[i], gains.max_spring, gains.spring_knee);
+        if (nudged) total[i] += squash(pull::nudge * motor.way * gains.unit, gains.max_spring, gains.spring_knee);
     }
 }
 

@@ -10,6 +10,7 @@ import numpy as np
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
+    from mobee.collision.contact import ContactTable
     from mobee.pose import Pose
 
 
@@ -20,11 +21,14 @@ def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
     """The names of the world objects in contact (fields included) with a link that the part moves, in order; one pose."""
-    table = pose.table
-    outside = np.flatnonzero(table.second_link < 0)
-    if not len(outside):
+    return touched_in(pose.table, links_moved(pose.robot)[part])
+
+
+def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
+    """The names of the world objects in contact with these links, in order, from the contacts of one pose."""
+    if not len(table):
         return ()
-    moved = links_moved(pose.robot)[part]
+    outside = np.flatnonzero(table.second_link < 0)
     found = {table.name(int(table.second[row])) for row in outside if int(table.first_link[row]) in moved}
     return tuple(sorted(found))
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """What a reach with one marker by one part begins with: the part's first motor, and tables, see `mobee._core.reach`."""
+    """What a reach with one marker by one part begins with; the tables: see `mobee._core.reach`.  `part`: its first motor, see `_first`."""
 
     part: int
     point: Array  # (3,) m, of the marker, at zero pose
@@ -65,21 +65,21 @@ class Reaches:
 
     def __init__(self, robot: Robot, law: Law) -> None:
         self._robot, self._law = robot, law
-        self._chains: dict[tuple[str, str], Chain] = {}  # by part and marker
-        self._under_way: dict[str, Reaching] = {}
+        self._chains: dict[tuple[str | None, str], Chain] = {}  # by part and marker
+        self._under_way: dict[str | None, Reaching] = {}  # by part, None the whole body
         self._core = core.calls()
         self._list()
 
     def __len__(self) -> int:
         return len(self._under_way)
 
-    def __getitem__(self, part: str) -> Reaching:
+    def __getitem__(self, part: str | None) -> Reaching:
         return self._under_way[part]
 
-    def begin(self, part: str, marker: str) -> None:
-        """Let a part draw a marker, to nowhere yet; the part's reach before is forgotten.
+    def begin(self, part: str | None, marker: str) -> None:
+        """Let a part draw a marker, None: the whole body, to nowhere yet; its reach before is forgotten.
 
-        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        Raises InvalidValue if none of its motors that may be moved moves the marker; UnknownName.
         """
         if (part, marker) not in self._chains:
             self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))
@@ -87,12 +87,12 @@ class Reaches:
         self._under_way[part] = Reaching(marker, self._chains[part, marker])
         self._list()
 
-    def end(self, part: str) -> None:
+    def end(self, part: str | None) -> None:
         """Forget a part's reach, if there is one."""
         if self._under_way.pop(part, None) is not None:
             self._list()
 
-    def marker(self, part: str) -> str | None:
+    def marker(self, part: str | None) -> str | None:
         """The marker that a part draws."""
         reaching = self._under_way.get(part)
         return None if reaching is None else reaching.marker
@@ -102,29 +102,36 @@ class Reaches:
         copy = q.copy()
         self._core.add(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
 
-    def go_on(self, part: str) -> bool:
+    def go_on(self, part: str | None) -> bool:
         """Whether a part reaches, and goes on although it has settled; never under the published law."""
-        return bool(self._core.goes_on(self._law.address, self.address, len(self), self._robot.part(part).start))
+        return bool(self._core.goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:
         """Write down where the core finds them."""
         self._addresses = np.array([reaching.address for reaching in self._under_way.values()], dtype=np.int64)
         self.address = address(self._addresses)
 
-    def _drawn(self, part: str, marker: str) -> Ints:
-        """The motors of a part that may be moved and that move a marker."""
+    def _drawn(self, part: str | None, marker: str) -> Ints:
+        """The motors of a part, or of the whole body, that may be moved and that move a marker."""
         robot = self._robot
-        link, where = robot.marker(marker).link, robot.part(part).slice
+        link, where = robot.marker(marker).link, slice(0, None) if part is None else robot.part(part).slice
         moving = np.zeros(len(robot.motors), dtype=bool)
         moving[self._law.active] = True
         moving &= (robot.coupling[0][tables(robot).ancestry[link]] != 0.0).any(axis=0)
         motors: Ints = where.start + np.flatnonzero(moving[where])
         if not len(motors):
-            raise InvalidValue(f"{part} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does")
+            raise InvalidValue(
+                f"{part or 'the robot'} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does"
+            )
         return motors
 
 
-def _chain(robot: Robot, part: str, marker: str, motors: Ints) -> Chain:
+def _first(robot: Robot, part: str | None) -> int:
+    """The motor that stands for a part in the core; the whole body is no part, so that no part's action waits for its reach."""
+    return -1 if part is None else robot.part(part).start
+
+
+def _chain(robot: Robot, part: str | None, marker: str, motors: Ints) -> Chain:
     """From the base to a marker that these motors draw."""
     placed, (matrix, offset), units = robot.marker(marker), robot.coupling, motor_units(robot)
     links = tables(robot).ancestry[placed.link]
@@ -141,4 +148,4 @@ def _chain(robot: Robot, part: str, marker: str, motors: Ints) -> Chain:
         drives += [(int(m), number.get(int(m), -1), matrix[j, m], matrix[j, m] * units[m] * (int(m) in number)) for m in by]
     pulled: Table = np.zeros(len(motors), dtype=core.PULLED)
     pulled["motor"] = motors
-    return Chain(robot.part(part).start, placed.position, placed.normal, joints, np.array(drives, dtype=core.DRIVE), pulled)
+    return Chain(_first(robot, part), placed.position, placed.normal, joints, np.array(drives, dtype=core.DRIVE), pulled)

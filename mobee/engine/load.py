@@ -15,9 +15,6 @@ from mobee.engine.cache import cache_folder, is_ready, mark_ready, mark_used
 MODULES = (
     "mobee.engine.scene",
     "mobee.engine.neighbours",
-    "mobee.learning.sweeps",
-    "mobee.learning.gains",
-    "mobee.learning.reaching.sums",
     "mobee.engine.descent",
     "mobee.engine.evaluate",
 )

@@ -4,7 +4,7 @@ A force of your own is a function of the `State`; put it behind the others and g
 `mobee.reference.plant.Plant`:
 
     def viscous(s: State) -> Array:
-        return -100.0 * max((c.depth for c in s.contacts), default=0.0) * s.velocity
+        return -5000.0 * max((c.depth for c in s.contacts if c.kind == "field"), default=0.0) * s.velocity
 
     acceleration(state, (*TERMS, viscous))
 """

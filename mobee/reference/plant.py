@@ -1,6 +1,6 @@
 """Robot, motors, model and law in one process, tick by tick: what `mobee.OfflinePlant` does, with the law as a list of terms.
 
-A force of your own is tried here before it is compiled (see `law`): thousands of times slower, the same numbers but for rounding.
+A force of your own is tried here before it is compiled (see `law`): hundreds of times slower, the same numbers but for rounding.
 """
 
 from __future__ import annotations

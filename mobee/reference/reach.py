@@ -1,4 +1,4 @@
-"""The force that draws a marker to a target by the motors of one part (thesis 5.1, 8.2).
+"""The force that draws a marker to a target by the motors of one part, or of the whole body (thesis 5.1, 8.2).
 
 Published law: J^T f with f as strong as the marker is far, bounded as a client's force, against the attractor's spring.
 
@@ -62,11 +62,12 @@ class Reach:
         return self.left > 0.75 * TOLERANCE and self.since < WAIT
 
 
-def begin(robot: Robot, gains: Gains, part: str, marker: str, target: ReachTarget) -> Reach:
-    """Pull with the motors of a part that may be moved and that move the marker."""
+def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
+    """Pull with the motors of a part, or of the whole body, that may be moved and that move the marker."""
     moving = (robot.coupling[0][joints_to(robot, robot.marker(marker).link)] != 0.0).any(axis=0) & (gains.weight(robot.motors) > 0)
-    where = robot.part(part).slice
-    return Reach(robot, gains, marker, target, where.start + np.flatnonzero(moving[where]))
+    if part is not None:
+        moving[: robot.part(part).slice.start] = moving[robot.part(part).slice.stop :] = False
+    return Reach(robot, gains, marker, target, np.flatnonzero(moving))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

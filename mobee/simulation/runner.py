@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mobee._core import address
 from mobee._core import plant as core
-from mobee._core.law import TERMS
+from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
-from mobee.control import Controller, Forces
+from mobee.control import Controller
 from mobee.engine import engine_of
 from mobee.engine.hands import NOBODY, Hand, Hands
 from mobee.engine.track import Neighbours
@@ -41,42 +41,59 @@ class Runner:
         if controller.modality == "position":
             self._commands[:] = controller.state["reference"]
         self._noise = motors.noise(dt)
-        self._client, self._torque, self._total, self._forces = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((len(TERMS), n))
+        self._client, self._torque, self._total = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._forces = np.zeros((len(controller.force_names), n))
         self.q: Array = controller.robot.home.copy()
         """The encoders of the last tick, (n,) rad."""
         self._struct = core.Plant(
             law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
-            client=address(self._client), forces=address(self._forces), motors=motors.address, commands=address(self._commands),
+            client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
+            commands=address(self._commands),
             command_age=command_age, substeps=substeps, dt=dt, seed=motors.seed,
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
-        self._parts = parts
-        self._address = ctypes.addressof(self._struct)
+        self._parts, self._record, self._reaches_at = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), 0
+        self._clients_act = False
+        self.address = ctypes.addressof(self._struct)
+        """Where the core finds the plant."""
         self._core = core.calls()
 
-    def run(self, ticks: int, most: int, kept: bool, solids: bool) -> tuple[Array, int, bool]:
-        """Run up to that many ticks after those there have been; the record, how many were run, whether the state is lost.
+    def prepare(self, ticks: int, most: int, kept: bool, solids: bool) -> None:
+        """Have `run` go on for up to that many ticks after those there have been.
 
-        `kept`: the record is; `solids`: contacts of solids are found too, for its sake.
+        `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         motors.begin_substeps(self._substep)
-        if controller.modality == "torque" or controller.pushed:  # forces that depend on the pose, beyond what the core knows
-            most = 1
+        if controller.modality == "torque" or controller.pushed or controller.terms:  # forces beyond what the core knows, of this pose
+            most, self._clients_act = 1, True
             self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt))
-        else:
+        elif controller.forced or self._clients_act:
+            self._clients_act = controller.forced
             self._client[:] = controller.client_force(self.q)
-        record = np.zeros((most if kept else 0, 3 * len(self.q) + core.RECORD_DEPTHS))
-        struct.record = address(record) if kept else None
-        struct.reaches = View(controller.reaches.address, len(controller.reaches))
+        if kept:
+            self._record = np.zeros((most, 3 * len(self.q) + core.RECORD_DEPTHS))
+            struct.record = address(self._record)
+        elif len(self._record):
+            self._record, struct.record = self._record[:0], None
+        reaches = controller.reaches
+        if reaches.address != self._reaches_at or reaches:
+            struct.reaches = View(reaches.address, len(reaches))
+            self._reaches_at = reaches.address
         struct.near = self._near(solids) if controller.contact_forces or solids else None
         struct.ticks, struct.most = ticks, most
-        self._core.run(self._address)
-        done: int = struct.done
+
+    def run(self) -> None:
+        """Run what was prepared."""
+        self._core.run(self.address)
+
+    def results(self) -> tuple[Array, int, bool]:
+        """The record (ticks, 3 n + 2), how many ticks were run, whether the motors' state is not finite any more."""
+        done, end = self._struct.done, self._struct.end
         if done:
-            controller.last_forces = Forces(*self._forces.copy())
-        return record[:done], done, struct.end == core.STATE_LOST
+            self._controller.note_forces(self._forces)
+        return self._record[:done], done, end == core.STATE_LOST
 
     def _near(self, solids: bool) -> int:
         """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
@@ -107,8 +124,10 @@ class Runner:
         return known
 
     def _pose_forces(self, q: Array) -> Array:
-        """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""
+        """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
         controller, motors = self._controller, self._motors
+        if controller.terms and np.isfinite(q).all():
+            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt).values())
         if controller.modality == "torque":
             controller.state["feedforward"] = gravity_torque(controller.robot, q)
             motors.load = gravity_torque(controller.robot, motors.q)

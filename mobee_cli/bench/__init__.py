@@ -19,6 +19,7 @@ BENCHES = {
     "trm": "a map of 5000 poses by least squares and by evolution",
     "edges": "checking the edges of a map of 5000 poses",
     "model": "the egocentric model beside MuJoCo and python-fcl",
+    "against": "another checkout beside this one, in processor time",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""
 
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
+    from experiments.bench.against import AgainstFailed
     from experiments.bench.cma_peer import CmaMissing
     from experiments.bench.mink_peer import MinkMissing
     from experiments.bench.mujoco_peer import MujocoMissing
@@ -44,6 +46,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     try:
         code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
-    except (CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed, NotInstalled) as error:
+    except (AgainstFailed, CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed, NotInstalled) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     return code

@@ -6,10 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from mobee.robot.robot import Array
-from services.vision.blobs import Picture, enclosed_area, outer_borders, red_pixels
 
+Picture = NDArray[np.uint8]
+
+MAX_HUE, MIN_SATURATION, MIN_VALUE = 16.0, 0.51, 50  # degrees from red; of 1; of 255
 MIN_AREA = 40.0  # px
 INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: still on it; certainly not of the ball
 MIN_ARC = 0.6  # of the outline must be seen
@@ -50,9 +54,30 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
 
 
 def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
-    """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough."""
-    borders = outer_borders(red_pixels(picture), int(MIN_AREA))
-    return [(border.astype(np.float64), enclosed_area(border)) for border in borders]
+    """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough, without its holes."""
+    regions, _ = ndimage.label(_red_pixels(picture), np.ones((3, 3)))
+    blobs = []
+    for number, where in enumerate(ndimage.find_objects(regions), start=1):
+        if regions[where].size < MIN_AREA:
+            continue
+        region = ndimage.binary_fill_holes(regions[where] == number)
+        if region.sum() < MIN_AREA:
+            continue
+        border = np.argwhere(region & ~ndimage.binary_erosion(region))
+        # Of the polygon through the centres of the border's pixels, by Pick's theorem.
+        area = float(region.sum() - 0.5 * len(border) - 1.0)
+        blobs.append(((border + (where[0].start, where[1].start))[:, ::-1].astype(np.float64), area))
+    return blobs
+
+
+def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
+    """Which pixels (height, width) are red, by hue, saturation and value."""
+    red, green, blue = np.ascontiguousarray(picture.transpose(2, 0, 1))
+    is_red = (red >= MIN_VALUE) & (red > green) & (red > blue)  # on bytes: most pixels fail here
+    value, green, blue = (channel[is_red].astype(np.float64) for channel in (red, green, blue))
+    spread = value - np.minimum(green, blue)
+    is_red[is_red] = (spread >= MIN_SATURATION * value) & (60.0 * np.abs(green - blue) <= MAX_HUE * spread)
+    return is_red
 
 
 def _rays(points: Array, intrinsics: Array) -> Array:

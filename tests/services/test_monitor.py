@@ -93,7 +93,9 @@ def test_a_field_is_red_while_it_is_in_contact() -> None:
     notebook = Notebook()
     scene = Scene(notebook.stream, ROBOT)
     capsules = [shape.name for shape in ROBOT.shapes if shape.role == "field" and shape.kind == "capsule"]
-    touching = ContactItem(first=capsules[3], second="table", kind="field", depth=0.01, point=[0.0] * 3, normal=[0.0, 0.0, 1.0])
+    touching = ContactItem(
+        first=capsules[3], second="table", kind="field", depth=0.01, point=[0.0] * 3, normal=[0.0, 0.0, 1.0], first_link=0, second_link=-1
+    )
     scene.log_robot(DOWN, [touching])
     scene.log_robot(DOWN, [])
     shown = [item for item in notebook.logged["scene/fields/capsules"] if isinstance(item, rr.Capsules3D)]
@@ -193,7 +195,7 @@ def whole_chain(stage: Stage) -> Callable[[], None]:
             about = {"action_id": "a", "epoch": 1, "status": "moving", "since_k": 0, "start_k": 0, "touched": []}
             stream.put(**about, q=at, dq=at, ddq=at, goal=at)
         zeros = [0.0] * len(ROBOT.motors)
-        forces.put(re_k=stage.k, limits=zeros, constraints=zeros, collision=zeros, part_age={}, touched={})
+        forces.put(re_k=stage.k, terms={"limits": zeros, "collision": zeros}, part_age={}, touched={})
         contacts.put(re_k=stage.k, contacts=[])
         for eye, stream in images.items():
             stream.put(eye=eye, k_capture=stage.k, width=16, height=12, encoding="rgb8", data=bytes(16 * 12 * 3))

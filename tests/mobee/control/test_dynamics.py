@@ -16,7 +16,7 @@ led = function("law_led", ADDRESS, REAL, REAL, REAL, REAL, result=REAL)
 
 def accelerated(error: float, velocity: float, force: float, gains: Gains) -> float:
     motor = np.zeros(1, dtype=MOTOR_GAINS)
-    motor["stiffness"], motor["max_spring"], motor["damping"] = gains.stiffness, gains.max_spring, gains.damping
+    motor["max_spring"], motor["spring_knee"], motor["damping"] = gains.max_spring, gains.max_spring / gains.stiffness, gains.damping
     return acceleration(address(motor), 0.0, velocity, error, force)
 
 

@@ -11,15 +11,15 @@ from mobee._core.law import MOTOR_GAINS
 formula = function("law_limit_force", ADDRESS, REAL, result=REAL)
 
 
-def limit_force(q: float, low: float, high: float, below: float, above: float, width: float, maximum: float) -> float:
+def limit_force(q: float, low: float, high: float, below: float, above: float, slope: float) -> float:
     motor = np.zeros(1, dtype=MOTOR_GAINS)
-    for name, value in (("low", low), ("high", high), ("below", below), ("above", above), ("limit_width", width), ("max_limit", maximum)):
+    for name, value in (("low", low), ("high", high), ("below", below), ("above", above), ("limit_slope", slope)):
         motor[name] = value
     return formula(address(motor), q)
 
 
 def at(q: float, width: float = 1.0, maximum: float = 1.0) -> float:
-    return limit_force(q, -3.0, 3.0, width, width, width, maximum)
+    return limit_force(q, -3.0, 3.0, width, width, maximum / width)
 
 
 @given(st.floats(-2.0, 2.0))
@@ -46,5 +46,5 @@ def test_the_ramp_goes_on_beyond_the_limit(beyond: float) -> None:
 
 
 def test_each_side_has_a_zone_of_its_own() -> None:
-    force = [limit_force(q, 0.0, 1.0, 0.0, 0.5, 0.5, 1.0) for q in (-0.1, 0.0, 0.25, 0.5, 1.0)]
+    force = [limit_force(q, 0.0, 1.0, 0.0, 0.5, 2.0) for q in (-0.1, 0.0, 0.25, 0.5, 1.0)]
     assert force == pytest.approx([0.2, 0.0, 0.0, 0.0, -1.0])

@@ -187,7 +187,7 @@ def test_a_warm_start_compiles_nothing() -> None:
 ONE = """
 import sys
 from mobee.engine.load import load_only
-print(load_only("mobee.learning.sweeps").__name__, "mobee.engine.evaluate" in sys.modules)
+print(load_only("mobee.engine.descent").__name__, "mobee.engine.evaluate" in sys.modules)
 """
 
 ONE_OF_TWO = """
@@ -202,7 +202,7 @@ print(mobee.engine.load.load_only("stand_in").twice(21.0), "another" in sys.modu
 def test_who_needs_one_module_loads_no_other() -> None:
     load()
     done = subprocess.run([sys.executable, "-c", ONE], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("mobee.learning.sweeps False\n", "")
+    assert (done.stdout, done.stderr) == ("mobee.engine.descent False\n", "")
 
 
 def test_who_needs_one_module_and_finds_nothing_compiled_compiles_all(tmp_path: Path) -> None:
