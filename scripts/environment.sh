@@ -142,9 +142,9 @@ ensure_environment() {
   fi
   # Sizes are those on Linux with Python 3.11.  Whoever only runs MoBeE may have a compiler whose warnings the project has not seen.
   if [[ "$kind" == dev ]]; then
-    packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one or two minutes"
+    packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one to three minutes"
   else
-    packages="$run" lock=requirements.lock core=(--here --no-strict) size="480 MB to download and 1 GB on disk, about half a minute"
+    packages="$run" lock=requirements.lock core=(--here --no-strict) size="400 MB to download and 1 GB on disk, half a minute to one"
   fi
   if is_current "stamp-$kind" "$packages" && is_current stamp-project "$project" && core_is_current; then
     return
