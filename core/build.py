@@ -234,7 +234,7 @@ def _with_zig(compiler: Compiler, flags: list[str], source: Path, library: Path)
 
 def macos_version() -> str:
     """The oldest macOS that a build is for."""
-    return os.environ.get("MACOSX_DEPLOYMENT_TARGET") or ("11.0" if platform.machine() == "arm64" else "10.13")
+    return os.environ.get("MACOSX_DEPLOYMENT_TARGET") or ("11.0" if platform.machine() == "arm64" else "10.15")
 
 
 def _knows_cpp20(compiler: Compiler) -> bool:
