@@ -7,6 +7,10 @@
 
 namespace mobee::narrow {
 
+struct Reach {
+    double low, high;
+};
+
 struct Difference {
     const Volume& first;
     const Volume& second;
@@ -18,6 +22,9 @@ struct Difference {
 
     // The point of the difference that is farthest along n, in the first's axes.
     Vec3 farthest(Vec3 n);
+
+    // From where to where it reaches along n.
+    Reach along(Vec3 n) const;
 
     // A lower bound of how far the two cores are apart; 0 if they meet.
     double apart();
