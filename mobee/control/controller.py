@@ -75,6 +75,7 @@ class Controller:
         """The law with its numbers."""
         self._reaches = Reaches(self.robot, self.law)
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
+        self._last_forces: Forces | Array
         self.clear()
         self.reset(self.robot.home)
 
@@ -119,7 +120,7 @@ class Controller:
 
     def note_forces(self, forces: Array) -> None:
         """Take the rows (TERMS, n) for `last_forces`, a copy."""
-        self._last_forces: Forces | Array = forces.copy()
+        self._last_forces = forces.copy()
 
     @property
     def pushed(self) -> bool:
