@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "interface.hpp"
@@ -98,6 +99,14 @@ void add_collision_forces(const Law& law, const Moment& now, double* force) {
     }
 }
 
+// All forces that constrain the robot, in the order in which they are added.
+constexpr Term terms[] = {
+    {"limits", add_limit_forces},
+    {"constraints", add_clause_forces},
+    {"collision", add_collision_forces},
+};
+constexpr std::int64_t term_count = std::size(terms);
+
 // Eq. 5.7 solved for the acceleration: squashed spring plus forces minus damping.
 double acceleration(double q, double velocity, double attractor, double force, const MotorGains& motor) {
     return squash(attractor - q, motor.max_spring, motor.spring_knee) + force - motor.damping * velocity;
@@ -134,19 +143,13 @@ Verdict unsettled(const Settle& settle, const SettleTest& test, double t) {
 
 }  // namespace law
 
-const Term terms[term_count] = {
-    {"limits", law::add_limit_forces},
-    {"constraints", law::add_clause_forces},
-    {"collision", law::add_collision_forces},
-};
-
 double limit_force(const MotorGains& motor, double q) {
     return motor.limit_slope * (std::max(motor.low + motor.below - q, 0.0) - std::max(q - motor.high + motor.above, 0.0));
 }
 
 void constraining_forces(const Law& law, const Moment& now, double* forces) {
-    std::fill_n(forces, term_count * law.motors.size, 0.0);
-    for (const Term& term : terms) {
+    std::fill_n(forces, law::term_count * law.motors.size, 0.0);
+    for (const Term& term : law::terms) {
         term.add(law, now, forces);
         forces += law.motors.size;
     }
@@ -215,8 +218,8 @@ Verdict look(const Law& law, Interval motors, const LawState* state, double t, S
 
 }  // namespace mobee
 
-MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, double* forces) {
-    mobee::constraining_forces(*law, {q, torque, true}, forces);
+MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, const mobee::LawState* state, double* forces) {
+    mobee::constraining_forces(*law, {q, torque, state}, forces);
 }
 
 MOBEE_CALL void mobee_law_begin(const mobee::Law* law, const double* q, mobee::LawState* state) { mobee::begin_at_rest(*law, q, state); }
@@ -245,7 +248,12 @@ MOBEE_CALL std::int64_t mobee_law_look(const mobee::Settle* settle, mobee::Settl
     return mobee::law::unsettled(*settle, *test, t);
 }
 
-MOBEE_CALL const char* mobee_law_term(std::int64_t index) { return index < mobee::term_count ? mobee::terms[index].name : nullptr; }
+// The term of that number: its name, none behind the last, and whether it depends on the state.
+MOBEE_CALL const char* mobee_law_term(std::int64_t index) {
+    return index < mobee::law::term_count ? mobee::law::terms[index].name : nullptr;
+}
+
+MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return mobee::law::terms[index].moving; }
 
 // Single formulas, for tests.
 MOBEE_CALL double mobee_law_squash(double v, double maximum, double slope) { return mobee::squash(v, maximum, maximum / slope); }

@@ -65,7 +65,8 @@ struct Law {
     std::int64_t touching = 0;   // contacts are felt
     std::int64_t direction = 0;  // a client's force is bounded by its norm in each part, not motor by motor
     std::int64_t modality = velocity_modality;
-    double max_constraint = 0.0, contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;
+    double max_constraint = 0.0;                                        // of the clauses' force
+    double contact_gain = 0.0, contact_slope = 0.0, max_contact = 0.0;  // of the contacts' force
     Settle settle;
 };
 
@@ -74,23 +75,23 @@ struct LawState {
     double velocity = 0.0, acceleration = 0.0, sent = 0.0, reference = 0.0, feedforward = 0.0;
 };
 
-// What forces depend on: the measured positions, and the sum of J^T (depth * normal) over the contacts of fields, both (n,).
+// What forces depend on, all of it (n,): the measured positions, the sum of J^T (depth * normal) over the contacts of fields, and the
+// law's state before the step.
 struct Moment {
     const double* q = nullptr;
     const double* torque = nullptr;
+    const LawState* state = nullptr;
     bool touched = true;  // else the torque is zero
 };
 
-// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.
+// A force on the motors: its name, and the function that adds it to `force` (n,), in rad/s^2.  Its numbers stand in the law.
 struct Term {
     const char* name;
     void (*add)(const Law& law, const Moment& now, double* force);
+    bool moving = false;  // it depends on the law's state: the model's process, which has none, leaves it to the controller
 };
 
-constexpr std::int64_t term_count = 3;
-extern const Term terms[term_count];
-
-// Fill `forces` (term_count, n).
+// Fill `forces` (terms, n), a row for each force that constrains the robot.
 void constraining_forces(const Law& law, const Moment& now, double* forces);
 
 // Add a client's force f, bounded (eqs. 5.9 and 5.10), to `total`, both (n,).

@@ -45,10 +45,10 @@ std::int64_t feel_pose(Plant& plant) {
 void respond(Plant& plant, std::int64_t tick, bool touched) {
     const Law& law = *plant.law;
     const std::int64_t n = law.motors.size;
-    constraining_forces(law, {plant.q, plant.torque, touched}, plant.forces);
+    constraining_forces(law, {plant.q, plant.torque, plant.law_state, touched}, plant.forces);
     for (const std::int64_t i : plant.motors->living) {
         double total = plant.forces[i];
-        for (std::int64_t term = 1; term < term_count; ++term) total += plant.forces[term * n + i];
+        for (std::int64_t row = 1; row < plant.rows; ++row) total += plant.forces[row * n + i];
         plant.total[i] = total + plant.client[i];
     }
     add_reaches(law, plant.reaches, plant.q, plant.attractor, plant.dt, plant.total);

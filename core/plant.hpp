@@ -31,7 +31,8 @@ struct Plant {
     LawState* law_state = nullptr;
     double* attractor = nullptr;     // (n,)
     const double* client = nullptr;  // (n,), f_config and f_work, bounded
-    double* forces = nullptr;        // (term_count, n)
+    double* forces = nullptr;        // (rows, n): those of the law's terms, behind them any others, given for one tick
+    std::int64_t rows = 0;
     View<Reach* const> reaches;
     Motors* motors = nullptr;
     double* commands = nullptr;  // (command_age, n): those on their way to the motors

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
-    from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, constraint_forces, reach_path
+    from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
     from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent
     from mobee.learning.lattice import Lattice
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "mobee.collision": "Contact Geometry World WorldObject box capsule cylinder sphere",
-    "mobee.control": "Command Controller Forces Gains Reacher ReachPath constraint_forces reach_path",
+    "mobee.control": "Command Controller Forces Gains Reacher ReachPath Term constraint_forces reach_path",
     "mobee.errors": "ActionInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent",
     "mobee.learning.lattice": "Lattice",
@@ -111,6 +111,7 @@ __all__ = [
     "Robot",
     "RobotFileError",
     "Space",
+    "Term",
     "TransitionModel",
     "UnknownName",
     "Voronoi",

@@ -18,7 +18,13 @@ struct Difference {
 
     // The point of the difference that is farthest along n, in the first's axes.
     Vec3 farthest(Vec3 n);
+
+    // A lower bound of how far the two cores are apart; 0 if they meet.
+    double apart();
 };
+
+// Whether a point, or the centre of one, is inside both; of boxes and cylinders.
+bool known_to_meet(const Volume& a, const Volume& b, Vec3 point);
 
 struct Nearest {
     double distance;

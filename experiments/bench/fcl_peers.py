@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import fcl
 import numpy as np
 
+from mobee.collision.fcl_engine import fcl  # raises NotInstalled
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
+from itertools import count, takewhile
 
 import numpy as np
 
@@ -20,10 +21,10 @@ STATE = columns("velocity", "acceleration", "sent", "reference", "feedforward")
 """A motor's state under the law: rad/s, rad/s^2, the velocity commanded last, the position reference, and N m added to a torque."""
 SETTLE = ("speed", "acceleration", "first_look", "interval", "timeout")
 
+TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
+"""The numbers of the terms that are the same for all motors, by their names in `Gains`."""
 MODALITIES = ("position", "velocity", "torque")
 VERDICTS = ("moving", "settled", "timeout")
-TERMS = ("limits", "constraints", "collision")
-"""The forces, in the order in which the core fills and adds them."""
 
 
 class Settle(ctypes.Structure):
@@ -44,7 +45,7 @@ class Law(ctypes.Structure):
     _fields_ = (
         *((name, View) for name in ("motors", "active", "felt", "parts", "clauses", "rows", "entries")),
         *((name, INTEGER) for name in ("published", "touching", "direction", "modality")),
-        *((name, REAL) for name in ("max_constraint", "contact_gain", "contact_slope", "max_contact")),
+        *((name, REAL) for name in TERM_GAINS),
         ("settle", Settle),
     )
 
@@ -53,7 +54,7 @@ class Calls:
     """The functions of that file."""
 
     def __init__(self) -> None:
-        self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+        self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
         self.begin = function("law_begin", ADDRESS, ADDRESS, ADDRESS)
         self.client = function("law_client", ADDRESS, ADDRESS, ADDRESS)
         self.step = function("law_step", ADDRESS, ADDRESS, REAL, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
@@ -64,3 +65,17 @@ class Calls:
 def calls() -> Calls:
     """Found when they are first asked for."""
     return Calls()
+
+
+@cache
+def term_names() -> tuple[str, ...]:
+    """The names of the forces, in the order in which the core fills and adds them."""
+    name = function("law_term", INTEGER, result=ctypes.c_char_p)
+    return tuple(found.decode() for found in takewhile(bool, map(name, count())))
+
+
+@cache
+def moving_names() -> tuple[str, ...]:
+    """Those of them that depend on the law's state."""
+    moving = function("law_moving", INTEGER, result=INTEGER)
+    return tuple(name for index, name in enumerate(term_names()) if moving(index))

@@ -21,7 +21,7 @@ class Plant(ctypes.Structure):
 
     _fields_ = (
         *((name, ADDRESS) for name in ("near", "law", "law_state", "attractor", "client", "forces")),
-        ("reaches", View),
+        ("rows", INTEGER), ("reaches", View),
         ("motors", ADDRESS), ("commands", ADDRESS), ("command_age", INTEGER), ("substeps", INTEGER), ("dt", REAL),
         ("seed", ctypes.c_uint64), ("noise", ADDRESS), ("parts", View),
         *((name, ADDRESS) for name in ("q", "torque", "total", "record")),

@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import fcl
 import numpy as np
 
 from mobee.collision.contact import ContactTable
@@ -17,9 +16,15 @@ from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject
 from mobee.engine.hands import NOBODY, Hands
 from mobee.engine.volumes import bound
+from mobee.errors import NotInstalled
 from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.jacobian import point_jacobian
 from mobee.robot.robot import Array, Ints, Robot, Shape
+
+try:
+    import fcl
+except ModuleNotFoundError:
+    raise NotInstalled("this needs python-fcl, which is not installed: pip install '.[fcl]' in MoBeE's folder") from None
 
 # fcl.collide is off by up to centimetres for capsules and boxes (it stops at any separating direction); signed distances are not.
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.law import TERMS
+from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
@@ -16,6 +17,7 @@ from mobee.control.law import Law
 from mobee.control.modality import Command, Modality
 from mobee.control.reaches import Reaches
 from mobee.control.stability import largest_step, require_stable
+from mobee.control.terms import State, Term, valid_terms
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.motor_units import motor_units
@@ -40,7 +42,7 @@ class Controller:
 
     __slots__ = (
         "_attractor", "_client", "_last_forces", "_pushes", "_reaches", "_state", "_track", "contact_forces", "forced", "gains", "law",
-        "max_dt", "modality", "model", "propagate", "robot", "weight",
+        "max_dt", "modality", "model", "propagate", "robot", "terms", "weight",
     )  # fmt: skip
 
     def __init__(
@@ -52,8 +54,12 @@ class Controller:
         speed_scale: float = 1.0,
         contact_forces: bool = True,
         alive: NDArray[np.bool_] | None = None,
+        terms: Sequence[Term] = (),
     ) -> None:
-        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all."""
+        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all.
+
+        `terms`: further forces, functions in Python, added to those of the law.  `max_dt` knows nothing of them.
+        """
         if not callable(getattr(model, "track", None)):  # who brings a model of their own is welcome
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
@@ -73,9 +79,10 @@ class Controller:
         self.max_dt = largest_step(self.robot, self.gains)
         self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
         """The law with its numbers."""
+        self.terms = valid_terms(terms)
         self._reaches = Reaches(self.robot, self.law)
-        self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self._last_forces: Forces | Array
+        self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
         self.reset(self.robot.home)
 
@@ -115,17 +122,22 @@ class Controller:
         """The constraint forces of the last step."""
         known = self._last_forces
         if not isinstance(known, Forces):
-            known = self._last_forces = Forces(*known)
+            known = self._last_forces = Forces(**dict(zip(self.force_names, known, strict=True)))
         return known
 
     def note_forces(self, forces: Array) -> None:
-        """Take the rows (TERMS, n) for `last_forces`, a copy."""
+        """Take the rows for `last_forces`, (forces, n) in the order of `force_names`, a copy."""
         self._last_forces = forces.copy()
 
     @property
     def pushed(self) -> bool:
         """Whether forces act on markers, which depend on the pose."""
         return bool(self._pushes)
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """The names of all forces in `last_forces`, in the order in which they are added."""
+        return (*term_names(), *(term.name for term in self.terms))
 
     @property
     def reaches(self) -> Reaches:
@@ -186,7 +198,7 @@ class Controller:
         q = checked("q", q, len(self.robot.motors))
         self._attractor[:] = q
         self._state[:] = self.law.at_rest(q)
-        self.note_forces(np.zeros((len(TERMS), len(q))))
+        self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
         """Stay where the part is: own velocity 0 and attractor at its measured q (n_part,) rad.
@@ -207,21 +219,35 @@ class Controller:
         self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """The constraint forces at a pose, as `step` computes them when it is given none."""
-        return forces_of(self.law, pose, self.propagate)
+        """The law's own constraint forces at a pose, as `step` computes them when it is given none."""
+        return forces_of(self.law, pose, self.propagate, self._state)
 
-    def step(self, q: Array, dt: float, forces: Forces | None = None) -> Command:
-        """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model.
+    def own_forces(self, q: Array, dt: float, pose: Pose | None = None) -> dict[str, Array]:
+        """What `terms` give for a tick of dt [s] at the measured q (n,) rad; raises InvalidValue, which names the term."""
+        if not self.terms:
+            return {}
+        state = State(self.robot, q, self.velocity, dt, lambda: self._track.evaluate(q) if pose is None else pose)
+        found = {term.name: np.zeros(len(q)) for term in self.terms}
+        for term in self.terms:
+            found[term.name][self.law.felt] = term.force(state)[self.law.felt]
+        return found
 
-        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), for a q that is not finite, and for
-        forces that are not or whose sum is beyond LARGEST_FORCE.
+    def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
+        """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model, or of the `pose`.
+
+        Forces that lack what depends on the law's state, or what `terms` give, are filled up.  Raises InvalidValue for a dt at which
+        the gains are unstable (`max_dt` and above), for a q that is not finite, and for forces that are not or whose sum is beyond
+        LARGEST_FORCE.
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
         n = len(self._attractor)
         q = checked("q", q, n)
         if forces is None:
-            forces = self.forces(self._track.evaluate(q))
+            pose = self._track.evaluate(q) if pose is None else pose
+            forces = self.forces(pose)
+        if not all(name in forces for name in self.force_names):
+            forces = self._filled(forces, q, dt, pose)
         total = checked_force("forces", forces.total, n) + self.client_force(q)
         if self._reaches:
             self._reaches.add_forces(q, self._attractor, dt, total)
@@ -230,6 +256,13 @@ class Controller:
         commands = self.law.step(q, dt, self._attractor, total, self._state)
         self._last_forces = forces
         return Command(*commands)
+
+    def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
+        """With all that it lacks."""
+        more = self.own_forces(q, dt, pose)
+        if any(name not in forces for name in moving_names()):
+            more |= self.forces(self._track.evaluate(q) if pose is None else pose)
+        return Forces(**{**more, **forces})
 
     def _add_client(self, q: Array, total: Array) -> None:
         """Add f_config and f_work (thesis eqs. 5.9-5.10); of a motor that slides f_work too counts in its unit, as a contact does."""

@@ -65,7 +65,7 @@ class Gains:
             value = getattr(self, name)
             if isinstance(value, list):  # as JSON has it
                 object.__setattr__(self, name, _tuples(value))
-            if name not in _NO_NUMBERS:
+            if name not in _NO_NUMBERS and value != self.__dataclass_fields__[name].default:  # 0 as default: a force that is not there
                 _require_positive(name, value)
         if self.law not in get_args(Law):
             raise UnknownName("law", self.law, get_args(Law))

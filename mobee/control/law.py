@@ -20,7 +20,6 @@ INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding o
 LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
 
 _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
-_SHARED = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
 
 
 class Law:
@@ -48,23 +47,26 @@ class Law:
         self._struct = core.Law(
             *(view(table) for table in (self.motors, self.active, self.felt, self.parts, self.clauses, self.rows, self.entries)),
             gains.law == "published_2014", contact_forces, gains.client_squash == "direction", core.MODALITIES.index(modality),
-            *(getattr(gains, name) for name in _SHARED),
+            *(getattr(gains, name) for name in core.TERM_GAINS),
             core.Settle(*(getattr(gains.settle, name) for name in core.SETTLE)),
         )  # fmt: skip
         self.address = ctypes.addressof(self._struct)
         """Where the core finds the law."""
         self._core = core.calls()
+        self._still: Table = np.zeros(len(self.motors), dtype=core.STATE)
 
     def __len__(self) -> int:
         return len(self.motors)
 
-    def forces(self, q: Array, torque: Array) -> Array:
-        """The forces that constrain the robot at q, (len(TERMS), n) in rad/s^2.
+    def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
+        """The forces that constrain the robot at q, (len(term_names()), n) in rad/s^2.
 
-        `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.
+        `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.  `state`:
+        of the law, before the step; None: it is at rest.
         """
-        found = np.empty((len(core.TERMS), len(self)))
-        self._core.forces(self.address, numbers(q, len(self)), numbers(torque, len(self)), address(found))
+        found = np.empty((len(core.term_names()), len(self)))
+        given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
+        self._core.forces(self.address, *given, address(found))
         return found
 
     def at_rest(self, q: Array) -> Table:

@@ -140,7 +140,7 @@ def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:
 
 def _hull(vertices: Array) -> tuple[Array, list[list[int]]]:
     """The corners (v, 3) of the hull of some points and which others an edge joins each one to; without edges if they are few, or flat."""
-    none = vertices, [[] for _ in vertices]
+    none: tuple[Array, list[list[int]]] = vertices, [[] for _ in vertices]
     if len(vertices) <= MANY_CORNERS:
         return none
     from scipy.spatial import ConvexHull, QhullError

@@ -11,6 +11,7 @@ import numpy as np
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
 from mobee.control.modality import Modality
+from mobee.control.terms import Term
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
@@ -51,6 +52,7 @@ class OfflinePlant:
         active: names or patterns of parts and motors that live; the others are rigid at home, without noise, and cost nothing.
         command_age: ticks between the encoders and the motion under their command, 1 as live.
         hashed: whether `hash` is kept.
+        terms: further forces of the law, functions in Python, which are called in every tick.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -70,9 +72,10 @@ class OfflinePlant:
         active: Sequence[str] | None = None,
         command_age: int = 1,
         hashed: bool = False,
+        terms: Sequence[Term] = (),
     ) -> None:
         alive = living(model.robot, active)
-        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive)
+        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive, terms)
         if not 0 < dt < self.controller.max_dt:
             raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
         if isinstance(command_age, bool) or not isinstance(command_age, int) or command_age < 1:
@@ -84,6 +87,8 @@ class OfflinePlant:
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
         self._options = {"gains": self.controller.gains, "motors": parameters, "dt": dt, "propagate": propagate, "modality": modality}
         self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
+        if terms:  # a plant without them is described as before there were any
+            self._options["terms"] = [term.name for term in terms]
         self._actions, self._touching = Actions(self.robot, alive), Touching(model)
         self._runner = Runner(self._controller, self.motors, alive, dt, command_age, self._actions.parts)
         self._alive = alive

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mobee._core import address
 from mobee._core import plant as core
-from mobee._core.law import TERMS
+from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
 from mobee.control import Controller
 from mobee.engine import engine_of
@@ -41,12 +41,14 @@ class Runner:
         if controller.modality == "position":
             self._commands[:] = controller.state["reference"]
         self._noise = motors.noise(dt)
-        self._client, self._torque, self._total, self._forces = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((len(TERMS), n))
+        self._client, self._torque, self._total = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._forces = np.zeros((len(controller.force_names), n))
         self.q: Array = controller.robot.home.copy()
         """The encoders of the last tick, (n,) rad."""
         self._struct = core.Plant(
             law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
-            client=address(self._client), forces=address(self._forces), motors=motors.address, commands=address(self._commands),
+            client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
+            commands=address(self._commands),
             command_age=command_age, substeps=substeps, dt=dt, seed=motors.seed,
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
@@ -64,7 +66,7 @@ class Runner:
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         motors.begin_substeps(self._substep)
-        if controller.modality == "torque" or controller.pushed:  # forces that depend on the pose, beyond what the core knows
+        if controller.modality == "torque" or controller.pushed or controller.terms:  # forces beyond what the core knows, of this pose
             most, self._clients_act = 1, True
             self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt))
         elif controller.forced or self._clients_act:
@@ -122,8 +124,10 @@ class Runner:
         return known
 
     def _pose_forces(self, q: Array) -> Array:
-        """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""
+        """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
         controller, motors = self._controller, self._motors
+        if controller.terms and np.isfinite(q).all():
+            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt).values())
         if controller.modality == "torque":
             controller.state["feedforward"] = gravity_torque(controller.robot, q)
             motors.load = gravity_torque(controller.robot, motors.q)

@@ -69,12 +69,6 @@ def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
 
 
-def test_a_force_of_ones_own_acts_in_the_readable_law(tmp_path: Path) -> None:
-    flow = next(block for block in blocks("docs/law.md", tmp_path) if "import mobee" in block)
-    settled, ticks, depth = run(tmp_path, "-c", flow).split()
-    assert settled == "True" and 100 <= int(ticks) <= 1000 and 0.0 <= float(depth) < 0.05
-
-
 def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
     _, check, _ = blocks("docs/robots.md", tmp_path)
     assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.control import Gains
+from mobee.control import Forces, Gains
 from mobee.control.law import Law
 from mobee.robot.load import load_robot
 
@@ -19,12 +19,12 @@ def test_only_motors_that_live_and_have_weight_are_moved_and_only_those_that_liv
     law = Law(ICUB, Gains.published_2014(), alive=alive)
     assert (len(law.active), len(law.felt)) == (7, 16)
     beyond = ICUB.limits[:, 1] + 0.1
-    limits, constraints, collision = law.forces(beyond, np.ones(len(beyond)))
-    assert np.all(limits[alive] < 0) and not limits[~alive].any()
-    assert constraints[alive].any()
-    assert np.all(collision[alive] > 0) and not collision[~alive].any()
+    forces = Forces(*law.forces(beyond, np.ones(len(beyond))))
+    assert np.all(forces.limits[alive] < 0) and not forces.limits[~alive].any()
+    assert forces.constraints[alive].any()
+    assert np.all(forces.collision[alive] > 0) and not forces.collision[~alive].any()
     state = law.at_rest(beyond)
-    law.step(beyond, 0.01, ICUB.home, limits, state)
+    law.step(beyond, 0.01, ICUB.home, forces.limits, state)
     assert np.flatnonzero(state["velocity"]).tolist() == list(range(arm.start, arm.start + 7))
 
 

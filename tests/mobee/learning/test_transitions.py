@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +10,9 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.divergence import kl_divergence
+from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
+from mobee.learning.value_iteration import value_iteration
 from mobee.reference.learning import imagined, observe
 from tests.mobee.learning.toys import arm, torso
 
@@ -161,3 +166,40 @@ def test_a_model_that_forgets_is_interested_again_and_unlearns_what_changed():
             model.observe(0, 0, outcome)
     assert forgetful.reward[0, 0] > faithful.reward[0, 0]
     assert forgetful.probabilities[0, 0, 0] > 0.6 > 0.2 > faithful.probabilities[0, 0, 0]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda model: pickle.loads(pickle.dumps(model))])
+def test_a_copy_goes_its_own_way(copied):
+    model = TransitionModel(arm(neighbours="equidistant"))
+    model.debiased()
+    for outcome in OTHERS:
+        model.observe(S, ACTION, outcome)
+    before, plan = model.counts.copy(), value_iteration(model, model.reward)[1]
+    other = copied(model)
+    for outcome in (20, 21, 22, GOAL):
+        assert other.observe(S, ACTION, outcome) > 0.0
+    assert np.array_equal(model.counts, before) and other.tries.sum() == 7
+    assert np.array_equal(value_iteration(model, model.reward)[1], plan)
+    assert not np.array_equal(value_iteration(other.debiased(), other.reward)[1], plan)
+    for outcome in (20, 21, 22, GOAL):
+        model.observe(S, ACTION, outcome)
+    for one, two in ((model, other), (model.debiased(), other.debiased())):
+        assert np.array_equal(one.probabilities, two.probabilities) and np.array_equal(one.outcomes, two.outcomes)
+
+
+def test_numbers_of_numpy_name_states_and_actions_too():
+    model = TransitionModel(arm(neighbours="equidistant"))
+    found = model.observe(np.int64(S), np.intp(ACTION), np.int32(7))
+    assert found == pytest.approx(0.0487, abs=PRINTED) and model.tries[S, ACTION] == 1
+
+
+def test_the_order_of_goals_in_memory_does_not_matter():
+    space = arm(neighbours="equidistant")
+    other = Space(space.robot, space.joints, space.samples, np.asfortranarray(space.goals))
+    models = [TransitionModel(one) for one in (space, other)]
+    for model in models:
+        model.debiased()
+        for outcome in (*OTHERS, GOAL):
+            model.observe(S, ACTION, outcome)
+    plans = [value_iteration(known, model.reward)[1] for model in models for known in (model, model.debiased())]
+    assert np.array_equal(plans[0], plans[2]) and np.array_equal(plans[1], plans[3])
