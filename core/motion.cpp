@@ -8,13 +8,14 @@
 namespace mobee {
 
 void Motion::fit(const Robot& robot) {
-    const std::int64_t shapes = robot.shapes();
+    const std::int64_t slots = robot.slots();
     moved.resize(robot.links);
     for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
     for (Array<double>* of_links : {&turned, &bend, &sway, &chain}) of_links->resize(robot.links);
-    for (Array<double>* of_shapes : {&x, &y, &z, &arm, &way}) of_shapes->resize(shapes);
+    for (Array<double>* of_slots : {&arm, &way}) of_slots->resize(slots);
     frame.resize(robot.links);
-    for (std::int64_t i = 0; i < shapes; ++i) {
+    center.resize(slots);
+    for (std::int64_t i = 0; i < slots; ++i) {
         const Volume& volume = robot.shape[i].volume;
         arm[i] = volume.bound - (volume.kind <= Kind::capsule ? volume.radius : 0.0);
     }
@@ -32,18 +33,15 @@ void remember(const Placed& placed, Motion& motion) {
     const auto copy = [](const auto& from, auto& to) { std::copy(from.begin(), from.end(), to.begin()); };
     copy(placed.links.angles, motion.angles);
     copy(placed.links.frame, motion.frame);
-    copy(placed.x, motion.x);
-    copy(placed.y, motion.y);
-    copy(placed.z, motion.z);
+    for (std::size_t i = 0; i < placed.outline.size(); ++i) motion.center[i] = placed.outline[i].center;
     std::fill(motion.way.begin(), motion.way.end(), 0.0);
 }
 
 double measure(const Robot& robot, const Placed& placed, double enough, Motion& motion) {
-    const std::int64_t shapes = robot.shapes();
-    for (std::int64_t i = 0; i < shapes; ++i) {
-        if (!motion.moved[robot.shape[i].link]) continue;
-        const Vec3 way{placed.x[i] - motion.x[i], placed.y[i] - motion.y[i], placed.z[i] - motion.z[i]};
-        motion.way[i] = length(way);
+    const std::int64_t slots = robot.slots();
+    for (std::int64_t i = 0; i < slots; ++i) {
+        if (!motion.moved[robot.link[i]]) continue;
+        motion.way[i] = length(three(placed.outline[i].center - motion.center[i]));
         if (motion.way[i] >= enough) return motion.way[i];
     }
     for (std::int64_t link = 0; link < robot.links; ++link) {
@@ -55,8 +53,8 @@ double measure(const Robot& robot, const Placed& placed, double enough, Motion& 
         motion.turned[link] = std::sqrt(0.5 * (squares[0] + squares[1] + squares[2]));
     }
     double farthest = 0.0;
-    for (std::int64_t i = 0; i < shapes; ++i) {
-        const std::int64_t link = robot.shape[i].link;
+    for (std::int64_t i = 0; i < slots; ++i) {
+        const std::int64_t link = robot.link[i];
         if (motion.moved[link]) motion.way[i] += motion.turned[link] * motion.arm[i];
         farthest = most(farthest, motion.way[i]);
     }
@@ -82,9 +80,12 @@ MOBEE_CALL void mobee_swung(const Robot* robot, const double* then, const double
     motion.fit(*robot);
     std::copy(then, then + robot->joints, motion.angles.begin());
     bend_links(*robot, now, motion);
-    for (const Shape& shape : robot->shape) {
-        for (std::int64_t other = 0; other < robot->links; ++other)
-            *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+    for (const Cluster cluster : robot->cluster) {
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) {
+            const Shape& shape = robot->shape[i];
+            for (std::int64_t other = 0; other < robot->links; ++other)
+                *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+        }
     }
 }
 

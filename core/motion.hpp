@@ -15,10 +15,10 @@ struct Motion {
     // The earlier pose.
     Array<double> angles;   // (joints,)
     Array<Frame> frame;     // (links,)
-    Array<double> x, y, z;  // (shapes,)
+    Array<Four> center;     // (slots,), of outlines
 
-    Array<double> arm;                // (shapes,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
-    Array<double> way;                // (shapes,), see `measure`
+    Array<double> arm;                // (slots,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
+    Array<double> way;                // (slots,), see `measure`
     Array<double> turned;             // (links,), see `measure`
     Array<double> bend, sway, chain;  // (links,), see `bend_links`
 

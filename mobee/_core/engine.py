@@ -37,6 +37,27 @@ class Handle:
         self._free(self.at)
 
 
+class _Memory:
+    """An array that the core has made and given away."""
+
+    def __init__(self, at: int, shape: tuple[int, ...], kind: str) -> None:
+        self.__array_interface__ = {"shape": shape, "typestr": kind, "data": (at, False), "version": 3}
+        self._at = at
+
+    def __del__(self) -> None:
+        _free(self._at)
+
+
+def _rows(take: Callable[[int, int], None], at: int, count: int) -> tuple[Ints, Array]:
+    """The contacts that an object of the core has found, (count, NUMBERS) and (count, REALS)."""
+    if count == 0:
+        return np.empty((0, NUMBERS), dtype=np.int64), np.empty((0, REALS))
+    arrays = (ADDRESS * 2)()
+    take(at, ctypes.addressof(arrays))
+    numbers, reals = _Memory(arrays[0] or 0, (count, NUMBERS), "<i8"), _Memory(arrays[1] or 0, (count, REALS), "<f8")
+    return np.asarray(numbers), np.asarray(reals)
+
+
 class _RobotTables(ctypes.Structure):
     """`RobotTables` of core/robot.cpp."""
 
@@ -73,14 +94,15 @@ _scene_new = function("scene_new", ADDRESS, ADDRESS, result=ADDRESS)
 _scene_free = function("scene_free", ADDRESS)
 _room_new = function("room_new", result=ADDRESS)
 _room_free = function("room_free", ADDRESS)
-_room_rows = function("room_rows", ADDRESS, ADDRESS, ADDRESS)
+_room_rows = function("room_rows", ADDRESS, ADDRESS)
+_free = function("free", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
 _neighbours_free = function("neighbours_free", ADDRESS)
 _neighbours_enter = function("neighbours_enter", ADDRESS, ADDRESS, ADDRESS)
-_neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS, ADDRESS)
+_neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS)
 _neighbours_state = function("neighbours_state", ADDRESS, ADDRESS)
 _follow = function("follow", ADDRESS, BYTES, INTEGER, ADDRESS, result=INTEGER)
 _sweep = function("sweep", ADDRESS, ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, result=INTEGER)
@@ -138,9 +160,9 @@ class Room:
         if len(q) == 1:
             return self._evaluate_one(scene, q, hands, cut)
         torque = np.empty(q.shape)
-        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), -1, cut, threads, (INTEGER * 4)(*hands))
+        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), 0, cut, threads, (INTEGER * 4)(*hands))
         count = _evaluate(self._at, ctypes.addressof(request))
-        return *self._rows(count), torque
+        return *_rows(_room_rows, self._at, count), torque
 
     def _evaluate_one(self, scene: Handle, q: Array, hands: list[int], cut: bool) -> tuple[Ints, Array, Array]:
         request = self._one
@@ -153,13 +175,8 @@ class Room:
         request.cut = cut
         self._q[:] = q
         count = _evaluate(self._at, self._one_at)
-        numbers, reals = (self._numbers[:count].copy(), self._reals[:count].copy()) if count <= FEW else self._rows(count)
+        numbers, reals = (self._numbers[:count].copy(), self._reals[:count].copy()) if count <= FEW else _rows(_room_rows, self._at, count)
         return numbers, reals, self._torque.copy()
-
-    def _rows(self, count: int) -> tuple[Ints, Array]:
-        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
-        _room_rows(self._at, address(numbers), address(reals))
-        return numbers, reals
 
 
 class Following:
@@ -183,9 +200,7 @@ class Following:
         """As `Room.evaluate`, of poses q (B, n) one after the other."""
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
-        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
-        _neighbours_rows(self.at, address(numbers), address(reals))
-        return numbers, reals, torque
+        return *_rows(_neighbours_rows, self.at, count), torque
 
     def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
         """Whether nothing touches between the poses q (V, n) of each edge (E, 2), (E,), and how many poses were looked at.
