@@ -4,7 +4,7 @@
 
 namespace mobee::narrow {
 
-namespace support {
+namespace core_support {
 
 // The corner of a hull that is farthest along v.
 Vec3 of_hull(const Hull& hull, Vec3 v) {
@@ -34,7 +34,18 @@ Vec3 of_core(const Volume& volume, Vec3 v) {
     return of_hull(volume.hull, v);
 }
 
-}  // namespace support
+bool holds(const Volume& v, Vec3 point) {
+    const Vec3 p = into(v.rotation, point - v.center), half = v.half;
+    if (v.kind == Kind::box) return std::fabs(p.x) < half.x && std::fabs(p.y) < half.y && std::fabs(p.z) < half.z;
+    return p.x * p.x + p.y * p.y < half.x * half.x && std::fabs(p.z) < half.y;
+}
+
+}  // namespace core_support
+
+bool known_to_meet(const Volume& a, const Volume& b, Vec3 point) {
+    using core_support::holds;
+    return (holds(a, point) && holds(b, point)) || holds(a, b.center) || holds(b, a.center);
+}
 
 Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), shift(into(a.rotation, b.center - a.center)) {
     for (int column = 0; column < 3; ++column) {
@@ -46,7 +57,9 @@ Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), 
 }
 
 Vec3 Difference::farthest(Vec3 n) {
-    return shift + out_of(turn, support::of_core(second, into(turn, n))) - support::of_core(first, -n);
+    return shift + out_of(turn, core_support::of_core(second, into(turn, n))) - core_support::of_core(first, -n);
 }
+
+double Difference::apart() { return closest(*this, 0.0).distance; }
 
 }  // namespace mobee::narrow

@@ -18,60 +18,78 @@ constexpr int full = most_faces - 8;  // which is sooner than there are too many
 constexpr double exact = 1e-12;       // m, for volumes of up to a metre: the bounds have met
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Against the clock, seen from outside.
+// Corners against the clock, seen from outside.
 struct Face {
-    int corner[3];
-};
-
-struct Plane {
-    double x, y, z, low;  // the unit normal and how far out the face is
+    std::int32_t a, b, c;
 };
 
 struct Edge {
-    int from, to;
+    std::int32_t from, to;
 };
 
-// Plain numbers that nobody sets to zero: there are more of them than most polytopes use.
-struct Point {
-    double x, y, z;
-    operator Vec3() const { return {x, y, z}; }
-};
-
+// Plain numbers, not set to zero: there is room for more than most polytopes need.
 struct Polytope {
-    Point corner[most_corners];
+    double px[most_corners], py[most_corners], pz[most_corners];
     Face face[most_faces];
-    Plane plane[most_faces];
+    double nx[most_faces], ny[most_faces], nz[most_faces];  // unit normals
+    double low[most_faces];                                 // how far out
+    double open[most_faces];                                // the same, or infinity where no shorter way is behind the face
     int faces = 0;
 
-    // One without area is never the closest.
+    Vec3 corner(int k) const { return {px[k], py[k], pz[k]}; }
+    Vec3 normal(int k) const { return {nx[k], ny[k], nz[k]}; }
+    void set(int k, Vec3 p) { px[k] = p.x, py[k] = p.y, pz[k] = p.z; }
+
+    // A face without area is never the closest.
     void add(Face added) {
-        const Vec3 a = corner[added.corner[0]], b = corner[added.corner[1]], c = corner[added.corner[2]];
-        const Vec3 u = b - a, v = c - a, n = cross(u, v);
+        const Vec3 a = corner(added.a), u = corner(added.b) - a, v = corner(added.c) - a, n = cross(u, v);
         const double squared = dot(n, n);
-        Plane made = {n.x, n.y, n.z, infinity};
-        if (squared > 1e-28 * dot(u, u) * dot(v, v)) {
-            const Vec3 normal = over(n, std::sqrt(squared));
-            made = {normal.x, normal.y, normal.z, dot(normal, a)};
-        }
+        const bool thin = !(squared > 1e-28 * dot(u, u) * dot(v, v));
+        const Vec3 out = (1.0 / (thin ? 1.0 : std::sqrt(squared))) * n;
         face[faces] = added;
-        plane[faces++] = made;
+        nx[faces] = out.x, ny[faces] = out.y, nz[faces] = out.z;
+        low[faces] = open[faces] = thin ? infinity : dot(out, a);
+        ++faces;
     }
 
-    // The face that is closest to the origin.
-    int least() const {
-        int found = 0;
-        double low = infinity;
-        for (int k = 0; k < faces; ++k)
-            if (plane[k].low < low - 0.01 * exact) found = k, low = plane[k].low;
-        return found;
+    void take_away(int k) {
+        --faces;
+        face[k] = face[faces];
+        nx[k] = nx[faces], ny[k] = ny[faces], nz[k] = nz[faces];
+        low[k] = low[faces], open[k] = open[faces];
     }
 
-    // Take away the faces that see the new corner, and span new ones from it to the edge of the hole.
+    // The open face that is closest to the origin.
+    int closest_face() const {
+        double lowest[4] = {infinity, infinity, infinity, infinity};
+        int k = 0;
+        for (; k + 4 <= faces; k += 4)
+            for (int lane = 0; lane < 4; ++lane) lowest[lane] = least(open[k + lane], lowest[lane]);
+        for (; k < faces; ++k) lowest[0] = least(open[k], lowest[0]);
+        const double found = least(least(lowest[0], lowest[1]), least(lowest[2], lowest[3]));
+        for (k = 0; k < faces - 1; ++k)
+            if (open[k] == found) break;
+        return k;
+    }
+
+    // How far the foot of the origin's perpendicular on a face is from the nearest side; negative outside the face.
+    double foot_within(int k) const {
+        const Vec3 n = normal(k), foot = low[k] * n;
+        const int at[4] = {face[k].a, face[k].b, face[k].c, face[k].a};
+        double within = infinity;
+        for (int side = 0; side < 3; ++side) {
+            const Vec3 from = corner(at[side]), along = corner(at[side + 1]) - from;
+            within = least(dot(cross(n, along), foot - from) / length(along), within);
+        }
+        return within;
+    }
+
+    // Take away the faces that see a corner, and span new ones from it to the edge of the hole.
     void expand(int added, double tolerance);
 };
 
 // Add an edge, or take it away if the other face along it is taken away too; how many then.
-int toggle(Edge* rim, int count, Edge edge) {
+inline int toggle(Edge* rim, int count, Edge edge) {
     for (int k = 0; k < count; ++k) {
         if (rim[k].from == edge.to && rim[k].to == edge.from) {
             rim[k] = rim[count - 1];
@@ -83,27 +101,28 @@ int toggle(Edge* rim, int count, Edge edge) {
 }
 
 void Polytope::expand(int added, double tolerance) {
-    const Vec3 p = corner[added];
+    const Vec3 p = corner(added);
+    double above[most_faces];
+    for (int k = 0; k < faces; ++k) above[k] = nx[k] * p.x + ny[k] * p.y + nz[k] * p.z - low[k];
+    int seeing[most_faces], count = 0;
+    for (int k = 0; k < faces; ++k) {
+        seeing[count] = k;
+        count += above[k] > tolerance;
+    }
     Edge rim[3 * most_faces];
     int edges = 0;
-    for (int k = 0; k < faces;) {
-        const Plane& side = plane[k];
-        if (!(side.x * p.x + side.y * p.y + side.z * p.z - side.low > tolerance)) {
-            ++k;
-            continue;
-        }
-        const int* c = face[k].corner;
-        edges = toggle(rim, edges, {c[0], c[1]});
-        edges = toggle(rim, edges, {c[1], c[2]});
-        edges = toggle(rim, edges, {c[2], c[0]});
-        --faces;
-        face[k] = face[faces];
-        plane[k] = plane[faces];
+    while (count > 0) {
+        const int k = seeing[--count];
+        const Face gone = face[k];
+        edges = toggle(rim, edges, {gone.a, gone.b});
+        edges = toggle(rim, edges, {gone.b, gone.c});
+        edges = toggle(rim, edges, {gone.c, gone.a});
+        take_away(k);
     }
-    for (int k = 0; k < edges && faces < most_faces; ++k) add({{rim[k].from, rim[k].to, added}});
+    for (int k = 0; k < edges && faces < most_faces; ++k) add({rim[k].from, rim[k].to, added});
 }
 
-Vec3 normalized(Vec3 v) { return over(v, length(v)); }
+inline Vec3 normalized(Vec3 v) { return (1.0 / length(v)) * v; }
 
 // Unit vectors square to u, and to u and the first.
 void square_to(Vec3 u, Vec3& one, Vec3& two) {
@@ -122,8 +141,23 @@ struct Start {
     Vec3 normal;  // of the difference, where it is flat
 };
 
+// Set four corners of the difference that are farthest along a direction and three others far from it, if they are not nearly in one
+// plane; 0 1 2 are against the clock seen from outside.
+bool spread(Difference& difference, Vec3 n, Polytope& polytope, Start& start) {
+    Vec3 t, u;
+    square_to(n, t, u);
+    const Vec3 found[4] = {difference.farthest(n), difference.farthest(0.94 * t - 0.33 * n),
+                           difference.farthest(0.82 * u - 0.47 * t - 0.33 * n), difference.farthest(-0.82 * u - 0.47 * t - 0.33 * n)};
+    const Vec3 a = found[1] - found[0], b = found[2] - found[0], c = found[3] - found[0], across = cross(b, a);
+    const double size = length(across), width = dot(across, c) / size;
+    if (!(width > 0.01 * length(c)) || !(size > 0.01 * dot(a, a)) || !(size > 0.01 * dot(b, b))) return false;
+    start.size = width;
+    for (int k = 0; k < 4; ++k) polytope.set(k, found[k]);
+    return true;
+}
+
 // Set four corners of the difference, 0 1 2 against the clock seen from outside.
-Start tetrahedron(Difference& difference, Point* corner) {
+Start tetrahedron(Difference& difference, Polytope& polytope) {
     Vec3 axis[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
     Vec3 found[4];
     double width = 0.0, turned = 0.0;
@@ -139,14 +173,27 @@ Start tetrahedron(Difference& difference, Point* corner) {
             if (count == 0 ? which == 0 || off > width : off > width) width = off, turned = turn, found[count] = p;
         }
         if (width == tie) return {0.0, axis[0]};
-        corner[count] = {found[count].x, found[count].y, found[count].z};
         const Vec3 u = found[1] - found[0];
         if (count == 1) square_to(u, axis[0], axis[1]);
         if (count == 2) axis[0] = normalized(cross(u, found[2] - found[0]));
     }
     // With the last in front of 0 1 2, those turn round.
-    if (turned > 0.0) std::swap(corner[0], corner[1]);
+    if (turned > 0.0) std::swap(found[0], found[1]);
+    for (int k = 0; k < 4; ++k) polytope.set(k, found[k]);
     return {width, axis[0]};
+}
+
+// Whether no way shorter than the limit, but those that are known, is behind the face: the polytope reaches less than the limit only
+// in a part of the directions around a face that the foot of the perpendicular lies on, which is small and in a band that is known.
+bool decided(const Polytope& polytope, int face, const Bands& bands, double limit) {
+    const double low = polytope.low[face];
+    if (!(low > 0.0)) return false;
+    const double within = polytope.foot_within(face);
+    if (within < 0.0) return within < -1e-6 * length(polytope.corner(polytope.face[face].a) - polytope.corner(polytope.face[face].b));
+    // At this angle from the normal, low cos + within sin is the limit.
+    const double gap = limit - low, sum = limit + low, squared = within * within - sum * gap;
+    if (!(squared > 0.0)) return false;
+    return bands.hold(polytope.normal(face), gap / (within + std::sqrt(squared)), limit);
 }
 
 }  // namespace epa
@@ -196,30 +243,44 @@ Way search(Difference& difference, Way best) {
 
 }  // namespace polish
 
-Way way_out(Difference& difference, Way known) {
+Way way_out(Difference& difference, Way known, const Bands* bands) {
     epa::Polytope polytope;
-    const epa::Start start = epa::tetrahedron(difference, polytope.corner);
+    epa::Start start;
+    if (!epa::spread(difference, known.direction, polytope, start)) start = epa::tetrahedron(difference, polytope);
     const double exact = epa::exact * most(start.size, 1.0);
-    for (const epa::Face face : {epa::Face{{0, 1, 2}}, {{2, 1, 3}}, {{0, 2, 3}}, {{1, 0, 3}}}) polytope.add(face);
+    for (const epa::Face face : {epa::Face{0, 1, 2}, {2, 1, 3}, {0, 2, 3}, {1, 0, 3}}) polytope.add(face);
     Way best = {epa::infinity, known.direction};
     double low = -epa::infinity;
     Vec3 n = start.normal;
-    for (int count = 4; count < epa::most_corners; ++count) {
-        if (start.size > 0.0) {
-            const epa::Plane& plane = polytope.plane[polytope.least()];
-            n = {plane.x, plane.y, plane.z};
-            low = plane.low;
+    int cursor = 4;
+    for (int count = 4; count < epa::most_corners;) {
+        if (start.size > 0.0 && bands != nullptr) {
+            const double target = least(best.reach, known.reach - tie) - exact;
+            while (cursor > 0 && !(polytope.low[cursor - 1] < target)) --cursor;
+            if (cursor == 0) break;
+            const int face = cursor - 1;
+            n = polytope.normal(face);
+            low = polytope.low[face];
+            if (epa::decided(polytope, face, *bands, known.reach - tie)) {
+                --cursor;
+                continue;
+            }
+        } else if (start.size > 0.0) {
+            const int face = polytope.closest_face();
+            n = polytope.normal(face);
+            low = polytope.low[face];
         }
         const Vec3 p = difference.farthest(n);
         const double reach = dot(n, p);
         if (reach < best.reach) best = {reach, n};
-        if (start.size == 0.0 || best.reach <= 0.0 || least(least(best.reach, known.reach - tie), reach) - low <= exact) break;
+        if (start.size == 0.0 || best.reach <= 0.0 || (bands == nullptr && least(least(best.reach, known.reach - tie), reach) - low <= exact)) break;
         if (polytope.faces > epa::full) {
             best = polish::search(difference, best.reach < known.reach - tie ? best : known);
             break;
         }
-        polytope.corner[count] = {p.x, p.y, p.z};
-        polytope.expand(count, 0.1 * exact);
+        polytope.set(count, p);
+        polytope.expand(count++, 0.1 * exact);
+        cursor = polytope.faces;
     }
     return best.reach < known.reach - tie ? best : known;
 }

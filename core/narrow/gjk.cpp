@@ -9,7 +9,7 @@ namespace gjk {
 
 constexpr int steps = 100;
 constexpr double exact = 1e-15;   // relative: the bounds have met
-constexpr double origin = 1e-12;  // m: what is so close to the origin holds it
+constexpr double origin = 1e-12;  // m, or of some size: what is so close to the origin holds it
 constexpr double thin = 1e-28;    // squared sine of the angle below which a triangle is one of its sides
 constexpr double level = 1e-24;   // squared sine of the angle below which a tetrahedron is one of its faces
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -96,8 +96,9 @@ Nearest closest(Difference& difference, double limit) {
     gjk::Simplex simplex;
     Vec3 point = difference.shift;
     double squared = gjk::infinity, apart = length(point);
+    const double origin = most(gjk::origin, 4e-15 * (apart + difference.first.bound + difference.second.bound));
     for (int step = 0; step < gjk::steps; ++step) {
-        if (apart < gjk::origin) {
+        if (apart < origin) {
             if (simplex.count > 0) return {0.0, {}};
             point = {1.0, 0.0, 0.0};
             apart = 1.0;

@@ -16,6 +16,21 @@ constexpr double aligned = 1e-6;    // sine of the angle below which a direction
 // -1 or 1; next to zero always 1, so that rounding cannot choose.
 inline double sign(double value) { return value < -tie ? -1.0 : 1.0; }
 
+// The better side of a plane across an axis to leave by, where `value` is how far the second volume is in front of the first.
+inline double away(double value) { return value > tie ? -1.0 : 1.0; }
+
+// Of a plane.
+struct Point {
+    double x, y;
+};
+
+inline Point operator+(Point a, Point b) { return {a.x + b.x, a.y + b.y}; }
+inline Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y}; }
+inline Point operator-(Point a) { return {-a.x, -a.y}; }
+inline Point operator*(double s, Point a) { return {s * a.x, s * a.y}; }
+inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
+inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
+
 inline Vec3 over(Vec3 v, double s) { return {v.x / s, v.y / s, v.z / s}; }
 
 inline Vec3 absolute(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
@@ -30,10 +45,14 @@ double capsule_capsule(const Volume& a, const Volume& b, Touch& touch);
 double sphere_box(const Volume& a, const Volume& b, Touch& touch);
 double capsule_box(const Volume& a, const Volume& b, Touch& touch);
 double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch);
+double cylinder_box(const Volume& a, const Volume& b, Touch& touch);
 double box_box(const Volume& a, const Volume& b, Touch& touch);
 
 // See `distance`.
 double capsule_box_distance(const Volume& a, const Volume& b);
+double capsule_cylinder_distance(const Volume& a, const Volume& b);
 
 // The s, t in [-1, 1] that bring w + s u and t v closest; the middle of the span if they are parallel.
 std::pair<double, double> closest_parameters(Vec3 w, Vec3 u, Vec3 v);

@@ -10,25 +10,6 @@ namespace narrow {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch) {
-    const Vec3 c = into(b.rotation, a.center - b.center);
-    const double side = std::sqrt(c.x * c.x + c.y * c.y), across = side - b.half.x, along = std::fabs(c.z) - b.half.y;
-    const double dx = most(across, 0.0), dz = most(along, 0.0), distance = std::sqrt(dx * dx + dz * dz);
-    if (distance >= a.radius) return a.radius - distance;
-    const Vec3 outward = side > touching ? Vec3{c.x / side, c.y / side, 0.0} : Vec3{1.0, 0.0, 0.0};
-    Vec3 n = {0.0, 0.0, sign(c.z)};
-    double apart = n.z * c.z - b.half.y;
-    if (distance > touching) {
-        n = (dx / distance) * outward + (dz / distance) * n;
-        apart = distance;
-    } else if (across > along + tie) {
-        n = outward;
-        apart = across;
-    }
-    touch = {out_of(b.rotation, n), b.center + out_of(b.rotation, c - 0.5 * (a.radius + apart) * n)};
-    return a.radius - apart;
-}
-
 // The shortest way out along the axes of either volume, across two axes, or straight away from the axis of either.
 Way natural(Difference& difference) {
     const Vec3 first = {0.0, 0.0, 1.0}, second = difference.turn.column(2), shift = difference.shift;
@@ -69,6 +50,9 @@ double overlap_in_order(const Volume& a, const Volume& b, Touch& touch) {
     if (b.kind == Kind::box && a.kind <= Kind::capsule) return a.kind == Kind::sphere ? sphere_box(a, b, touch) : capsule_box(a, b, touch);
     if (a.kind == Kind::box && b.kind == Kind::box) return box_box(a, b, touch);
     if (a.kind == Kind::sphere && b.kind == Kind::cylinder) return sphere_cylinder(a, b, touch);
+    if (a.kind == Kind::capsule && b.kind == Kind::cylinder) return capsule_cylinder(a, b, touch);
+    if (a.kind == Kind::cylinder && b.kind == Kind::cylinder) return cylinder_cylinder(a, b, touch);
+    if (a.kind == Kind::cylinder && b.kind == Kind::box) return cylinder_box(a, b, touch);
     return general(a, b, touch);
 }
 
@@ -94,6 +78,8 @@ double distance(const Volume& a, const Volume& b) {
         apart = -narrow::capsule_capsule(a, b, unused);
     } else if (a.kind == Kind::capsule && b.kind == Kind::box) {
         apart = narrow::capsule_box_distance(a, b);
+    } else if (a.kind == Kind::capsule && b.kind == Kind::cylinder) {
+        apart = narrow::capsule_cylinder_distance(a, b);
     } else {
         narrow::Difference difference(a, b);
         apart = narrow::closest(difference, narrow::infinity).distance - narrow::rounding(a) - narrow::rounding(b);

@@ -1,11 +1,9 @@
 // Polygons of the plane across a contact's normal.
 #pragma once
 
-namespace mobee::narrow {
+#include "narrow.hpp"
 
-struct Point {
-    double x, y;
-};
+namespace mobee::narrow {
 
 // Keep, in order, the corners of the convex hull of points; how many (Jarvis's march).
 int outline(Point* points, int count, double near);

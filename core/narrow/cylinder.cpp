@@ -1,0 +1,210 @@
+// A cylinder with a sphere, a capsule or a box: closed forms, and smooth minima along the outlines of their difference.
+#include <limits>
+
+#include "difference.hpp"
+#include "narrow.hpp"
+#include "outline.hpp"
+
+namespace mobee::narrow {
+
+namespace cylinder {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+inline int after(int axis) { return axis == 2 ? 0 : axis + 1; }
+inline int before(int axis) { return axis == 0 ? 2 : axis - 1; }
+
+inline Vec3 axis_of(int i) {
+    Vec3 e;
+    e[i] = 1.0;
+    return e;
+}
+
+// The difference of segments along three axes (a box, or the core of a capsule) and a cylinder, seen along those axes.
+// Its shortest way out is along the cylinder's axis c, along an axis of a box, across c and a segment, or a smooth minimum among the
+// directions square to c or to a segment.  (Where the rim meets a corner, the reach has no minimum.)
+struct Swept {
+    Vec3 shift;  // from the cylinder's centre to that of the segments
+    Vec3 half;   // of the segments
+    Vec3 axis;   // c
+    double radius, height;
+    Vec3 beside;  // of c, how much is beside each segment: the length of their cross product
+    Vec3 moment;  // shift x c
+
+    Swept(const Volume& round, const Volume& other, Vec3 halves)
+        : shift(into(other.rotation, other.center - round.center)), half(halves), axis(into(other.rotation, round.rotation.column(2))),
+          radius(round.half.x), height(round.half.y) {
+        const Vec3 c = axis;
+        beside = {std::sqrt(c.y * c.y + c.z * c.z), std::sqrt(c.z * c.z + c.x * c.x), std::sqrt(c.x * c.x + c.y * c.y)};
+        moment = cross(shift, c);
+    }
+
+    // How far the difference extends from `shift` along c, along the axes of a box, and across c and a segment.
+    double along_cylinder() const { return dot(half, absolute(axis)) + height; }
+    Vec3 along_box() const { return half + height * absolute(axis) + radius * beside; }
+    double across(int i) const {
+        const int j = after(i), k = before(i);
+        return beside[i] > flat ? (half[j] * std::fabs(axis[k]) + half[k] * std::fabs(axis[j])) / beside[i] + radius : infinity;
+    }
+    Vec3 normal_across(int i) const { return over(cross(axis_of(i), axis), beside[i]); }
+    // Of the shift along that normal.
+    double shift_across(int i) const { return beside[i] > flat ? -moment[i] / beside[i] : 0.0; }
+
+    // The reach along a unit vector.
+    double reach(Vec3 n) const {
+        return dot(n, shift) + dot(half, absolute(n)) + height * std::fabs(dot(n, axis)) + radius * length(cross(n, axis));
+    }
+};
+
+inline double smallest(Vec3 v) { return least(least(v.x, v.y), v.z); }
+
+// Take the way along an axis, or against it, whichever leads apart sooner.
+inline void prefer(Way& best, Vec3 n, double extent, double shift) {
+    const double reach = extent + away(shift) * shift;
+    if (reach < best.reach - tie) best = {reach, away(shift) * n};
+}
+
+// Square to c: away from the corner of the segments' outline that is closest to c.
+void prefer_away_from_corner(Way& best, const Swept& swept) {
+    const Vec3 c = swept.axis, half = swept.half;
+    double nearest = infinity;
+    Vec3 corner;
+    for (int k = 0; k < 8; ++k) {
+        const Vec3 p = swept.shift + Vec3{k & 1 ? half.x : -half.x, k & 2 ? half.y : -half.y, k & 4 ? half.z : -half.z};
+        const Vec3 q = p - dot(p, c) * c;
+        if (dot(q, q) < nearest) corner = q, nearest = dot(q, q);
+    }
+    const double size = std::sqrt(nearest);
+    if (size <= touching) return;
+    const Vec3 n = over(-corner, size);
+    const double reach = swept.reach(n);
+    if (reach < best.reach - tie) best = {reach, n};
+}
+
+// Square to the segment along axis i.
+void prefer_around(Way& best, const Swept& swept, int i) {
+    const int j = after(i), k = before(i);
+    const Vec3 c = swept.axis;
+    const Disc disc = {swept.radius, swept.height, {c[j], c[k]}, c[i] * c[i], 0.0};
+    Exit exit = {best.reach, {}};
+    improve_around(disc, {swept.shift[j], swept.shift[k]}, {swept.half[j], swept.half[k]}, exit);
+    if (!(exit.reach < best.reach)) return;
+    best.reach = exit.reach;
+    best.direction[i] = 0.0;
+    best.direction[j] = exit.n.x;
+    best.direction[k] = exit.n.y;
+}
+
+// A segment c + s h, |s| <= 1, and a cylinder about the z axis: how far apart they are at s, and half the slope of the square.
+struct Apart {
+    Vec3 way;  // from the cylinder
+    double distance, slope, rise;
+
+    Apart(Vec3 c, Vec3 h, double radius, double height, double s) {
+        const Vec3 p = c + s * h;
+        const double side = std::sqrt(p.x * p.x + p.y * p.y), beyond = most(side - radius, 0.0), share = beyond > 0.0 ? beyond / side : 0.0;
+        way = {share * p.x, share * p.y, p.z - clamp(p.z, -height, height)};
+        distance = std::sqrt(beyond * beyond + way.z * way.z);
+        slope = dot(way, h);
+        const double across = beyond > 0.0 ? (p.x * h.x + p.y * h.y) / side : 0.0;
+        rise = across * across + share * (h.x * h.x + h.y * h.y - across * across) + (way.z != 0.0 ? h.z * h.z : 0.0);
+        if (beyond <= 0.0) rise = way.z != 0.0 ? h.z * h.z : 0.0;
+    }
+    // No point of the segment is nearer than this: beyond the plane across the way, which touches the cylinder.
+    double bound(double s) const { return distance > 0.0 ? distance - std::fabs(slope) / distance * (slope > 0.0 ? 1.0 + s : 1.0 - s) : 0.0; }
+};
+
+// The closest that the two come; once that is known to be more than `limit`, a lower bound that is more, too.
+Apart closest_to_cylinder(Vec3 c, Vec3 h, const Volume& round, double inverse, double limit, double& bound) {
+    double low = -1.0, high = 1.0, s = unit(-dot(c, h) * inverse);
+    Apart here(c, h, round.half.x, round.half.y, s);
+    for (int step = 0; step < 60; ++step) {
+        bound = here.bound(s);
+        if ((bound >= limit && bound > 0.0) || here.distance <= touching) break;
+        (here.slope > 0.0 ? high : low) = s;
+        double next = here.rise > 0.0 ? s - here.slope / here.rise : here.slope > 0.0 ? -1.0 : 1.0;
+        if (!(next > low && next < high)) next = next <= low && low == -1.0 ? -1.0 : next >= high && high == 1.0 ? 1.0 : (low + high) / 2.0;
+        if (std::fabs(next - s) < 1e-15) break;
+        s = next;
+        here = Apart(c, h, round.half.x, round.half.y, s);
+    }
+    return here;
+}
+
+}  // namespace cylinder
+
+double sphere_cylinder(const Volume& a, const Volume& b, Touch& touch) {
+    const Vec3 c = into(b.rotation, a.center - b.center);
+    const double side = std::sqrt(c.x * c.x + c.y * c.y), across = side - b.half.x, along = std::fabs(c.z) - b.half.y;
+    const double dx = most(across, 0.0), dz = most(along, 0.0), distance = std::sqrt(dx * dx + dz * dz);
+    if (distance >= a.radius) return a.radius - distance;
+    const Vec3 outward = side > touching ? Vec3{c.x / side, c.y / side, 0.0} : Vec3{1.0, 0.0, 0.0};
+    Vec3 n = {0.0, 0.0, sign(c.z)};
+    double apart = n.z * c.z - b.half.y;
+    if (distance > touching) {
+        n = (dx / distance) * outward + (dz / distance) * n;
+        apart = distance;
+    } else if (across > along + tie) {
+        n = outward;
+        apart = across;
+    }
+    touch = {out_of(b.rotation, n), b.center + out_of(b.rotation, c - 0.5 * (a.radius + apart) * n)};
+    return a.radius - apart;
+}
+
+double cylinder_box(const Volume& a, const Volume& b, Touch& touch) {
+    using namespace cylinder;
+    const Swept swept(a, b, b.half);
+    const double along = swept.along_cylinder(), off = dot(swept.shift, swept.axis);
+    const Vec3 box = swept.along_box(), across = {swept.across(0), swept.across(1), swept.across(2)};
+    const Vec3 aside = {swept.shift_across(0), swept.shift_across(1), swept.shift_across(2)};
+    const double between = smallest(across - absolute(aside));
+    const double apart = least(least(along - std::fabs(off), between), smallest(box - absolute(swept.shift)));
+    if (apart <= 0.0) return apart;
+    Way best = {infinity, {}};
+    prefer(best, swept.axis, along, off);
+    for (const int i : {2, 0, 1}) prefer(best, axis_of(i), box[i], swept.shift[i]);
+    for (int i = 0; i < 3; ++i) prefer(best, swept.normal_across(i), across[i], aside[i]);
+    // Where the cylinder's axis passes beside the box, a corner may be closest.
+    if (between < swept.radius) prefer_away_from_corner(best, swept);
+    for (int i = 0; i < 3; ++i) prefer_around(best, swept, i);
+    if (best.reach <= 0.0) return best.reach;
+    const Touch found = touch_along(a, b, out_of(b.rotation, best.direction), best.reach);
+    const double gap = known_to_meet(a, b, found.point) ? 0.0 : Difference(a, b).apart();
+    if (gap > 0.0) return -gap;
+    touch = found;
+    return best.reach;
+}
+
+double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch) {
+    using namespace cylinder;
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    double bound = 0.0;
+    const Apart apart = closest_to_cylinder(c, h, b, a.inverse, a.radius, bound);
+    if (bound >= a.radius && bound > 0.0) return a.radius - bound;
+    if (apart.distance > touching) {
+        if (apart.distance >= a.radius) return a.radius - apart.distance;
+        const double depth = a.radius - apart.distance;
+        touch = touch_along(a, b, out_of(b.rotation, over(apart.way, apart.distance)), depth);
+        return depth;
+    }
+    // The core meets the cylinder.
+    const Swept swept(b, a, {0.0, 0.0, a.half.y});
+    Way best = {infinity, {}};
+    prefer(best, swept.axis, swept.along_cylinder(), dot(swept.shift, swept.axis));
+    for (int i = 2; i >= 0; --i) prefer(best, swept.normal_across(i), swept.across(i), swept.shift_across(i));
+    prefer_away_from_corner(best, swept);
+    prefer_around(best, swept, 2);
+    const double depth = a.radius + best.reach;
+    touch = touch_along(a, b, out_of(a.rotation, -best.direction), depth);
+    return depth;
+}
+
+double capsule_cylinder_distance(const Volume& a, const Volume& b) {
+    using namespace cylinder;
+    const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
+    double bound = 0.0;
+    return most(closest_to_cylinder(c, h, b, a.inverse, infinity, bound).distance - a.radius, 0.0);
+}
+
+}  // namespace mobee::narrow

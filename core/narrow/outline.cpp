@@ -1,0 +1,137 @@
+#include "outline.hpp"
+
+namespace mobee::narrow {
+
+namespace outline_of_disc {
+
+constexpr int most_steps = 80, most_arcs = 16;
+constexpr double settled = 1e-10;  // rad; the reach is then within its square of the minimum
+
+inline Point normalized(Point v) { return (1.0 / std::sqrt(dot(v, v))) * v; }
+
+// Square to the axis.
+inline Point beside(const Disc& disc) { return {-disc.axis.y, disc.axis.x}; }
+
+// A direction, the outline's point that is farthest along it, and what follows from them.
+struct Support {
+    Point n, point;
+    double reach;
+    double slope;   // of the reach, against the clock
+    double radius;  // of curvature
+};
+
+inline Support support(const Disc& disc, Point corner, Point n) {
+    const double q = cross(disc.axis, n), squared = disc.lean + q * q, k = disc.radius / std::sqrt(squared);
+    const Point point = corner + (k * disc.lean + disc.ball) * n + (k * q) * beside(disc);
+    return {n, point, dot(n, point), cross(n, point), k * disc.lean / squared + disc.ball};
+}
+
+struct Arc {
+    Support from, to;
+};
+
+// Whether no smooth minimum below the limit is between the two.  The reach h there is not below the distance of the chord, where that
+// is positive; with its slope it is bound by h'' = radius - h, and the radius has its extremes at the ends or along the axis.
+bool hopeless(const Disc& disc, const Arc& arc, double limit) {
+    const Point chord = arc.to.point - arc.from.point, turn = arc.to.n - arc.from.n;
+    const double far = std::sqrt(dot(chord, chord)), area = cross(arc.from.point, chord);
+    if (area >= limit * far) return true;
+    const bool along = cross(disc.axis, arc.from.n) * cross(disc.axis, arc.to.n) < 0.0;
+    const double high = along ? disc.radius / std::sqrt(disc.lean) + disc.ball : most(arc.from.radius, arc.to.radius);
+    const double ends = least(arc.from.reach, arc.to.reach);
+    if (ends >= high - tie) return true;  // concave
+    if (arc.from.slope * arc.to.slope <= 0.0) return false;
+    const double low = area > 0.0 ? least(ends, area / far) : -std::sqrt(dot(arc.from.point, arc.from.point));
+    const double angle = 1.5708 * std::sqrt(dot(turn, turn)), change = angle * (high - low);
+    return change < (arc.from.slope < 0.0 ? -arc.from.slope : arc.to.slope);  // steep
+}
+
+inline Point across_chord(const Arc& arc) {
+    const Point chord = arc.to.point - arc.from.point;
+    return normalized({chord.y, -chord.x});
+}
+
+inline bool inside(const Arc& arc, Point n) { return cross(arc.from.n, n) > 0.0 && cross(n, arc.to.n) > 0.0; }
+
+// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does).
+void descend(const Disc& disc, Point corner, Arc arc, Exit& best) {
+    Support here = support(disc, corner, across_chord(arc));
+    for (int step = 0; step < most_steps; ++step) {
+        (here.slope < 0.0 ? arc.from : arc.to) = here;
+        const double rise = here.radius - here.reach, turn = rise > 0.0 ? -here.slope / rise : 1.0;
+        if (std::fabs(turn) < settled) break;
+        Point next = std::fabs(turn) < 0.5 ? normalized(here.n + turn * Point{-here.n.y, here.n.x}) : across_chord(arc);
+        if (!inside(arc, next)) next = across_chord(arc);
+        if (!inside(arc, next)) break;
+        here = support(disc, corner, next);
+    }
+    if (here.reach < best.reach - tie) best = {here.reach, here.n};
+}
+
+// The smooth minima between two directions, less than half a turn apart against the clock; the outline is the disc's about a corner.
+void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit& best) {
+    Arc stack[most_arcs];
+    stack[0] = {support(disc, corner, from), support(disc, corner, to)};
+    int waiting = 1;
+    for (int step = 0; step < most_steps && waiting > 0; ++step) {
+        const Arc arc = stack[--waiting];
+        if (hopeless(disc, arc, best.reach - tie)) continue;
+        // Where h is not above the least radius at both ends it is so between them, and h is convex.
+        if (most(arc.from.reach, arc.to.reach) <= least(arc.from.radius, arc.to.radius) + tie) {
+            if (arc.from.slope < 0.0 && arc.to.slope > 0.0) descend(disc, corner, arc, best);
+            continue;
+        }
+        const Point n = across_chord(arc);
+        if (waiting + 2 > most_arcs || !inside(arc, n)) continue;
+        const Support middle = support(disc, corner, n);
+        stack[waiting++] = {middle, arc.to};
+        stack[waiting++] = {arc.from, middle};
+    }
+}
+
+// The directions where the corner changes, in order against the clock; the second half are opposite to the first.
+struct Kinks {
+    Point n[6], swell[6];  // and the disc's point that is farthest along each
+    int count = 0;
+
+    explicit Kinks(const Disc& disc) {
+        const double size = std::sqrt(dot(disc.axis, disc.axis));
+        const bool leans = size > flat;
+        Point across = (1.0 / (leans ? size : 1.0)) * beside(disc);
+        if (across.y < 0.0 || (across.y == 0.0 && across.x < 0.0)) across = -across;
+        n[count++] = {1.0, 0.0};
+        if (leans && across.x > 0.0) n[count++] = across;
+        n[count++] = {0.0, 1.0};
+        if (leans && !(across.x > 0.0)) n[count++] = across;
+        for (int k = 0; k < count; ++k) {
+            swell[k] = support(disc, {0.0, 0.0}, n[k]).point;
+            n[count + k] = -n[k];
+            swell[count + k] = -swell[k];
+        }
+        count *= 2;
+    }
+};
+
+}  // namespace outline_of_disc
+
+void improve_around(const Disc& disc, Point shift, Point half, Exit& best) {
+    // A disc seen from the side has no smooth minimum.
+    if (disc.lean <= flat * flat) return;
+    const outline_of_disc::Kinks kinks(disc);
+    for (int k = 0; k < kinks.count; ++k) {
+        const int next = k + 1 < kinks.count ? k + 1 : 0;
+        const Point from = kinks.n[k], to = kinks.n[next], middle = from + to;
+        // The opposite ones are shorter.
+        if (dot(shift, from) > tie && dot(shift, to) > tie) continue;
+        const Point corner = shift + Point{std::copysign(half.x, middle.x), std::copysign(half.y, middle.y)} +
+                             std::copysign(disc.height, dot(middle, disc.axis)) * disc.axis;
+        const Point first = corner + kinks.swell[k], chord = kinks.swell[next] - kinks.swell[k];
+        const double reach = dot(from, first);
+        if (reach < best.reach - tie) best = {reach, from};
+        const double limit = best.reach - tie, area = cross(first, chord);
+        if (area > 0.0 && area * area >= limit * limit * dot(chord, chord)) continue;
+        outline_of_disc::improve_between(disc, corner, from, to, best);
+    }
+}
+
+}  // namespace mobee::narrow
