@@ -133,24 +133,6 @@ MOBEE_CALL void mobee_sines_cosines(const double* angles, std::int64_t count, do
     sines_cosines(angles, count, sines, cosines);
 }
 
-// Every link in the poses q (count, motors): (count, links, 4, 4).
-MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64_t count, double* out) {
-    Links links;
-    links.fit(*robot);
-    for (std::int64_t b = 0; b < count; ++b) {
-        place_links_at(*robot, q + b * robot->motors, links);
-        for (const Frame& frame : links.frame) {
-            for (int row = 0; row < 3; ++row) {
-                const Four values{frame.x[row], frame.y[row], frame.z[row], frame.shift[row]};
-                std::memcpy(out + 4 * row, &values, sizeof values);
-            }
-            out[12] = out[13] = out[14] = 0.0;
-            out[15] = 1.0;
-            out += 16;
-        }
-    }
-}
-
 // How a link's point, root frame at zero pose, moves with each motor in the poses q (count, motors): (count, 6, motors).
 MOBEE_CALL void mobee_jacobians(const Robot* robot, const double* q, std::int64_t count, std::int64_t link, const Vec3* point, double* out) {
     Links links;

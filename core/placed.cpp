@@ -66,7 +66,7 @@ void place(const Robot& robot, const bool* moved, Placed& placed) {
             const Four own = robot.outline[i].center, core = robot.outline[i].core;
             const Four center = own[0] * f.x + own[1] * f.y + own[2] * f.z + f.shift;
             placed.outline[i].center = with_fourth(center, own);
-            placed.outline[i].core = with_fourth(core[0] * f.x + core[1] * f.y + core[2] * f.z, core);
+            if (core[3] > 0.0) placed.outline[i].core = with_fourth(core[0] * f.x + core[1] * f.y + core[2] * f.z, core);
             placed.whole[i] = false;
         }
     }

@@ -14,9 +14,16 @@ namespace sieves {
 constexpr double margin = 1e-9;  // m: far above rounding, far below what costs time
 constexpr double tiny = 1e-30;
 
-inline const Outline& outline_at(const Scene& scene, const Placed& placed, std::int32_t slot) {
-    const auto slots = static_cast<std::int32_t>(scene.robot->slots());
-    return slot < slots ? placed.outline[slot] : scene.outline[slot - slots];
+// The outlines of slots and, behind them, of objects.
+struct Outlines {
+    const Outline *of_slots, *of_objects;
+    std::int32_t slots;
+
+    const Outline& operator[](std::int32_t k) const { return k < slots ? of_slots[k] : of_objects[k - slots]; }
+};
+
+inline Outlines outlines_of(const Scene& scene, const Placed& placed) {
+    return {placed.outline.data(), scene.outline.data(), static_cast<std::int32_t>(scene.robot->slots())};
 }
 
 // Four segments, each beside another: from the middle of the second to that of the first, both halves, and 1 over their squares; and how
@@ -27,11 +34,11 @@ struct FourPairs {
     Four vx, vy, vz, per_e;
 };
 
-inline FourPairs four_pairs(const Scene& scene, const Placed& placed, const std::int32_t* first, const std::int32_t* second) {
+inline FourPairs four_pairs(const Outlines& outlines, const std::int32_t* first, const std::int32_t* second) {
     constexpr Four turn{-1.0, -1.0, -1.0, 1.0};
     Four w[4], u[4], v[4];
     for (int k = 0; k < 4; ++k) {
-        const Outline &one = placed.outline[first[k]], &two = outline_at(scene, placed, second[k]);
+        const Outline &one = outlines.of_slots[first[k]], &two = outlines[second[k]];
         w[k] = one.center + turn * two.center;
         u[k] = one.core;
         v[k] = two.core;
@@ -61,8 +68,9 @@ void thick_ones(const Scene& scene, const Placed& placed, PairList& pairs, Array
     for (std::size_t k = count; k % 4 != 0; ++k) first[k] = second[k] = 0;  // there is room for them
     Pair* to = left.spare(count);
     const Pair* begin = to;
+    const Outlines outlines = outlines_of(scene, placed);
     for (std::size_t k = 0; k < count; k += 4) {
-        unsigned near = near_each_other(four_pairs(scene, placed, first + k, second + k));
+        unsigned near = near_each_other(four_pairs(outlines, first + k, second + k));
         if (count - k < 4) near &= (1u << (count - k)) - 1u;
         for (; near != 0; near &= near - 1) {
             const std::size_t which = k + static_cast<std::size_t>(std::countr_zero(near));
@@ -96,12 +104,13 @@ void others(const Scene& scene, Placed& placed, const PairList& pairs, Array<Pai
         return placed.box[slot];
     };
     const auto thick_at = [&](std::int32_t slot) { return is_thick(slot < slots ? robot.shape[slot].volume.kind : scene.volume[slot - slots].kind); };
+    const Outlines outlines = outlines_of(scene, placed);
     Pair* to = left.spare(pairs.size());
     const Pair* begin = to;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
         std::int32_t a = pairs.first[k], b = pairs.second[k];
         if (thick_at(b)) std::swap(a, b);
-        const Outline &one = outline_at(scene, placed, a), &two = outline_at(scene, placed, b);
+        const Outline &one = outlines[a], &two = outlines[b];
         const Box& box = box_at(b);
         const Four w = with_fourth(one.center - two.center, Four{});
         const bool near = thick_at(a) ? segment_near_box(into(box, w), into(box, one.core), box.half, one.center[3] + margin)

