@@ -35,16 +35,6 @@ struct Nearest {
 // Once the distance is known to be larger than `limit`, a lower bound of it that is larger, too.
 Nearest closest(Difference& difference, double limit);
 
-// Of two cylinders, in the axes of the first: the directions around those that are square to the axis of either.
-struct Bands {
-    Vec3 shift;  // from the first's centre to that of the second
-    Vec3 axis;   // of the second
-    double radius[2], height[2];  // half
-
-    // Whether no direction within an angle of n reaches less than `limit`, where none that is square to an axis does; tan(angle / 2).
-    bool hold(Vec3 n, double half_tangent, double limit) const;
-};
-
 struct Way {
     double reach;
     Vec3 direction;
@@ -52,6 +42,6 @@ struct Way {
 
 // The least reach of a difference that holds the origin, over all directions [m], and that direction, in the first's axes.
 // A way that is known already stays unless another is shorter by more than `tie`.
-Way way_out(Difference& difference, Way known, const Bands* bands = nullptr);
+Way way_out(Difference& difference, Way known);
 
 }  // namespace mobee::narrow
