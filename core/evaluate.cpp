@@ -101,7 +101,7 @@ MOBEE_CALL Room* mobee_room_new() { return make<Room>(); }
 
 MOBEE_CALL void mobee_room_free(Room* room) { discard(room); }
 
-// Give the rows of the last evaluation away, in the order of the poses: the numbers, and the reals; `mobee_free` ends each.
+// Give the rows of the last evaluation away, in the order of the poses: the numbers, and the reals; `mobee_rows_end` ends each.
 MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
     Rows& all = room->workers[0]->rows;
     for (std::size_t k = 1; k < room->workers.size(); ++k) {
@@ -110,8 +110,6 @@ MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
     }
     all.give(arrays);
 }
-
-MOBEE_CALL void mobee_free(void* memory) { std::free(memory); }
 
 // Find the contacts of all poses; returns how many there are.  If they are more than few, `mobee_room_rows` gives them.
 MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {

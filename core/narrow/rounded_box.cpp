@@ -1,4 +1,5 @@
 // Spheres and capsules with boxes: a point or a segment c + s h, |s| <= 1, inflated by a radius, seen from the box.
+#include "lanes.hpp"
 #include "narrow.hpp"
 
 namespace mobee::narrow {
@@ -20,49 +21,50 @@ inline Span span_within(double x, double h, double k, double least_square) {
 
 inline double outer(double s, Span span) { return most(s - span.high, 0.0) - most(span.low - s, 0.0); }
 
-// Half the derivative of the squared distance along the segment never falls, and is linear between the ends of the spans.
-struct Slope {
-    Span x, y, z;
-    Vec3 weight;
-    double left = -1.0, under = -1.0, right = 1.0, over = 1.0;  // where it changes sign, and its values there
-
-    // Draw in to the knot s if it is nearer.
-    void narrow_to(double s) {
-        const double slope = weight.x * outer(s, x) + weight.y * outer(s, y) + weight.z * outer(s, z);
-        if (slope <= 0.0 && s >= left) left = s, under = slope;
-        if (slope >= 0.0 && s <= right) right = s, over = slope;
-    }
+// The same along all three axes at once; the fourth numbers are those of a parallel line.
+struct Spans {
+    Four low, high;
 };
 
+inline Spans spans_within(Four c, Four h, Four k, double least_square) {
+    const Four middle = -c / h, reach = absolute_of(k / h);
+    const auto parallel = h * h <= least_square;
+    return {parallel ? Four{} - far : middle - reach, parallel ? Four{} + far : middle + reach};
+}
+
+// Half the derivative of the squared distance at four places along the segment.  It never falls, and is linear between the ends of the
+// spans.
+inline Four slopes(Four s, const Spans& spans, Four weight) {
+    const Four none{};
+    Four slope{};
+    for (int axis = 0; axis < 3; ++axis)
+        slope += weight[axis] * (most_of(s - spans.high[axis], none) - most_of(spans.low[axis] - s, none));
+    return slope;
+}
+
+inline double most_of_three(Four v) { return most(most(v[0], v[1]), v[2]); }
+inline double least_of_three(Four v) { return least(least(v[0], v[1]), v[2]); }
+
 // The s that brings the segment closest to the box of half edges k about the origin: the middle of all such s.
-double closest_to_box(Vec3 c, Vec3 h, Vec3 k) {
-    const double least_square = flat * flat * dot(h, h);
-    const Span x = span_within(c.x, h.x, k.x, least_square), y = span_within(c.y, h.y, k.y, least_square),
-               z = span_within(c.z, h.z, k.z, least_square);
-    const double low = most(most(x.low, y.low), most(z.low, -1.0)), high = least(least(x.high, y.high), least(z.high, 1.0));
+double closest_to_box(Vec3 center, Vec3 half_core, Vec3 half) {
+    const Four c = four(center), h = four(half_core), k = four(half);
+    const Spans spans = spans_within(c, h, k, flat * flat * dot(half_core, half_core));
+    const double low = most(most_of_three(spans.low), -1.0), high = least(least_of_three(spans.high), 1.0);
     if (low <= high) return (low + high) / 2.0;
-    Slope slope{x, y, z, {h.x * h.x, h.y * h.y, h.z * h.z}};
-    for (const double knot : {-1.0, x.low, x.high, y.low, y.high, z.low, z.high, 1.0}) slope.narrow_to(unit(knot));
-    if (slope.left >= slope.right) return slope.right;
-    return slope.left + (slope.right - slope.left) * (slope.under / (slope.under - slope.over));
+    // Where the slope changes its sign: between the last knot where it is not above 0 and the first where it is not below.
+    const Four weight = h * h, none{};
+    const Four a = unit_of(Four{-1.0, spans.low[0], spans.low[1], spans.low[2]}), b = unit_of(Four{1.0, spans.high[0], spans.high[1], spans.high[2]});
+    const Four at_a = slopes(a, spans, weight), at_b = slopes(b, spans, weight);
+    const Four last = most_of(at_a <= none ? a : none - 1.0, at_b <= none ? b : none - 1.0);
+    const Four first = least_of(at_a >= none ? a : none + 1.0, at_b >= none ? b : none + 1.0);
+    const double left = most(most_of_three(last), last[3]), right = least(least_of_three(first), first[3]);
+    if (left >= right) return right;
+    const Four ends = slopes(Four{left, right, left, right}, spans, weight);
+    return left + (right - left) * (ends[0] / (ends[0] - ends[1]));
 }
 
 inline double beyond(double x, double k) { return x - clamp(x, -k, k); }
 inline Vec3 beyond(Vec3 p, Vec3 k) { return {beyond(p.x, k.x), beyond(p.y, k.y), beyond(p.z, k.z)}; }
-
-// A lower bound of the distance of the core from the box: along the box's axes, and across the core and one of them.
-double distance_bound(Vec3 c, Vec3 h, Vec3 k) {
-    const Vec3 a = absolute(h), m = cross(c, h);
-    const Vec3 d = {most(std::fabs(c.x) - a.x - k.x, 0.0), most(std::fabs(c.y) - a.y - k.y, 0.0), most(std::fabs(c.z) - a.z - k.z, 0.0)};
-    double squared = dot(d, d);
-    double gap = most(std::fabs(m.x) - k.y * a.z - k.z * a.y, 0.0), length = a.y * a.y + a.z * a.z;
-    if (gap * gap > squared * length) squared = gap * gap / length;
-    gap = most(std::fabs(m.y) - k.z * a.x - k.x * a.z, 0.0), length = a.z * a.z + a.x * a.x;
-    if (gap * gap > squared * length) squared = gap * gap / length;
-    gap = most(std::fabs(m.z) - k.x * a.y - k.y * a.x, 0.0), length = a.x * a.x + a.y * a.y;
-    if (gap * gap > squared * length) squared = gap * gap / length;
-    return std::sqrt(squared);
-}
 
 // A contact given in the box's own axes.
 Touch from_box(const Volume& box, Vec3 normal, Vec3 point) {
@@ -143,8 +145,6 @@ double sphere_box(const Volume& a, const Volume& b, Touch& touch) {
 
 double capsule_box(const Volume& a, const Volume& b, Touch& touch) {
     const Vec3 c = into(b.rotation, a.center - b.center), h = into(b.rotation, a.core);
-    const double bound = rounded_box::distance_bound(c, h, b.half);
-    if (bound >= a.radius) return a.radius - bound;
     const Vec3 p = c + rounded_box::closest_to_box(c, h, b.half) * h, d = rounded_box::beyond(p, b.half);
     const double squared = dot(d, d);
     if (squared >= a.radius * a.radius) return a.radius - std::sqrt(squared);

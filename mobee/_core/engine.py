@@ -46,7 +46,7 @@ class _Memory:
         self._at = at
 
     def __del__(self) -> None:
-        _free(self._at)
+        _rows_end(self._at)
 
 
 def _rows(take: Callable[[int, int], None], at: int, count: int) -> tuple[Ints, Array]:
@@ -96,7 +96,7 @@ _scene_free = function("scene_free", ADDRESS)
 _room_new = function("room_new", result=ADDRESS)
 _room_free = function("room_free", ADDRESS)
 _room_rows = function("room_rows", ADDRESS, ADDRESS)
-_free = function("free", ADDRESS)
+_rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 _evaluate_one = function("evaluate_one", ADDRESS, ADDRESS, BYTES, result=INTEGER)
 _link_poses = function("link_poses", ADDRESS, ADDRESS, BYTES, INTEGER, ADDRESS)
