@@ -23,6 +23,7 @@ class Refused(Exception):
         self.reason = reason
 
 
+@cache
 def encoding_of(cls: type[Struct]) -> str:
     """The encoding string that travels with a message of this type."""
     return f"application/msgpack;icub/{cls.__name__}/{VERSION}"
@@ -92,8 +93,11 @@ def _length_kind(hint: Any) -> str | None:
 def _check_lengths(message: Struct, part: int | None, robot: int | None) -> None:
     for name, kind in _vectors(type(message)):
         expected, value = part if kind == "part" else robot, getattr(message, name)
-        if expected is not None and value is not None and len(value) != expected:
-            raise Refused("length", f"{type(message).__name__}.{name}: {len(value)} numbers, expected {expected}")
+        if expected is None or value is None:
+            continue
+        for vector in value.values() if isinstance(value, dict) else (value,):
+            if len(vector) != expected:
+                raise Refused("length", f"{type(message).__name__}.{name}: {len(vector)} numbers, expected {expected}")
 
 
 @cache

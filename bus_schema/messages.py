@@ -18,6 +18,7 @@ Quaternion = Annotated[list[float], Meta(min_length=4, max_length=4)]
 Matrix3 = Annotated[list[float], Meta(min_length=9, max_length=9)]  # row-major
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Text = Annotated[str, Meta(max_length=2000)]
+Link = Annotated[int, Meta(ge=-1)]  # index of the link that carries a shape, -1 = none does
 Count = Annotated[int, Meta(ge=0, le=2**62)]  # differences of two still fit into msgpack
 
 Mode = Literal["position", "velocity", "torque", "hold"]
@@ -127,17 +128,6 @@ class Targets(Message, frozen=True, kw_only=True):
     positions: dict[Name, Vector3]  # m
 
 
-class Forces(Message, frozen=True, kw_only=True):
-    """Constraint forces at tick re_k (thesis eqs. 5.11-5.17)."""
-
-    re_k: Count
-    limits: RobotVector  # rad/s^2
-    constraints: RobotVector  # rad/s^2
-    collision: RobotVector  # rad/s^2
-    part_age: dict[str, int]  # ns between the part's sample and tick re_k
-    touched: dict[str, list[Name]]  # part -> world objects in contact
-
-
 class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
     """A marker in the root frame."""
 
@@ -163,6 +153,18 @@ class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
     depth: float  # m
     point: Vector3  # m
     normal: Vector3  # the way `first` must go
+    first_link: Link
+    second_link: Link
+
+
+class Forces(Message, frozen=True, kw_only=True):
+    """Terms of the law at tick re_k (thesis eqs. 5.11-5.17); of the controller: those that it has from outside."""
+
+    re_k: Count
+    terms: dict[Name, RobotVector]  # rad/s^2, by name, in the order in which they are added
+    part_age: dict[str, int]  # ns between the part's sample and tick re_k
+    touched: dict[str, list[Name]]  # part -> world objects in contact
+    contacts: list[ContactItem] | None = None  # all at that tick, where the controller has terms that may depend on them
 
 
 class Contacts(Message, frozen=True, kw_only=True):

@@ -1,3 +1,3 @@
 """The version of the contract: a receiver refuses every other one."""
 
-VERSION = 2
+VERSION = 3

@@ -54,6 +54,15 @@ public:
 
     void clear() { size_ = 0; }
 
+    // Where up to `count` more elements can be written behind the last; `extend` then says how many were.
+    T* spare(std::size_t count) {
+        if (size_ + count > room_) reserve(size_ + count + room_);
+        return data_ + size_;
+    }
+
+    void extend(std::size_t count) { size_ += count; }
+    void shorten(std::size_t size) { size_ = size; }
+
     void reserve(std::size_t room) {
         if (room <= room_) return;
         void* larger = std::aligned_alloc(64, (room * sizeof(T) + 63) / 64 * 64);

@@ -1,4 +1,4 @@
-// A contact of one pose.
+// The contacts of one pose, and what they do to the motors.
 #pragma once
 
 #include <cstdint>

@@ -8,3 +8,10 @@
 #include <cstdint>
 
 #define MOBEE_CALL extern "C" __attribute__((visibility("default")))
+
+namespace mobee {
+
+// Raise it when a function changes its arguments or its meaning, and with it ABI in mobee/_core/__init__.py.
+constexpr std::int64_t abi = 1;
+
+}  // namespace mobee

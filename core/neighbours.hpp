@@ -4,12 +4,10 @@
 #include <cstdint>
 
 #include "contact.hpp"
-#include "robot.hpp"
 
 namespace mobee {
 
-struct Scene;       // a robot among the free objects of one state of the world
-struct Neighbours;  // what one user remembers from pose to pose
+struct Neighbours;  // what one user remembers from pose to pose, of a robot in a scene; mobee/engine/track.py makes it
 
 // Find the contacts in the pose q (motors,); returns how many, in no order.
 std::int64_t find(Neighbours& near, const double* q);

@@ -47,21 +47,20 @@ inline Vec3 into(const Rotation& r, Vec3 v) {
             r.m[2] * v.x + r.m[5] * v.y + r.m[8] * v.z};
 }
 
-// Where a link has gone from its place at zero pose: three rows of (rotation, shift).
+// Four numbers in one register; of a vector the fourth is whatever its user says.
+typedef double Four __attribute__((vector_size(32)));
+
+inline Vec3 three(Four v) { return {v[0], v[1], v[2]}; }
+inline Four four(Vec3 v) { return Four{v.x, v.y, v.z, 0.0}; }
+
+// Where a link has gone from its place at zero pose: the columns of its rotation, and its shift.  The fourth numbers are 0.
 struct Frame {
-    double m[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    Four x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, shift{0.0, 0.0, 0.0, 0.0};
 };
 
-inline Vec3 turn(const Frame& f, Vec3 v) {
-    return {f.m[0] * v.x + f.m[1] * v.y + f.m[2] * v.z,
-            f.m[4] * v.x + f.m[5] * v.y + f.m[6] * v.z,
-            f.m[8] * v.x + f.m[9] * v.y + f.m[10] * v.z};
-}
-
-inline Vec3 move(const Frame& f, Vec3 p) {
-    return {f.m[0] * p.x + f.m[1] * p.y + f.m[2] * p.z + f.m[3],
-            f.m[4] * p.x + f.m[5] * p.y + f.m[6] * p.z + f.m[7],
-            f.m[8] * p.x + f.m[9] * p.y + f.m[10] * p.z + f.m[11]};
-}
+inline Four turned(const Frame& f, Vec3 v) { return v.x * f.x + v.y * f.y + v.z * f.z; }
+inline Four moved(const Frame& f, Vec3 p) { return turned(f, p) + f.shift; }
+inline Vec3 turn(const Frame& f, Vec3 v) { return three(turned(f, v)); }
+inline Vec3 move(const Frame& f, Vec3 p) { return three(moved(f, p)); }
 
 }  // namespace mobee

@@ -1,7 +1,7 @@
 """A hand is drawn to a point: once as a path in advance, once as a force while everything else acts too (thesis Algorithm 5).
 
-`reach_path` is kinematics alone. A `Reacher` pulls at the marker through the Jacobian transpose, tick by tick, and the limits,
-constraints and contacts of example 04 act as ever. Out of reach it rests where it is nearest.
+`reach_path` is kinematics alone. A `Reacher` has the controller draw the marker with the whole body, tick by tick, and the limits,
+constraints and contacts of example 04 act as ever. Out of reach it rests where no small motion brings it nearer.
 """
 
 from __future__ import annotations

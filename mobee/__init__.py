@@ -1,37 +1,79 @@
 """A humanoid that learns by curiosity to plan and to reach, while a reactive layer keeps it safe."""
 
-from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
-from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, constraint_forces, reach_path
-from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
-from mobee.learning.agent import CuriousAgent
-from mobee.learning.lattice import Lattice
-from mobee.learning.parallel import run
-from mobee.learning.planner import Plan, Planner
-from mobee.learning.policy_iteration import policy_iteration
-from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.space import Space
-from mobee.learning.transitions import TransitionModel
-from mobee.learning.value_iteration import value_iteration
-from mobee.learning.voronoi import Voronoi
-from mobee.model import Model, Pose
-from mobee.plant import Outcome, Plant
-from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
-from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
-from mobee.roadmap.adaptive.explorer import MapExplorer
-from mobee.roadmap.adaptive.state_space import roadmap_space
-from mobee.roadmap.adaptive.walker import Walker
-from mobee.roadmap.building import tasks
-from mobee.roadmap.building.build import build_roadmap
-from mobee.roadmap.building.front import Front
-from mobee.roadmap.evolution.nes import NES
-from mobee.roadmap.evolution.search import Restart, minimize
-from mobee.roadmap.ik import costs
-from mobee.roadmap.ik.ngik import IK, solve_ik
-from mobee.roadmap.roadmap import Roadmap, load_roadmap
-from mobee.robot.join import join_robots
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Robot
-from mobee.simulation import MotorParameters, OfflinePlant, run_batch
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
+    from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
+    from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
+    from mobee.learning.agent import CuriousAgent
+    from mobee.learning.lattice import Lattice
+    from mobee.learning.parallel import run
+    from mobee.learning.planner import Plan, Planner
+    from mobee.learning.policy_iteration import policy_iteration
+    from mobee.learning.reaching.reach_agent import ReachAgent
+    from mobee.learning.space import Space
+    from mobee.learning.transitions import TransitionModel
+    from mobee.learning.value_iteration import value_iteration
+    from mobee.learning.voronoi import Voronoi
+    from mobee.model import Model, Pose
+    from mobee.plant import Outcome, Plant
+    from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
+    from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+    from mobee.roadmap.adaptive.explorer import MapExplorer
+    from mobee.roadmap.adaptive.state_space import roadmap_space
+    from mobee.roadmap.adaptive.walker import Walker
+    from mobee.roadmap.building import tasks
+    from mobee.roadmap.building.build import build_roadmap
+    from mobee.roadmap.building.front import Front
+    from mobee.roadmap.evolution.nes import NES
+    from mobee.roadmap.evolution.search import Restart, minimize
+    from mobee.roadmap.ik import costs
+    from mobee.roadmap.ik.ngik import IK, solve_ik
+    from mobee.roadmap.roadmap import Roadmap, load_roadmap
+    from mobee.robot.join import join_robots
+    from mobee.robot.load import load_robot, load_world
+    from mobee.robot.robot import Robot
+    from mobee.simulation import MotorParameters, OfflinePlant, run_batch
+
+_MODULES = {
+    "mobee.collision": "Contact Geometry World WorldObject box capsule cylinder sphere",
+    "mobee.control": "Command Controller Forces Gains Reacher ReachPath Term constraint_forces reach_path",
+    "mobee.errors": "ActionInterrupted InvalidValue MobeeError RobotFileError UnknownName",
+    "mobee.learning.agent": "CuriousAgent",
+    "mobee.learning.lattice": "Lattice",
+    "mobee.learning.parallel": "run",
+    "mobee.learning.planner": "Plan Planner",
+    "mobee.learning.policy_iteration": "policy_iteration",
+    "mobee.learning.reaching.reach_agent": "ReachAgent",
+    "mobee.learning.space": "Space",
+    "mobee.learning.transitions": "TransitionModel",
+    "mobee.learning.value_iteration": "value_iteration",
+    "mobee.learning.voronoi": "Voronoi",
+    "mobee.model": "Model Pose",
+    "mobee.plant": "Outcome Plant",
+    "mobee.reach": "ReachOutcome ReachPlant ReachTarget",
+    "mobee.roadmap.adaptive.adaptive": "AdaptiveRoadmap",
+    "mobee.roadmap.adaptive.explorer": "MapExplorer",
+    "mobee.roadmap.adaptive.state_space": "roadmap_space",
+    "mobee.roadmap.adaptive.walker": "Walker",
+    "mobee.roadmap.building": "tasks",
+    "mobee.roadmap.building.build": "build_roadmap",
+    "mobee.roadmap.building.front": "Front",
+    "mobee.roadmap.evolution.nes": "NES",
+    "mobee.roadmap.evolution.search": "Restart minimize",
+    "mobee.roadmap.ik": "costs",
+    "mobee.roadmap.ik.ngik": "IK solve_ik",
+    "mobee.roadmap.roadmap": "Roadmap load_roadmap",
+    "mobee.robot.join": "join_robots",
+    "mobee.robot.load": "load_robot load_world",
+    "mobee.robot.robot": "Robot",
+    "mobee.simulation": "MotorParameters OfflinePlant run_batch",
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
     "ActionInterrupted",
@@ -69,6 +111,7 @@ __all__ = [
     "Robot",
     "RobotFileError",
     "Space",
+    "Term",
     "TransitionModel",
     "UnknownName",
     "Voronoi",
@@ -96,3 +139,17 @@ __all__ = [
     "tasks",
     "value_iteration",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the module of a public name when the name is first used: a process loads what it needs."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'mobee' has no attribute {name!r}")
+    module = importlib.import_module(_HOME[name])
+    value = getattr(module, name, None) or importlib.import_module(f"{_HOME[name]}.{name}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

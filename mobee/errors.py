@@ -35,5 +35,9 @@ class UnknownName(MobeeError, KeyError):
         return str(self.args[0])
 
 
+class NotInstalled(MobeeError):
+    """A package or a built library that is not there, or not for this machine; the message holds the remedy."""
+
+
 class ActionInterrupted(MobeeError):
     """An action that ended without an outcome (hold, fault, or a new run): it is not an observation."""

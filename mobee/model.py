@@ -13,7 +13,7 @@ from mobee.collision.snapshot import EMPTY
 from mobee.collision.world import World, link_pose
 from mobee.collision.world_object import seen_from
 from mobee.engine import engine_of
-from mobee.engine.hands import MOST, Hand, hands, hands_of
+from mobee.engine.hands import MOST, NOBODY, Hand, Hands
 from mobee.errors import InvalidValue, UnknownName
 from mobee.pose import Engine, Pose
 from mobee.real_array import real_array
@@ -42,7 +42,7 @@ class Model:
         self._engine = _engine(robot, engine)
         self._motors = len(robot.motor_table)
         self._reaching: str | tuple[str, ...] | None = None
-        self._hands = hands()
+        self._hands: Hands = NOBODY
         self._hand_of: dict[str, Hand] = {}
 
     @property
@@ -55,13 +55,13 @@ class Model:
         markers = () if marker is None else (marker,) if isinstance(marker, str) else tuple(marker)
         if len(markers) > MOST:
             raise InvalidValue(f"{len(markers)} markers reach at once: {', '.join(markers)}; at most {MOST} may")
-        self._hands = hands(*(self.hand(one) for one in markers))
+        self._hands = tuple(self.hand(one) for one in markers)
         self._reaching = marker
 
     @property
-    def hands(self) -> tuple[Hand, ...]:
+    def hands(self) -> Hands:
         """Those of the markers that reach."""
-        return hands_of(self._hands)
+        return self._hands
 
     def hand(self, marker: str) -> Hand:
         """What does not feel the targets while that marker reaches: its link with all that this carries.
@@ -76,8 +76,8 @@ class Model:
     def _found_hand(self, link: int, marker: str) -> Hand:
         home = self.robot.home.copy()
         speck = World()
-        speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, hands()).position(marker))
-        table, _ = self._engine.contacts(home[None], speck.snapshot, hands())
+        speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, NOBODY).position(marker))
+        table, _ = self._engine.contacts(home[None], speck.snapshot, NOBODY)
         around = set(table.first_link[(table.kind == 1) & (table.second_link < 0)].tolist())
         fields = here = link
         part = self._part_of(link)

@@ -11,6 +11,7 @@ from mobee.collision.contact import Contact, ContactTable
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.world import link_pose
 from mobee.collision.world_object import WorldObject, placed
+from mobee.engine.hands import Hands
 from mobee.errors import InvalidValue
 from mobee.kinematics.jacobian import point_jacobian
 from mobee.robot.robot import Array, Ints, Robot
@@ -19,7 +20,7 @@ from mobee.robot.robot import Array, Ints, Robot
 class Finder(Protocol):
     """What finds contacts."""
 
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int) -> tuple[ContactTable, Array]:
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
 
 
@@ -32,7 +33,7 @@ class Engine(Protocol):
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
         """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
 
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
 
 
@@ -44,12 +45,13 @@ class Pose:
 
     # Kept by hand: functools.cached_property takes one lock for all poses before Python 3.12, and no evaluation may wait for another.
 
-    def __init__(self, robot: Robot, engine: Engine, q: Array, snapshot: Snapshot, reaching: int) -> None:
+    def __init__(self, robot: Robot, engine: Engine, q: Array, snapshot: Snapshot, reaching: Hands, threads: int = 1) -> None:
         self.robot = robot
         self.q = q
         self._engine = engine
         self._snapshot = snapshot
         self._reaching = reaching
+        self._threads = threads
         self._transforms: Array | None = None
         self._felt: tuple[ContactTable, Array] | None = None
         self._contacts: tuple[Contact, ...] | None = None
@@ -98,7 +100,7 @@ class Pose:
     @property
     def projection_of_part(self) -> Array:
         """The projection, cut where a part ends, as in the original program: an arm's contact does not reach the torso."""
-        return self._engine.contacts(self._flat, self._snapshot, self._reaching, cut=True)[1].reshape(self.q.shape)
+        return self._engine.contacts(self._flat, self._snapshot, self._reaching, True, self._threads)[1].reshape(self.q.shape)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -145,5 +147,5 @@ class Pose:
 
     def _feel(self) -> tuple[ContactTable, Array]:
         if self._felt is None:
-            self._felt = self._engine.contacts(self._flat, self._snapshot, self._reaching)
+            self._felt = self._engine.contacts(self._flat, self._snapshot, self._reaching, False, self._threads)
         return self._felt

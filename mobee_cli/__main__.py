@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from typing import NoReturn
 
-from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
+from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, INTERRUPTED, UserError
 
 VERBS = {
     "launch": "start a scenario and keep it running",
@@ -81,9 +81,20 @@ def _run(verb: str, arguments: list[str]) -> int:
     except UserError as error:
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return error.code
+    except Exception as error:
+        if not _is_not_installed(error):
+            raise
+        print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
+        return ENVIRONMENT
     except KeyboardInterrupt:  # a verb that is meant to end so does not let it come here
         print(f"mobee {verb}: interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+def _is_not_installed(error: Exception) -> bool:
+    """Whether the library misses a package or its core; most verbs start without the library, and no other makes it load."""
+    errors = sys.modules.get("mobee.errors")
+    return errors is not None and isinstance(error, errors.NotInstalled)
 
 
 def _usage() -> str:

@@ -27,7 +27,7 @@ from experiments.run_folder import (
     write,
 )
 from experiments.sweep import CellsFailed
-from mobee.errors import InvalidValue, MobeeError
+from mobee.errors import InvalidValue, MobeeError, NotInstalled
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
 from mobee_cli.results_text import results_text
 
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
             return _figure(arguments)
         experiment = load_experiment(arguments.name)
         return _run(experiment, _options(experiment, arguments.make_parser, arguments.options))
-    except MatplotlibMissing as error:
+    except (MatplotlibMissing, NotInstalled) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None

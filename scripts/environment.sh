@@ -1,9 +1,8 @@
-# Sourced by ./launch and ./test: makes .venv from requirements.lock when it is missing or stale, and compiles the engine.
+# Sourced by ./launch and ./test: makes .venv from a lock file when it is missing or stale, and builds the native core.
 # shellcheck shell=bash
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 venv="$root/.venv"
-
 say() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; }
 
 # Prints the interpreter to use: python3.11 first, because PyBullet has wheels for no later one.
@@ -19,7 +18,7 @@ find_python() {
   return 1
 }
 
-# Prints three words: the Python version, what the installed dependencies and what the installed project depend on.
+# Prints four words: the Python version, and what the packages to run, those to test and the installed project depend on.
 fingerprints() {
   "$1" - "$root" <<'PYTHON'
 import hashlib, pathlib, sys
@@ -33,7 +32,7 @@ def digest(*names):
     return hashlib.sha256(f"{version} {root} ".encode() + text).hexdigest()
 
 
-print(version, digest("requirements.lock"), digest("requirements.lock", "pyproject.toml"))
+print(version, digest("requirements.lock"), digest("requirements-dev.lock"), digest("requirements.lock", "pyproject.toml"))
 PYTHON
 }
 
@@ -41,53 +40,117 @@ is_current() { # stamp file name, fingerprint
   [[ -x "$venv/bin/python" && "$(cat "$venv/$1" 2>/dev/null)" == "$2" ]] && "$venv/bin/python" -c '' 2>/dev/null
 }
 
-install_environment() { # interpreter, fingerprint of the dependencies, fingerprint of the project
-  local pip=("$venv/bin/python" -m pip install --quiet --quiet --no-input --disable-pip-version-check)
-  if ! is_current stamp-dependencies "$2"; then
-    local start=$SECONDS
-    say "installing the environment into .venv: once, one or two minutes and 3 GB ..."
-    rm -rf "$venv"
-    if ! "$1" -m venv "$venv"; then
-      say "$1 cannot make a virtual environment: install its venv module (Debian: apt install python3-venv)."
-      return 1
-    fi
-    if ! "${pip[@]}" --require-hashes -r "$root/requirements.lock"; then
-      say "the installation failed, see above; .venv is marked unfinished and will be made anew by the next call."
-      return 1
-    fi
-    echo "$2" >"$venv/stamp-dependencies"
-    say "installed in $((SECONDS - start)) s."
-  fi
-  if ! is_current stamp-project "$3"; then
-    rm -f "$venv/stamp-project"
-    if ! "${pip[@]}" --no-deps --no-build-isolation --editable "$root"; then
-      say "the project itself did not install, see above: is pyproject.toml well-formed?"
-      return 1
-    fi
-    echo "$3" >"$venv/stamp-project"
+pip() { "$venv/bin/python" -m pip --no-input --disable-pip-version-check "$@"; }
+
+make_venv() { # interpreter
+  rm -rf "$venv"
+  if ! "$1" -m venv "$venv"; then
+    say "$1 cannot make a virtual environment: install its venv module (Debian: apt install python3-venv)."
+    return 1
   fi
 }
 
-# Leaves a complete .venv behind or returns non-zero with one line that says why.
+# Byte code is written when a module is first imported: most never are.
+install_packages() { # lock file, its size in words
+  local log="$venv/pip.log" code=0 counter=""
+  say "1 of 3: $(grep -c '^[a-z].*==' "$1") packages into .venv, $2 ..."
+  : >"$log"
+  if [[ -t 2 ]]; then count_packages "$log" & counter=$!; fi
+  pip install --progress-bar off --no-compile --require-hashes -r "$1" >"$log" 2>&1 || code=$?
+  if [[ -n "$counter" ]]; then
+    kill "$counter" 2>/dev/null || true
+    wait "$counter" 2>/dev/null || true
+    printf '\r\033[K' >&2
+  fi
+  ((code == 0)) || grep -v '^WARNING' "$log" | tail -n 12 >&2
+  return "$code"
+}
+
+count_packages() { # what pip says
+  local before all
+  before="$(installed_packages)"
+  while kill -0 $$; do # a Ctrl-C does not come here
+    all="$(sed -n 's/^Installing collected packages: //p' "$1" | wc -w)"
+    if ((all > 0)); then
+      printf '\r  unpacked: %d of %d   ' $(($(installed_packages) - before)) "$all" >&2
+    else
+      printf '\r  downloaded: %d   ' "$(grep -c '^Collecting' "$1")" >&2
+    fi
+    sleep 0.3
+  done
+}
+
+installed_packages() { find "$venv" -maxdepth 5 -name '*.dist-info' | wc -l; }
+
+core_is_current() { "$venv/bin/python" "$root/core/build.py" --check "${core[@]}"; }
+
+# Builds the core by the system's compiler; where there is none, by one that is fetched for it and removed again.
+build_core() { # options of core/build.py
+  local code=0 folder="$venv/compiler"
+  "$venv/bin/python" "$root/core/build.py" "$@" >/dev/null 2>"$venv/core.log" || code=$?
+  if ((code == 3)); then
+    say "2 of 3: fetching a compiler for the native core, as here is none: 100 MB to download, 400 MB on disk, removed afterwards ..."
+    rm -rf "$folder"
+    pip install --quiet --quiet --no-compile --require-hashes --target "$folder" -r "$root/core/compiler.lock" || return 1
+    code=0
+    PYTHONPATH="$folder" "$venv/bin/python" "$root/core/build.py" "$@" >/dev/null 2>"$venv/core.log" || code=$?
+    rm -rf "$folder"
+  fi
+  ((code == 0)) || cat "$venv/core.log" >&2
+  return "$code"
+}
+
+# Does what ensure_environment found to be missing; its variables are seen here.
+install_environment() {
+  local start=$SECONDS
+  if ! is_current "stamp-$kind" "$packages"; then
+    is_current stamp-run "$run" || make_venv "$python" || return 1
+    rm -f "$venv/stamp-run" "$venv/stamp-dev"
+    # What was cut down to run is whole again to test.
+    if [[ -s "$venv/trimmed" ]]; then xargs "$venv/bin/python" -m pip uninstall --quiet --quiet --yes <"$venv/trimmed"; fi
+    if ! install_packages "$root/$lock" "$size"; then
+      say "the installation failed, see above; .venv is marked unfinished and will be made anew by the next call."
+      return 1
+    fi
+    if [[ "$kind" == run ]]; then "$venv/bin/python" "$root/scripts/trim.py" >"$venv/trimmed"; else rm -f "$venv/trimmed"; fi
+    echo "$run" >"$venv/stamp-run"
+    echo "$packages" >"$venv/stamp-$kind"
+  fi
+  if ! core_is_current; then
+    say "2 of 3: building the native core, some seconds ..."
+    build_core "${core[@]}" || return 1
+  fi
+  if ! is_current stamp-project "$project"; then
+    say "3 of 3: the project itself ..."
+    rm -f "$venv/stamp-project"
+    if ! pip install --quiet --quiet --no-deps --no-build-isolation --editable "$root"; then
+      say "the project itself did not install, see above: is pyproject.toml well-formed?"
+      return 1
+    fi
+    echo "$project" >"$venv/stamp-project"
+  fi
+  say "installed in $((SECONDS - start)) s."
+}
+
+# Leaves a complete .venv behind, with what ./test needs too if told "dev", or returns non-zero with one line that says why.
 ensure_environment() {
-  local python version dependencies project
+  local kind="${1:-run}" python version run dev project packages lock size core=()
   python="$(find_python)" || return 1
-  read -r version dependencies project < <(fingerprints "$python")
+  read -r version run dev project < <(fingerprints "$python")
   if [[ "$version" != 3.11 ]]; then
     say "Python $version: PyBullet has no wheel for it, so the robot runs on its kinematic back-end only; install python3.11 for the physics."
   fi
-  if is_current stamp-dependencies "$dependencies" && is_current stamp-project "$project"; then
+  # Sizes are those on Linux with Python 3.11.  Whoever only runs MoBeE may have a compiler whose warnings the project has not seen.
+  if [[ "$kind" == dev ]]; then
+    packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one to three minutes"
+  else
+    packages="$run" lock=requirements.lock core=(--here --no-strict) size="400 MB to download and 1 GB on disk, half a minute to one"
+  fi
+  if is_current "stamp-$kind" "$packages" && is_current stamp-project "$project" && core_is_current; then
     return
   fi
   ( # two calls at once: the second waits for the first, where flock exists
     if command -v flock >/dev/null; then flock 9; fi
-    install_environment "$python" "$dependencies" "$project"
+    install_environment
   ) 9>"$root/.venv.lock"
-}
-
-# Compiles the model's engine when its machine code is missing or its sources have changed; says how far it is.
-ensure_engine() {
-  local folder
-  folder="$("$venv/bin/python" -I "$root/mobee/engine/cache.py")" || return 1
-  [[ -e "$folder/ready" ]] || (cd "$root" && "$venv/bin/python" -m mobee.engine >/dev/null)
 }

@@ -15,6 +15,7 @@ import yaml
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+RUN_EXTRAS = ("sim", "viz")
 HEAVY = {"zenoh", "rerun", "pybullet", "cv2", "services", "bus_schema"}
 
 
@@ -23,25 +24,44 @@ def tracked_files() -> list[Path]:
     return [path for name in listing.split("\0") if name and (path := ROOT / name).is_file()]
 
 
-def requirements() -> list[str]:
-    text = (ROOT / "requirements.lock").read_text().replace("\\\n", " ")
+LOCKS = ("requirements.lock", "requirements-dev.lock", "core/compiler.lock")
+
+
+def locked(lock: str) -> list[str]:
+    text = (ROOT / lock).read_text().replace("\\\n", " ")
     return [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
 
 
-def test_every_locked_requirement_is_pinned_and_hashed() -> None:
-    locked = requirements()
-    assert len(locked) > 20
-    assert [line for line in locked if not re.match(r"[a-z0-9.-]+==\S+ .*--hash=sha256:[0-9a-f]{64}", line)] == []
+def names(requirements: list[str]) -> set[str]:
+    return {re.match(r"[\w.-]+", line)[0] for line in requirements}
 
 
-def test_lock_names_no_index() -> None:
-    assert re.findall(r"https?://|file:|--index|--extra-index|--find-links|--trusted", (ROOT / "requirements.lock").read_text()) == []
+@pytest.mark.parametrize("lock", LOCKS)
+def test_every_locked_requirement_is_pinned_and_hashed(lock: str) -> None:
+    assert [line for line in locked(lock) if not re.match(r"[a-z0-9.-]+==\S+ .*--hash=sha256:[0-9a-f]{64}", line)] == []
 
 
-def test_lock_holds_every_declared_dependency() -> None:
-    groups = [PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()]
-    declared = {re.match(r"[\w.-]+", line)[0] for group in groups for line in group}
-    assert declared <= {line.split("==")[0] for line in requirements()}
+@pytest.mark.parametrize("lock", LOCKS)
+def test_lock_names_no_index(lock: str) -> None:
+    assert re.findall(r"https?://|file:|--index|--extra-index|--find-links|--trusted", (ROOT / lock).read_text()) == []
+
+
+def test_locks_hold_what_is_declared() -> None:
+    extras = PROJECT["optional-dependencies"]
+    run = names([*PROJECT["dependencies"], *(line for extra in RUN_EXTRAS for line in extras[extra])])
+    assert run <= names(locked("requirements.lock"))
+    assert run | names([line for lines in extras.values() for line in lines]) <= names(locked("requirements-dev.lock"))
+
+
+def test_what_runs_is_tested_in_the_same_versions() -> None:
+    assert {line.split()[0] for line in locked("requirements.lock")} <= {line.split()[0] for line in locked("requirements-dev.lock")}
+
+
+def test_only_what_runs_is_installed_to_run() -> None:
+    extras = {name: names(lines) for name, lines in PROJECT["optional-dependencies"].items()}
+    others = set().union(*(extras[name] for name in extras if name not in RUN_EXTRAS)) - set().union(*(extras[name] for name in RUN_EXTRAS))
+    needed_by_others = {"psutil", "pyarrow"}  # of rerun-sdk
+    assert names(locked("requirements.lock")) & others <= needed_by_others
 
 
 def test_no_tracked_file_names_a_machine_or_a_registry() -> None:
@@ -104,13 +124,13 @@ def bare_clone(tmp_path: Path) -> Path:
     """The scripts alone, with an empty bin/ that comes first on the path of `ensure`."""
     for folder in ("bin", "scripts"):
         (tmp_path / folder).mkdir()
-    for name in ("scripts/environment.sh", "requirements.lock", "pyproject.toml"):
+    for name in ("scripts/environment.sh", "requirements.lock", "requirements-dev.lock", "pyproject.toml"):
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     return tmp_path
 
 
-def ensure(clone: Path) -> subprocess.CompletedProcess[str]:
-    command = f"source {clone}/scripts/environment.sh; ensure_environment"
+def ensure(clone: Path, *kind: str) -> subprocess.CompletedProcess[str]:
+    command = f"source {clone}/scripts/environment.sh; ensure_environment {' '.join(kind)}"
     return subprocess.run(["bash", "-euc", command, "launch"], env={"PATH": f"{clone}/bin:/usr/bin:/bin"}, capture_output=True, text=True)
 
 
@@ -130,46 +150,104 @@ def test_a_newer_python_says_in_one_line_what_is_lost(bare_clone: Path) -> None:
     assert done.stderr.count("PyBullet") == 1
 
 
-def fake_interpreter(clone: Path, pip: str) -> None:
-    """A python3.11 whose venv holds a copy of itself and whose pip runs the command `pip`; both are logged."""
+def fake_interpreter(clone: Path, pip: str = "exit 0", core: str = "touch $root/core; exit 0") -> None:
+    """A python3.11 whose venv holds a copy of itself; pip runs the command `pip`, the core is built by `core`, and all is logged."""
     body = f"""
+root={clone}
 case "$*" in
-  "-m venv "*) mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; echo venv >>{clone}/log;;
-  "-m pip "*) echo pip >>{clone}/log; {pip};;
+  "-m venv "*) mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; echo venv >>$root/log;;
+  *"core/build.py --check "*) [[ -e $root/core ]];;
+  *core/build.py*) echo core >>$root/log; {core};;
+  *scripts/trim.py) echo trim >>$root/log; echo pybullet;;
+  "-m pip uninstall "*) echo "whole again: ${{@: -1}}" >>$root/log;;
+  "-m pip "*) echo pip >>$root/log; {pip};;
   *) exec {sys.executable} "$@";;
 esac"""
     fake_python(clone / "bin", "python3.11", body)
 
 
+RUN_MADE = "venv\npip\ntrim\ncore\npip\n"  # the packages, the core, the project
+
+
+def log(clone: Path) -> str:
+    return (clone / "log").read_text()
+
+
 def test_an_interrupted_installation_is_not_taken_for_a_good_one(bare_clone: Path) -> None:
-    fake_interpreter(bare_clone, pip="exit 7")
+    fake_interpreter(bare_clone, pip="echo ERROR: no space; exit 7")
     for attempt in (1, 2):
         done = ensure(bare_clone)
         assert done.returncode != 0
-        assert "the installation failed" in done.stderr
-        assert (bare_clone / "log").read_text() == "venv\npip\n" * attempt
+        assert done.stderr.splitlines()[-2:] == [
+            "ERROR: no space",
+            "launch: the installation failed, see above; .venv is marked unfinished and will be made anew by the next call.",
+        ]
+        assert log(bare_clone) == "venv\npip\n" * attempt
 
 
 def test_the_environment_is_made_once_and_again_when_the_lock_changes(bare_clone: Path) -> None:
-    fake_interpreter(bare_clone, pip="exit 0")
-    made = "venv\npip\npip\n"  # the requirements, then the project
+    fake_interpreter(bare_clone)
     for _ in range(2):
         assert ensure(bare_clone).returncode == 0
-        assert (bare_clone / "log").read_text() == made
+        assert log(bare_clone) == RUN_MADE
     with (bare_clone / "requirements.lock").open("a") as lock:
         lock.write("# changed\n")
     assert ensure(bare_clone).returncode == 0
-    assert (bare_clone / "log").read_text() == made * 2
+    assert log(bare_clone) == RUN_MADE + RUN_MADE.replace("core\n", "")
+
+
+def test_stages_are_told_before_they_start_and_no_progress_goes_into_a_pipe(bare_clone: Path) -> None:
+    fake_interpreter(bare_clone)
+    told = ensure(bare_clone).stderr.splitlines()
+    assert [line[: len("launch: 1 of 3")] for line in told[:3]] == [f"launch: {stage} of 3" for stage in (1, 2, 3)]
+    assert re.search(r"1 of 3: \d+ packages into .venv, \d+ MB to download and 1 GB on disk", told[0])
+    assert len(told) == 4
+    assert "installed in" in told[-1]
 
 
 def test_a_changed_pyproject_installs_the_project_alone(bare_clone: Path) -> None:
-    fake_interpreter(bare_clone, pip="exit 0")
+    fake_interpreter(bare_clone)
     assert ensure(bare_clone).returncode == 0
-    before = (bare_clone / "log").read_text()
+    before = log(bare_clone)
     with (bare_clone / "pyproject.toml").open("a") as project:
         project.write("# changed\n")
     assert ensure(bare_clone).returncode == 0
-    assert (bare_clone / "log").read_text() == before + "pip\n"
+    assert log(bare_clone) == before + "pip\n"
+
+
+def test_what_the_tests_need_is_added_to_what_runs(bare_clone: Path) -> None:
+    fake_interpreter(bare_clone)
+    assert ensure(bare_clone).returncode == 0
+    before = log(bare_clone)
+    for _ in range(2):
+        assert ensure(bare_clone, "dev").returncode == 0
+        assert log(bare_clone) == before + "whole again: pybullet\npip\n"
+    assert ensure(bare_clone).returncode == 0
+    assert log(bare_clone) == before + "whole again: pybullet\npip\n"  # enough to run, too
+
+
+def test_a_changed_core_is_built_anew_alone(bare_clone: Path) -> None:
+    fake_interpreter(bare_clone)
+    assert ensure(bare_clone).returncode == 0
+    before = log(bare_clone)
+    (bare_clone / "core").unlink()
+    assert ensure(bare_clone).returncode == 0
+    assert log(bare_clone) == before + "core\n"
+
+
+def test_where_there_is_no_compiler_one_is_fetched_for_the_core(bare_clone: Path) -> None:
+    fake_interpreter(bare_clone, core="[[ -n ${PYTHONPATH:-} ]] || exit 3; touch $root/core; exit 0")
+    done = ensure(bare_clone)
+    assert done.returncode == 0
+    assert "fetching a compiler" in done.stderr
+    assert log(bare_clone) == RUN_MADE.replace("core\n", "core\npip\ncore\n")
+
+
+def test_a_core_that_does_not_compile_is_said_in_the_compiler_s_words(bare_clone: Path) -> None:
+    fake_interpreter(bare_clone, core="echo wrong.cpp: error >&2; exit 1")
+    done = ensure(bare_clone)
+    assert done.returncode != 0
+    assert done.stderr.splitlines()[-1] == "wrong.cpp: error"
 
 
 def test_every_folder_with_code_is_a_package() -> None:

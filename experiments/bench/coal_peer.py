@@ -10,10 +10,12 @@ import numpy as np
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject
+from mobee.engine.hands import NOBODY
 from mobee.errors import MobeeError
 from mobee.robot.robot import Array, Ints, Robot, Shape
 
-_TOLERANCE, _ITERATIONS = 1e-9, 1000  # m; of coal's iterative searches
+# Of coal's iterative searches [m]: with larger tolerances it misses contacts of cylinders, and by its plain search some of micrometres.
+_TOLERANCE, _ITERATIONS, _SEARCH = 1e-12, 1000, "NesterovAcceleration"
 
 
 class CoalMissing(MobeeError):
@@ -30,7 +32,7 @@ class CoalPeer:
         except ImportError:
             raise CoalMissing("coal is not installed: pip install '.[dev]' in MoBeE's folder") from None
         self._pin, self._coupling = pinocchio, robot.coupling
-        first, second, _ = tested_pairs(robot, snapshot, -1)
+        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
         self.pairs = np.stack([first, second], axis=1)
         self._model = _tree(pinocchio, robot)
         self._geometry = _geometry(pinocchio, coal, robot, snapshot)
@@ -39,7 +41,9 @@ class CoalPeer:
         self._data, self._found = self._model.createData(), pinocchio.GeometryData(self._geometry)
         for request in self._found.distanceRequests:
             request.enable_signed_distance = True
+        search = coal.GJKVariant.names[_SEARCH]
         for request in (*self._found.distanceRequests, *self._found.collisionRequests):
+            request.gjk_variant = search
             request.gjk_tolerance = request.epa_tolerance = _TOLERANCE
             request.gjk_max_iterations = request.epa_max_iterations = _ITERATIONS
             with warnings.catch_warnings():  # deprecated, but the setting that is to replace it has no effect
@@ -77,5 +81,9 @@ def _geometry(pin: Any, coal: Any, robot: Robot, snapshot: Snapshot) -> Any:
 
 
 def _shape(coal: Any, volume: Shape | WorldObject) -> Any:
-    makers = {"sphere": coal.Sphere, "capsule": coal.Capsule, "box": coal.Box}
+    if isinstance(volume, Shape) and volume.vertices is not None:
+        points = coal.StdVec_Vec3s()
+        points.extend(volume.vertices)
+        return coal.Convex.convexHull(points, True, None)
+    makers = {"sphere": coal.Sphere, "capsule": coal.Capsule, "cylinder": coal.Cylinder, "box": coal.Box}
     return makers[volume.kind](*volume.size)

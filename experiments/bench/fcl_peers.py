@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import fcl
 import numpy as np
 
+from mobee.collision.fcl_engine import fcl  # raises NotInstalled
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject
+from mobee.engine.hands import NOBODY
 from mobee.robot.robot import Array, Robot, Shape
 
 _MAKERS = {"sphere": fcl.Sphere, "capsule": fcl.Capsule, "box": fcl.Box}
@@ -42,7 +43,7 @@ class FclPairs(_Placer):
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
         volumes = self.shapes + self.things
-        first, second, _ = tested_pairs(robot, snapshot, -1)
+        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
         self._pairs = [(volumes[a], volumes[b]) for a, b in zip(first, second, strict=True)]
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()
 
@@ -65,7 +66,7 @@ class FclTrees(_Placer):
         for manager, bodies in ((self._robot, self.shapes), (self._world, self.things)):
             manager.registerObjects(bodies)
             manager.setup()
-        first, second, _ = tested_pairs(robot, snapshot, -1)
+        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
         volumes = [id(body) for body in self.shapes + self.things]
         self._tested = {key for a, b in zip(first, second, strict=True) for key in ((volumes[a], volumes[b]), (volumes[b], volumes[a]))}
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()

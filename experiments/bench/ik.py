@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from experiments.bench import ik_solvers
+from experiments.bench import calibration, ik_solvers, requirement
+from experiments.bench.calibration import Calibration
 from experiments.bench.cma_peer import load_cma
-from experiments.bench.ik_solvers import RIVALS, Solve
-from experiments.bench.ik_workload import MOTORS, Target, scene, targets
+from experiments.bench.ik_solvers import RIVALS, Entrant, Tries
+from experiments.bench.ik_workload import MOTORS, scene, targets
 from experiments.bench.mink_peer import load_mink
+from experiments.bench.requirement import judged
 from experiments.bench.rounds import one_core
 from experiments.progress import Progress
 
@@ -24,14 +26,14 @@ FINE = {"metres": 0.001, "radians": float(np.deg2rad(1.0))}
 # Name, row, key of the row, at least or at most, bound.
 REQUIREMENTS = (
     ("NES, share reached", NES, "reached", "least", 0.99),
-    ("NES, ms, median", NES, "ms", "most", 20.0),
-    ("NES, ms, 95 %", NES, "ms_95", "most", 50.0),
-    ("NES, times faster than CMA-ES pose by pose", NES, "times_cma", "least", 4.0),
+    ("NES, ms, median", NES, "standard_ms", "most", 25.0),
+    ("NES, ms, 95 %", NES, "standard_ms_95", "most", 50.0),
+    ("NES, times CMA-ES pose by pose", NES, "times_cma", "least", 4.0),
     ("hybrid, share reached", HYBRID, "reached", "least", 1.0),
-    ("hybrid, ms, median", HYBRID, "ms", "most", 0.5),
-    ("hybrid, times faster than CMA-ES pose by pose", HYBRID, "times_cma", "least", 100.0),
+    ("hybrid, ms, median", HYBRID, "standard_ms", "most", 1.0),
+    ("hybrid, times CMA-ES pose by pose", HYBRID, "times_cma", "least", 100.0),
     ("all 41 motors, share reached", WHOLE, "reached", "least", 0.97),
-    ("all 41 motors, ms, median", WHOLE, "ms", "most", 100.0),
+    ("all 41 motors, ms, median", WHOLE, "standard_ms", "most", 100.0),
 )
 
 
@@ -55,38 +57,36 @@ def measure(settings: Settings) -> dict[str, Any]:
     aims = targets(model, max(settings.targets, settings.whole, settings.rivals))
     fine = [replace(aim, **FINE) for aim in aims]
     hybrid, nes = (ik_solvers.library(model, method, MOTORS) for method in ("hybrid", "nes"))
-    runs: list[tuple[str, Solve, list[Target]]] = [
-        (HYBRID, hybrid, aims[: settings.targets]),
-        (NES, nes, aims[: settings.targets]),
-        (WHOLE, ik_solvers.library(model, "nes", None), aims[: settings.whole]),
-        (FINE_HYBRID, hybrid, fine[: settings.targets]),
-        (FINE_NES, nes, fine[: settings.targets]),
-        (MINK, ik_solvers.mink(model), aims[: settings.targets]),
-        *((name, ik_solvers.rival(model, name, MOTORS), aims[: settings.rivals]) for name in RIVALS),
-    ]
-    rows: dict[str, dict[str, float]] = {}
+    entrants = {
+        HYBRID: Entrant(hybrid, aims[: settings.targets]),
+        NES: Entrant(nes, aims[: settings.targets]),
+        WHOLE: Entrant(ik_solvers.library(model, "nes", None), aims[: settings.whole]),
+        FINE_HYBRID: Entrant(hybrid, fine[: settings.targets]),
+        FINE_NES: Entrant(nes, fine[: settings.targets]),
+        MINK: Entrant(ik_solvers.mink(model), aims[: settings.targets]),
+        **{name: Entrant(ik_solvers.rival(model, name, MOTORS), aims[: settings.rivals]) for name in RIVALS},
+    }
+    speeds = Calibration()
     with one_core() as core, Progress() as progress:
-        for number, (name, solve, wanted) in enumerate(runs):
-            progress.show(number / len(runs), name)
-            rows[name] = _row(solve, wanted)
+        found = ik_solvers.tried(entrants, speeds, lambda done, name: progress.show(done / len(aims), name))
+    rows = {name: _row(tries) for name, tries in found.items()}
     for row in rows.values():
-        row["times_cma"] = rows[ik_solvers.CMA]["ms"] / row["ms"]
-    required = [_required(rows, *one) for one in REQUIREMENTS]
-    return {"core": core, "rows": rows, "requirements": required, "passed": all(one["passed"] for one in required)}
+        row["times_cma"] = rows[ik_solvers.CMA]["standard_ms"] / row["standard_ms"]
+    return {"core": core, "speed": speeds.median, "rows": rows} | verdict(rows)
 
 
-def _row(solve: Solve, aims: Sequence[Target]) -> dict[str, float]:
+def _row(tries: Tries) -> dict[str, float]:
     """The share of targets reached, and evaluations and processor time of a target, median and 95 %; failures count as they are."""
-    tries = ik_solvers.tried(solve, aims)
-    row: dict[str, float] = {"targets": len(aims), "reached": float(tries.reached.mean())}
-    for key, values in (("evaluations", tries.evaluations), ("ms", tries.ms)):
+    row: dict[str, float] = {"targets": len(tries.reached), "reached": float(np.mean(tries.reached))}
+    for key, values in (("evaluations", tries.evaluations), ("ms", tries.ms), ("standard_ms", tries.standard_ms)):
         row |= {key: float(np.median(values)), f"{key}_95": float(np.quantile(values, 0.95))}
     return row
 
 
-def _required(rows: dict[str, dict[str, float]], name: str, row: str, key: str, sense: str, bound: float) -> dict[str, Any]:
-    found = rows[row][key]
-    return {"name": name, "found": found, f"at_{sense}": bound, "passed": found <= bound if sense == "most" else found >= bound}
+def verdict(rows: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """Whether poses are found as often and as soon as required."""
+    required = [judged(name, rows[row][key], **{f"at_{sense}": bound}) for name, row, key, sense, bound in REQUIREMENTS]
+    return {"requirements": required, "passed": requirement.all_passed(required)}
 
 
 def report(result: dict[str, Any]) -> str:
@@ -102,10 +102,7 @@ def report(result: dict[str, Any]) -> str:
         lines.append(
             f"  {name:<29}{row['targets']:>7}{100.0 * row['reached']:>7.1f} %{evaluations:>14}{ms:>14}{_three(row['times_cma']):>7}"
         )
-    for one in result["requirements"]:
-        bound = f">= {one['at_least']:g}" if "at_least" in one else f"<= {one['at_most']:g}"
-        lines.append(f"  {one['name']:<53}{one['found']:9.3g} {bound:>8} {'pass' if one['passed'] else 'SHORT'}")
-    return "\n".join(lines)
+    return "\n".join([*lines, calibration.told(result["speed"]), *requirement.lines(result["requirements"])])
 
 
 def _three(value: float) -> str:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 import mobee
+from experiments.bench.calibration import Calibration
 from experiments.bench.ik_rivals import annealing, cma, particles, xnes
 from experiments.bench.ik_workload import MOTORS, Target
 from experiments.bench.mink_peer import MinkPeer
 from mobee.roadmap.ik.problem import Problem
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array
 
 MOST = 20_000  # evaluations of a rival
+IN_TURN = 20  # targets of one solver, before it is another's turn: fewer would measure cold caches
 CMA, CMA_BATCHED = "CMA-ES, pose by pose", "CMA-ES, a generation at once"
 ANNEALING, PARTICLES, XNES = "simulated annealing", "particle filter", "xNES, as published"
 RIVALS: dict[str, Callable[[Problem, int, int], Array | None]] = {
@@ -61,23 +61,45 @@ def mink(model: mobee.Model) -> Solve:
     return solve
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True)
 class Tries:
-    """What came of targets: whether each was reached, its evaluations and its processor time [ms], (T,); failures as they are."""
+    """What came of targets, in order: whether each was reached, its evaluations and its processor time, failures as they are."""
 
-    reached: Array
-    evaluations: Ints
-    ms: Array
+    reached: list[bool] = field(default_factory=list)
+    evaluations: list[int] = field(default_factory=list)
+    ms: list[float] = field(default_factory=list)
+    standard_ms: list[float] = field(default_factory=list)  # on the standard machine, see calibration.py
+
+    def add(self, solve: Solve, aim: Target, seed: int, speeds: Calibration) -> None:
+        """One target more."""
+
+        def timed() -> tuple[bool, int, float]:
+            start = time.process_time()
+            return *solve(aim, seed), 1e3 * (time.process_time() - start)
+
+        (reached, evaluations, ms), speed = speeds.around(timed)
+        self.reached.append(reached)
+        self.evaluations.append(evaluations)
+        self.ms.append(ms)
+        self.standard_ms.append(ms * speed)
 
 
-def tried(solve: Solve, aims: Sequence[Target], seed: int = 0) -> Tries:
-    """Every target once, each with a seed of its own."""
-    solve(aims[0], seed)  # caches and lazy set-up
-    reached, evaluations, ms = [], [], []
-    for number, aim in enumerate(aims, seed):
-        start = time.process_time()
-        done, looked = solve(aim, number)
-        ms.append(1e3 * (time.process_time() - start))
-        reached.append(done)
-        evaluations.append(looked)
-    return Tries(np.array(reached), np.array(evaluations), np.array(ms))
+@dataclass(frozen=True, slots=True)
+class Entrant:
+    """A solver and the targets that it is given."""
+
+    solve: Solve
+    aims: Sequence[Target]
+
+
+def tried(entrants: Mapping[str, Entrant], speeds: Calibration, tell: Callable[[int, str], None]) -> dict[str, Tries]:
+    """All targets, some to each solver in turn, so that a slow minute of the machine hits everyone; `tell` hears how far it is."""
+    for one in entrants.values():
+        one.solve(one.aims[0], 0)  # caches and lazy set-up
+    found = {name: Tries() for name in entrants}
+    for begin in range(0, max(len(one.aims) for one in entrants.values()), IN_TURN):
+        for name, one in entrants.items():
+            tell(begin, name)
+            for seed, aim in enumerate(one.aims[begin : begin + IN_TURN], begin):
+                found[name].add(one.solve, aim, seed, speeds)
+    return found

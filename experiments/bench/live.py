@@ -1,18 +1,25 @@
 """How late the commands of the live system are, at several rates: jitter of the controller's period and age of the command in force.
 
-Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, and 4 at 1 kHz.  Age and jitter are the services'
-own numbers, a tick in hold counts as held and not as an age.  Run time: `seconds` and a start for every rate; on a machine that
-does nothing else.
+Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are the
+services' own numbers, a tick in hold counts as held and not as an age.  Beside every run a bare chain of processes that do a little
+each (calibration.py) tells what the machine's scheduling costs: where that is more than on the standard machine, the ages may
+be as many times longer.  Run time: `seconds` and a start for every rate; on a machine that does nothing else.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from experiments.bench.calibration import bare_ages
 from experiments.launched import summary_of
 from experiments.progress import Progress
 
-QUICK_ENOUGH = {200: 2.0, 1000: 4.0}  # ticks that the age may have at most (p99), up to that rate
+MOST = {200: 2.0, 500: 3.0, 1000: 5.0}  # ticks that the age may have at most (p99), up to that rate
+BARE = {200: 1.0, 500: 2.0, 1000: 2.0}  # ticks that the bare chain's has on the standard machine
+BARE_SECONDS = 3.0  # of the bare chain, before and after every run
 
 
 def measure(rates: tuple[int, ...], seconds: float, backend: str) -> dict[str, Any]:
@@ -21,20 +28,24 @@ def measure(rates: tuple[int, ...], seconds: float, backend: str) -> dict[str, A
     with Progress() as progress:
         for done, rate in enumerate(rates):
             progress.show(done / len(rates), f"{backend} at {rate} Hz")
-            runs.append(_measured(rate, seconds, backend))
+            settings = (f"services.robot_sim.backend={backend}", f"services.robot_sim.rate={rate}")
+            bare = [bare_ages(rate, BARE_SECONDS)]
+            summary = summary_of("kinematic", settings, duration=seconds)
+            bare.append(bare_ages(rate, BARE_SECONDS))
+            runs.append(judged_run(rate, summary, float(np.percentile(np.concatenate(bare), 99))))
     return {"backend": backend, "seconds": seconds, "runs": runs, "passed": all(run["passed"] for run in runs)}
 
 
-def _measured(rate: int, seconds: float, backend: str) -> dict[str, Any]:
-    settings = (f"services.robot_sim.backend={backend}", f"services.robot_sim.rate={rate}")
-    summary = summary_of("kinematic", settings, duration=seconds)
+def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[str, Any]:
+    """What one run came to where the bare chain has that age."""
     age, controller = summary["command_age_ticks"], summary["services"]["controller"]
-    most = next((ticks for limit, ticks in QUICK_ENOUGH.items() if rate <= limit), None)
+    most = next((ticks * max(1.0, bare_p99 / BARE[limit]) for limit, ticks in MOST.items() if rate <= limit), None)
     return {
         "rate": rate,
         "age_p50": age["p50"],
         "age_p99": age["p99"],
         "age_max": age["max"],
+        "bare_p99": bare_p99,
         "jitter_ms_p50": controller["jitter_ms_p50"],
         "jitter_ms_p99": controller["jitter_ms_p99"],
         "ticks": summary["ticks"],
@@ -49,12 +60,14 @@ def _measured(rate: int, seconds: float, backend: str) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> str:
     """The same for people."""
     lines = [f"Live on the {result['backend']} robot, three agents, {result['seconds']:g} s each; age in ticks, jitter in ms"]
-    names = ("rate", "age p50", "p99", "most", "jitter p50", "p99", "missed", "held", "late")
-    lines.append("{:>7}{:>9}{:>5}{:>6}{:>12}{:>8}{:>8}{:>7}{:>7}".format(*names))
+    names = ("rate", "age p50", "p99", "bare", "allowed", "most", "jitter p50", "p99", "missed", "held", "late")
+    lines.append("{:>7}{:>8}{:>4}{:>5}{:>8}{:>5}{:>11}{:>7}{:>7}{:>6}{:>6}".format(*names))
     for run in result["runs"]:
-        verdict = "" if run["passed"] else "  LATE"
+        allowed = "-" if run["at_most"] is None else f"{run['at_most']:.3g}"
         lines.append(
-            f"{run['rate']:>4} Hz{run['age_p50']:>9.0f}{run['age_p99']:>5.0f}{run['age_max']:>6.0f}{run['jitter_ms_p50']:>12.2f}"
-            f"{run['jitter_ms_p99']:>8.2f}{run['missed_ticks']:>8}{run['hold_ticks']:>7}{run['late_forces']:>7}{verdict}"
+            f"{run['rate']:>4} Hz{run['age_p50']:>8.0f}{run['age_p99']:>4.0f}{run['bare_p99']:>5.0f}{allowed:>8}{run['age_max']:>5.0f}"
+            f"{run['jitter_ms_p50']:>11.2f}{run['jitter_ms_p99']:>7.2f}{run['missed_ticks']:>7}{run['hold_ticks']:>6}{run['late_forces']:>6}"
+            + ("" if run["passed"] else " LATE")
         )
+    lines.append("bare: p99 of a chain of processes that only do the calibration's work")
     return "\n".join(lines)

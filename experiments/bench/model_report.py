@@ -5,12 +5,17 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from experiments.bench.agreement import GRAZE
-from experiments.bench.model import KINEMATICS, MUJOCO, PAIRS, TREES
+from experiments.bench import requirement
+from experiments.bench.agreement import GRAZE, MINIMAL
+from experiments.bench.model import BATCH, CALL, KINEMATICS, MUJOCO, PAIRS, TREES
 
 _PEERS = (MUJOCO, PAIRS, TREES)
 _WIDTH = 80
-_NOTE = "MuJoCo's depths are not judged: with a box they are per point of contact, of a capsule as of spheres on its axis."
+_NOTE = (
+    f"differ: pairs that touch for one of the two only, and how deep the deepest is (less than {GRAZE:g} m is no difference); "
+    f"same depths: within {MINIMAL:g} m of the peer's, which need not be minimal; "
+    "longer: ours than the way out along the peer's normal, at most [m]"
+)
 
 
 def report(result: dict[str, Any]) -> str:
@@ -21,7 +26,8 @@ def report(result: dict[str, Any]) -> str:
         f"Processor time {'of one core' if result['core'] is not None else '(not pinned to a core)'}, medians of {about['rounds']} rounds: "
         "ratios can be compared, rates only within one run."
     )
-    return "\n\n".join([head, *_tables(result), _requirements(result), *([_agreement(result)] if result["agreement"] else [])])
+    required = "\n".join(["required", *requirement.lines(result["requirements"])])
+    return "\n\n".join([head, *_tables(result), _others(result), required, *([_agreement(result)] if result["agreement"] else [])])
 
 
 def _tables(result: dict[str, Any]) -> list[str]:
@@ -41,23 +47,31 @@ def _table(title: str, boxes: dict[int, Any], rows: dict[str, list[str]]) -> str
     return "\n".join(lines)
 
 
-def _requirements(result: dict[str, Any]) -> str:
-    lines = ["required, at least"]
-    for one in result["requirements"]:
-        aim = f", aim {one['aim']:g}" if one["aim"] else ""
-        what = f"{one['name']}, N = {one['boxes']}: {one['least']:g} x {one['peer']}{aim}"
-        lines.append(f"  {what:<60}{one['ratio']:9.1f}  {'pass' if one['passed'] else 'SHORT'}")
+def _others(result: dict[str, Any]) -> str:
+    """Robots of other makers, and threads."""
+    lines = ["robots of other makers                poses per second          times MuJoCo"]
+    lines.append(f"  {'N':>20}{'batch':>12}{'one call':>10}{'MuJoCo':>10}{'batch':>12}{'one call':>10}")
+    for name, found in result["others"].items():
+        for count, rates in found["poses_per_second"].items():
+            ratios = found["times_mujoco"][count]
+            lines.append(
+                f"  {name:<16}{count:>4}{_thousands(rates[BATCH]):>12}{_thousands(rates[CALL]):>10}{_thousands(rates[MUJOCO]):>10}"
+                f"{ratios[BATCH]:>12.2f}{ratios[CALL]:>10.2f}"
+            )
+    threads = result["threads"]
+    if threads is not None:
+        lines.append(f"  a batch on 2 threads: {threads['gain']:.2f} x one; 2 processes at once: {threads['processes']:.2f} x one")
     return "\n".join(lines)
 
 
 def _agreement(result: dict[str, Any]) -> str:
-    lines = [f"agreement (a pair that overlaps by less than {GRAZE:g} m may differ)"]
+    lines = [f"{'agreement':<18}{'N':>4}{'':<12}{'contacts':>9}{'differ':>9}{'same depths':>13}{'longer':>9}"]
     for one in result["agreement"]:
-        differing = f"{one['other_pairs']} pairs differ" + (f", the deepest by {one['deepest_other']:.1e} m" if one["other_pairs"] else "")
-        depths = ", ".join(f"{kinds} {difference:.0e}" for kinds, difference in one["depth_difference"].items())
-        verdict = "pass" if one["passed"] else "DIFFERS"
-        lines.append(f"  {one['peer']}, N = {one['boxes']}, {one['poses']} poses: {one['contacts']} contacts, {differing}  {verdict}")
-        lines.append(_wrapped(f"depths differ at most [m]: {depths}", "    "))
+        differing = f"{one['other_pairs']}" + (f", {one['deepest_other']:.0e}" if one["other_pairs"] else "")
+        lines.append(
+            f"  {one['scene']:<16}{one['objects']:>4}  {one['peer']:<10}{one['contacts']:>9}{differing:>9}"
+            f"{100.0 * one['same_depths']:>11.1f} %{one['beaten']:>9.0e}{'' if one['passed'] else ' DIFFERS'}"
+        )
     if not result["coal"]:
         lines.append("  coal: not installed: pip install '.[dev]' in MoBeE's folder")
     return "\n".join([*lines, _wrapped(_NOTE, "  ")])

@@ -30,13 +30,18 @@ def load_mujoco() -> Any:
 class MujocoPeer:
     """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo never tests them together."""
 
-    def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None) -> None:
-        """`servo`: the gain of velocity servos on all joints, for who lets it step; no gravity then."""
+    def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None, precise: bool = False) -> None:
+        """`servo`: the gain of velocity servos on all joints, for who lets it step; no gravity then.
+
+        `precise`: its iterative searches go on to the last digits, which takes longer than as it is used.
+        """
         self._mujoco = load_mujoco()
         self._coupling = robot.coupling
         spec = _spec(self._mujoco, robot, objects)
         if servo is not None:
             _drive(self._mujoco, spec, len(robot.joints), servo)
+        if precise:
+            spec.option.ccd_tolerance, spec.option.ccd_iterations = 1e-12, 1000
         self.model = spec.compile()
         self.data = self._mujoco.MjData(self.model)
         geoms = [shape.name for shape in robot.shapes] + list(objects)
@@ -62,14 +67,18 @@ class MujocoPeer:
         """Advance by that many of the model's time steps."""
         self._mujoco.mj_step(self.model, self.data, nstep=count)
 
-    def touching(self) -> tuple[Ints, Array]:
-        """The pairs (c, 2) of volumes in contact at the last detection, smaller index first, and their greatest depths (c,) m."""
+    def touching(self) -> tuple[Ints, Array, Array]:
+        """The pairs (c, 2) of volumes in contact at the last detection, their depths (c,) m and where the first must move (c, 3).
+
+        The smaller index is first; of several points of contact of a pair the deepest one counts.
+        """
         contact = self.data.contact
-        pairs = np.sort(self._volume[np.array(contact.geom).reshape(-1, 2)], axis=1)
-        unique, which = np.unique(pairs, axis=0, return_inverse=True)
-        depths = np.zeros(len(unique))
-        np.maximum.at(depths, which, -np.array(contact.dist))
-        return unique, depths
+        volumes = self._volume[np.array(contact.geom).reshape(-1, 2)]
+        depths, normals = -np.array(contact.dist), np.array(contact.frame).reshape(-1, 9)[:, :3]
+        normals = np.where(volumes[:, :1] < volumes[:, 1:], -normals, normals)  # it leads from the first geom to the second
+        order = np.argsort(-depths, kind="stable")
+        pairs, which = np.unique(np.sort(volumes, axis=1)[order], axis=0, return_index=True)
+        return pairs, depths[order][which], normals[order][which]
 
 
 def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
@@ -87,9 +96,9 @@ def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
         bodies.append(body)
         origins.append(joint.point)
     for shape in robot.shapes:
-        _add(mujoco, bodies[shape.link], shape, shape.position - origins[shape.link])
+        _add(mujoco, spec, bodies[shape.link], shape, shape.position - origins[shape.link])
     for thing in objects.values():
-        _add(mujoco, spec.worldbody, thing, thing.position)
+        _add(mujoco, spec, spec.worldbody, thing, thing.position)
     for one, other in map(sorted, robot.untested):
         spec.add_exclude(bodyname1=f"link{one}", bodyname2=f"link{other}")
     return spec
@@ -102,11 +111,15 @@ def _drive(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
         servo.set_to_velocity(gain)
 
 
-def _add(mujoco: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
-    kinds = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in ("sphere", "capsule", "cylinder", "box")}
+def _add(mujoco: Any, spec: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
+    kinds = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in ("sphere", "capsule", "cylinder", "box", "mesh")}
     size = np.zeros(3)
     size[: len(volume.size)] = volume.size
     size[slice(None) if volume.kind == "box" else slice(1, None)] /= 2.0  # MuJoCo has half lengths
     turn = np.empty(4)
     mujoco.mju_mat2Quat(turn, np.ascontiguousarray(volume.rotation).reshape(9))
+    if isinstance(volume, Shape) and volume.vertices is not None:
+        mesh = spec.add_mesh(name=volume.name, uservert=volume.vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+        body.add_geom(name=volume.name, type=kinds["mesh"], meshname=mesh.name, pos=position, quat=turn, margin=0.0)
+        return
     body.add_geom(name=volume.name, type=kinds[volume.kind], size=size, pos=position, quat=turn, margin=0.0)

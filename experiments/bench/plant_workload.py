@@ -38,6 +38,10 @@ class Pace:
             "seconds_per_action": self.plant_seconds / self.ended,
         }
 
+    def standard(self, speed: float) -> dict[str, float]:
+        """The rates on the standard machine, if this one had that speed (experiments/bench/calibration.py)."""
+        return {f"standard_{key}": self.numbers[key] / speed for key in ("times_real_time", "actions_per_second")}
+
 
 def robot() -> Robot:
     """The published model."""

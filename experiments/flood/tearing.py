@@ -9,9 +9,9 @@ import numpy as np
 from mobee import Model, World
 from mobee.collision import Geometry, WorldObject
 from mobee.collision.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
-from mobee.engine.layout import BOX, ROW, ROW_BOUND, ROW_HALF, ROW_KIND, ROW_POSITION, ROW_ROTATION
+from mobee.engine.volumes import CODES, VOLUME, Volumes
 from mobee.model import Pose
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 FREE = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
 AGREED = 1e-9  # m, depth of one contact in two evaluations of the same
@@ -46,16 +46,16 @@ def torn_table(snapshot: Snapshot) -> str | None:
     return None
 
 
-def _rows_of_boxes(boxes: list[WorldObject]) -> Array:
-    """The rows (N, ROW), written apart from what is checked."""
-    rows = np.zeros((len(boxes), ROW))
+def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
+    """The rows (N,), written apart from what is checked."""
+    rows = np.zeros(len(boxes), dtype=VOLUME)
     if not boxes:
         return rows
-    rows[:, ROW_KIND] = BOX
-    rows[:, ROW_POSITION : ROW_POSITION + 3] = [box.position for box in boxes]
-    rows[:, ROW_ROTATION : ROW_ROTATION + 9] = np.reshape([box.rotation for box in boxes], (-1, 9))
-    rows[:, ROW_HALF : ROW_HALF + 3] = np.array([box.size for box in boxes]) / 2.0
-    rows[:, ROW_BOUND] = [math.hypot(*box.size) / 2.0 for box in boxes]
+    rows["kind"] = CODES["box"]
+    rows["position"] = [box.position for box in boxes]
+    rows["rotation"] = [box.rotation for box in boxes]
+    rows["half"] = np.array([box.size for box in boxes]) / 2.0
+    rows["bound"] = [math.hypot(*box.size) / 2.0 for box in boxes]
     return rows
 
 

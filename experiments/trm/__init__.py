@@ -12,6 +12,7 @@ vertex.  Every pose is checked by python-fcl.  `python -m experiments.trm NAME` 
 from __future__ import annotations
 
 import argparse
+import importlib
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,7 @@ def work(cell: Cell) -> dict[str, Any]:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Do what is left of the sweep."""
+    importlib.import_module("mobee.collision.fcl_engine")  # raises NotInstalled before anything is begun
     run_cells(work, cells(arguments), folder, arguments)
     return findings(load_cells(folder))
 

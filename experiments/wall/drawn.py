@@ -1,4 +1,4 @@
-"""A hand is drawn to a target by J^T (thesis Algorithm 5, `mobee.control.Reacher`): does it stop dead, does it oscillate?"""
+"""A hand is drawn to a target by the whole body (thesis 5.1, 8.2; `mobee.Reacher`): does it stop dead, does it oscillate?"""
 
 from __future__ import annotations
 

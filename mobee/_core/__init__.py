@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,21 +17,76 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core.levels import (
+    FOLDER,
+    SANITIZED,
+    SOURCES,
+    fingerprint,
+    library_file,
+    machine_levels,
+    missing,
+    possible_levels,
+    processor_flags,
+)
+from mobee.errors import NotInstalled, UnknownName
+
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
 """An array that is only read, as its `tobytes()`: for a few numbers this costs less than an address."""
 
-LEVELS = ("x86-64-v4", "x86-64-v3", "x86-64-v2")
+_NOTHING: Any = ctypes.c_char * 0
+
+ABI = 1
+"""What `mobee_abi` of a library must say that these declarations belong to; see core/interface.hpp."""
+
 FORCED = "MOBEE_CORE"
-"""The environment variable that names the level to use."""
+"""The environment variable that names the build to use."""
+
+
+class CoreUnavailable(NotInstalled):
+    """There is no native library for this machine, or not of these sources, or the one asked for does not run here."""
 
 
 @cache
 def library() -> ctypes.CDLL:
     """The shared library for this processor, loaded when it is first asked for."""
-    folder = Path(__file__).parent
-    level = os.environ.get(FORCED) or "x86-64-v3"
-    return ctypes.CDLL(str(folder / f"core-{level}.so"))
+    return load(choose(os.environ.get(FORCED, ""), processor_flags()))
+
+
+def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
+    """The build to load: the one asked for, else the widest of those in a folder that a processor with these flags runs."""
+    flags = frozenset(flags)
+    known, possible = machine_levels(), possible_levels(flags)
+    if forced:
+        if forced == SANITIZED and "asan" not in os.environ.get("LD_PRELOAD", ""):
+            raise CoreUnavailable(f"{FORCED}={forced} needs the sanitizers in the process before it: run python core/sanitize.py COMMAND.")
+        if forced not in (*known, SANITIZED):
+            raise CoreUnavailable(str(UnknownName(f"level in {FORCED}:", forced, known)))
+        if lacks := missing(forced, flags):
+            rest = f"Valid here: {', '.join(possible)}; or leave {FORCED} out." if possible else "None of the builds runs here."
+            raise CoreUnavailable(f"{FORCED}={forced}: this processor lacks {', '.join(lacks)}. {rest}")
+        return forced
+    if not possible:
+        lacks = missing(known[0], flags)
+        raise CoreUnavailable(f"MoBeE needs a processor of level {known[0]}, of about 2009 or later: this one lacks {', '.join(lacks)}.")
+    return next((level for level in reversed(possible) if library_file(level, folder).exists()), possible[-1])
+
+
+def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
+    """A build, after a look whether it is of the sources beside it and of these declarations; raises CoreUnavailable."""
+    file = library_file(level, folder)
+    if not file.exists():
+        raise CoreUnavailable(f"there is no {file}: {_remedy(level)}")
+    try:
+        found = ctypes.CDLL(str(file))
+    except OSError as error:
+        raise CoreUnavailable(f"{file} cannot be loaded ({error}): {_remedy(level)}") from None
+    found.mobee_sources.restype = ctypes.c_char_p
+    if _is_checkout() and fingerprint() not in found.mobee_sources().decode():
+        raise CoreUnavailable(f"{file} was built from other sources than those in {SOURCES}: {_remedy(level)}")
+    if (abi := found.mobee_abi()) != ABI:
+        raise CoreUnavailable(f"{file} has the interface {abi}, this version of mobee calls {ABI}: {_remedy(level)}")
+    return found
 
 
 def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., Any]:
@@ -43,7 +98,25 @@ def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., An
 
 def address(array: NDArray[Any]) -> int:
     """Where the numbers of a C-contiguous array stand; the caller keeps the array alive."""
+    flags = array.flags
+    if flags.carray:  # may be written to: then this is the same, in a quarter of the time
+        return ctypes.addressof(_NOTHING.from_buffer(array))
+    whole = array.base
+    if isinstance(whole, np.ndarray) and whole.nbytes == array.nbytes and whole.flags.carray and flags.c_contiguous:
+        return ctypes.addressof(_NOTHING.from_buffer(whole))  # of which the array is a view that may not be written to
+    if not (flags.c_contiguous and flags.aligned):
+        raise ValueError("the core needs arrays that are contiguous, row by row, and aligned")
     return array.ctypes.data
 
 
-__all__ = ["ADDRESS", "BYTES", "INTEGER", "LEVELS", "REAL", "address", "function", "library", "np", "sys"]
+def _is_checkout() -> bool:
+    return (SOURCES / "interface.hpp").exists()
+
+
+def _remedy(level: str) -> str:
+    if not _is_checkout():
+        return "install mobee again, for this machine: pip install --force-reinstall --no-deps mobee"
+    return f"run {Path(sys.executable).name} {SOURCES / 'build.py'}" + (" --sanitize" if level == SANITIZED else "")
+
+
+__all__ = ["ADDRESS", "BYTES", "INTEGER", "REAL", "CoreUnavailable", "address", "function", "library"]

@@ -8,17 +8,23 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import fcl
 import numpy as np
 
 from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import WorldObject
-from mobee.engine.layout import ROW_BOUND, convex_row, volume_row
+from mobee.engine.hands import NOBODY, Hands
+from mobee.engine.volumes import bound
+from mobee.errors import NotInstalled
 from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.jacobian import point_jacobian
 from mobee.robot.robot import Array, Ints, Robot, Shape
+
+try:
+    import fcl
+except ModuleNotFoundError:
+    raise NotInstalled("this needs python-fcl, which is not installed: pip install '.[fcl]' in MoBeE's folder") from None
 
 # fcl.collide is off by up to centimetres for capsules and boxes (it stops at any separating direction); signed distances are not.
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)
@@ -30,7 +36,7 @@ class FclEngine:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._pairs: tuple[Snapshot | None, int, tuple[Ints, Ints, Ints] | None] = None, 0, None
+        self._pairs: tuple[Snapshot | None, Hands, tuple[Ints, Ints, Ints] | None] = None, NOBODY, None
 
     def transforms(self, q: Array) -> Array:
         """Every link in the poses q (B, n), (B, L, 4, 4)."""
@@ -42,10 +48,10 @@ class FclEngine:
         moved = transforms[:, link, :3, :3] @ point + transforms[:, link, :3, 3]
         return point_jacobian(self.robot, transforms, link, moved)
 
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n).
 
-        `reaching`: links that spare the targets, see `hands`; `cut`: a motor feels only what happens to links of its own part.
+        `reaching`: who spares the targets; `cut`: a motor feels only what happens to links of its own part.  `threads`: fcl knows but one.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -57,7 +63,7 @@ class FclEngine:
         numbers, reals = (np.concatenate([getattr(table, what) for table in (none, *tables)]) for what in ("numbers", "reals"))
         return _table(self.robot, snapshot, numbers, reals), torque
 
-    def _tested(self, snapshot: Snapshot, reaching: int) -> tuple[Ints, Ints, Ints]:
+    def _tested(self, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
         known = self._pairs
         if known[2] is not None and known[0] is snapshot and known[1] == reaching:
             return known[2]
@@ -170,8 +176,7 @@ def _ball_overlap(first: Any, second: Any, ball: Array, radius: float, sign: flo
 
 
 def _bound(volume: Shape | WorldObject) -> float:
-    vertices = getattr(volume, "vertices", None)
-    return float((volume_row(volume) if vertices is None else convex_row(volume, vertices, 0))[ROW_BOUND])
+    return bound(volume, getattr(volume, "vertices", None))
 
 
 def _geometry(volume: Shape | WorldObject) -> Any:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.collision.world_object import Role, WorldObject
-from mobee.engine.layout import ROW, volume_row
-from mobee.robot.robot import Array
+from mobee.engine.volumes import VOLUME, Volumes, volume_row
 
 OBSTACLE, TARGET, GHOST, ATTACHED, ATTACHED_GHOST = range(5)
 _FREE: dict[Role, int] = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
@@ -21,26 +20,26 @@ _CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": 
 class Snapshot:
     """A consistent state of the world; it never changes, each edit makes the next.
 
-    `names`, `rows` and `roles` are in the order of `objects`, in which they were added.  `rows` (N, ROW): see
-    mobee.engine.layout; of an attached object in the frame of its link.  `roles` (N,): OBSTACLE, TARGET, GHOST, or ATTACHED
-    and ATTACHED_GHOST for what is attached to a link.  The arrays are writable only because compiled code takes no others.
+    `names`, `rows` and `roles` are in the order of `objects`, in which they were added.  `rows` (N,): see
+    mobee.engine.volumes; of an attached object in the frame of its link.  `roles` (N,): OBSTACLE, TARGET, GHOST, or ATTACHED
+    and ATTACHED_GHOST for what is attached to a link.
     """
 
     version: int
     objects: MappingProxyType[str, WorldObject]
     names: tuple[str, ...]
-    rows: Array  # (N, ROW) float64, C-contiguous
+    rows: Volumes  # (N,) VOLUME, contiguous
     roles: NDArray[np.int64]  # (N,)
     attached: tuple[str, ...]  # names
 
 
-EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty((0, ROW)), np.empty(0, dtype=np.int64), ())
+EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empty(0, dtype=np.int64), ())
 
 
 def extended(old: Snapshot, new: WorldObject) -> Snapshot:
     """The next snapshot, with an object more at the end."""
     count, role = len(old.names), _code(new)
-    rows, roles = np.empty((count + 1, ROW)), np.empty(count + 1, dtype=np.int64)
+    rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
     rows[:count], rows[count] = old.rows, volume_row(new)
     roles[:count], roles[count] = old.roles, role
     attached = (*old.attached, new.name) if role >= ATTACHED else old.attached
@@ -62,7 +61,7 @@ def changed(old: Snapshot, new: WorldObject) -> Snapshot:
 def shortened(old: Snapshot, name: str) -> Snapshot:
     """The next snapshot, without the object of that name."""
     place, count = old.names.index(name), len(old.names)
-    rows, roles = np.empty((count - 1, ROW)), np.empty(count - 1, dtype=np.int64)
+    rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
     rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
     roles[:place], roles[place:] = old.roles[:place], old.roles[place + 1 :]
     objects = old.objects.copy()

@@ -7,20 +7,19 @@ import itertools
 import numpy as np
 
 from mobee.collision.snapshot import ATTACHED, OBSTACLE, TARGET, Snapshot
-from mobee.engine.hands import hands_of
+from mobee.engine.hands import Hands
 from mobee.errors import UnknownName
 from mobee.robot.robot import Ints, Robot
 
 SOLID, FIELD = 0, 1
 
 
-def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: int) -> tuple[Ints, Ints, Ints]:
+def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
     """First and second volume, the robot's shapes and then the objects, and kind (0 solid, 1 field) of every tested pair.
 
-    Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares the hands that are `reaching` (see
-    `hands`).  An object on a link meets the shapes of all links that its own is tested
-    against, whatever else such links carry, and the free objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object
-    on no link of the robot.
+    Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares the hands that are `reaching`.
+    An object on a link meets the shapes of all links that its own is tested against, whatever else such links carry, and the free
+    objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object on no link of the robot.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]
@@ -33,7 +32,7 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: int) -> tuple[Ints,
     with_free = [(index, link, role) for index, link, role in bodies if index not in robot.base_shapes]
     with_free += [(index, link, SOLID) for index, link in carried]
     sparing = [set[int](), set[int]()]  # links, by kind
-    for hand in hands_of(reaching):
+    for hand in reaching:
         sparing[SOLID] |= _carried(robot, hand.link)
         sparing[FIELD] |= _carried(robot, hand.link) | _carried(robot, hand.fields)
     world = [(a, b, kind) for a, link, kind in with_free for b, is_target in free if not (is_target and link in sparing[kind])]

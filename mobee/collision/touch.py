@@ -5,11 +5,10 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
+    from mobee.collision.contact import ContactTable
     from mobee.pose import Pose
 
 
@@ -20,13 +19,14 @@ def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
     """The names of the world objects in contact (fields included) with a link that the part moves, in order; one pose."""
-    table = pose.table
-    outside = np.flatnonzero(table.second_link < 0)
-    if not len(outside):
-        return ()
-    moved = links_moved(pose.robot)[part]
-    found = {table.name(int(table.second[row])) for row in outside if int(table.first_link[row]) in moved}
-    return tuple(sorted(found))
+    return touched_in(pose.table, links_moved(pose.robot)[part])
+
+
+def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
+    """The names of the world objects in contact with these links, in order, from the contacts of one pose."""
+    rows = table.numbers.tolist()
+    found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}
+    return tuple(sorted(map(table.name, found)))
 
 
 @lru_cache(maxsize=8)

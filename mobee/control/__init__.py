@@ -10,3 +10,5 @@ from mobee.control.reach import reach_path as reach_path
 from mobee.control.reacher import Reacher as Reacher
 from mobee.control.settle import Settle as Settle
 from mobee.control.settle import SettleTest as SettleTest
+from mobee.control.terms import State as State
+from mobee.control.terms import Term as Term

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core.law import moving_names, term_names
+from mobee._core.tables import Table
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.layout import FEEDFORWARD, OWN_ACCELERATION, OWN_VELOCITY
-from mobee.control.load import law, reach_law
+from mobee.control.law import Law
 from mobee.control.modality import Command, Modality
-from mobee.control.pack import Law, pack
-from mobee.control.packed_reaches import Arrays, PackedReaches
+from mobee.control.reaches import Reaches
 from mobee.control.stability import largest_step, require_stable
+from mobee.control.terms import State, Term, valid_terms
 from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.motor_units import motor_units
@@ -39,8 +41,8 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_compiled", "_packed", "_pushes", "_reaches", "_state", "_track", "contact_forces", "gains",
-        "last_forces", "max_dt", "modality", "model", "propagate", "robot", "weight",
+        "_attractor", "_client", "_last_forces", "_pushes", "_reaches", "_state", "_track", "contact_forces", "force_names", "forced",
+        "gains", "law", "max_dt", "modality", "model", "propagate", "robot", "terms", "weight",
     )  # fmt: skip
 
     def __init__(
@@ -52,8 +54,12 @@ class Controller:
         speed_scale: float = 1.0,
         contact_forces: bool = True,
         alive: NDArray[np.bool_] | None = None,
+        terms: Sequence[Term] = (),
     ) -> None:
-        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all."""
+        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all.
+
+        `terms`: further forces, functions in Python, added to those of the law.  `max_dt` knows nothing of them.
+        """
         if not callable(getattr(model, "track", None)):  # who brings a model of their own is welcome
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
@@ -71,10 +77,14 @@ class Controller:
         self.contact_forces = contact_forces
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
-        self._compiled = law()
-        reach_law()  # the first reach is not to wait for it
-        self._packed = pack(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
-        self._reaches = PackedReaches(self.robot, self._packed.integers)
+        self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
+        """The law with its numbers."""
+        self.terms = valid_terms(terms)
+        self.force_names = (*term_names(), *(term.name for term in self.terms))
+        """The names of all forces in `last_forces`, in the order in which they are added."""
+        self._reaches = Reaches(self.robot, self.law)
+        self._last_forces: Forces | Array
+        self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
         self.reset(self.robot.home)
 
@@ -85,34 +95,41 @@ class Controller:
 
     @attractor.setter
     def attractor(self, q: Array) -> None:
-        self._attractor = checked("attractor", q, len(self.robot.motors))
+        self._attractor[:] = checked("attractor", q, len(self.robot.motors))
 
     @property
     def velocity(self) -> Array:
         """The law's own velocity, shape (n,), in [rad/s]: a copy."""
-        own: Array = self._state[OWN_VELOCITY].copy()
+        own: Array = self._state["velocity"].copy()
         return own
 
     @property
     def acceleration(self) -> Array:
         """The acceleration of the last step, shape (n,), in [rad/s^2]: a copy."""
-        own: Array = self._state[OWN_ACCELERATION].copy()
+        own: Array = self._state["acceleration"].copy()
         return own
 
     @property
-    def law(self) -> Law:
-        """The law as compiled code reads it."""
-        return self._packed
-
-    @property
-    def state(self) -> Array:
-        """The law's state (STATE, n), see `layout`: what compiled code advances, no copy."""
+    def state(self) -> Table:
+        """The law's state, a row for each motor (see `mobee._core.law.STATE`): always the same array, which a plant advances."""
         return self._state
 
     @property
     def goal(self) -> Array:
-        """The attractor itself, shape (n,), in [rad]: what compiled code reads, no copy."""
+        """The attractor itself, shape (n,), in [rad]: always the same array, no copy."""
         return self._attractor
+
+    @property
+    def last_forces(self) -> Forces:
+        """The constraint forces of the last step."""
+        known = self._last_forces
+        if not isinstance(known, Forces):
+            known = self._last_forces = Forces(**dict(zip(self.force_names, known, strict=True)))
+        return known
+
+    def note_forces(self, forces: Array) -> None:
+        """Take the rows for `last_forces`, (forces, n) in the order of `force_names`, a copy."""
+        self._last_forces = forces.copy()
 
     @property
     def pushed(self) -> bool:
@@ -120,14 +137,14 @@ class Controller:
         return bool(self._pushes)
 
     @property
-    def reaches(self) -> Arrays:
-        """The reaches as compiled code reads them, and keeps its memory: no copy."""
-        return self._reaches.arrays
+    def reaches(self) -> Reaches:
+        """The reaches under way."""
+        return self._reaches
 
     def client_force(self, q: Array) -> Array:
         """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
         total = np.zeros(len(q))
-        if self._pushes or self._client.any():
+        if self._pushes or self.forced:
             self._add_client(q, total)
         return total
 
@@ -139,6 +156,7 @@ class Controller:
     def force(self, f: Array) -> None:
         """Apply a force in configuration space, (n,) rad/s^2 or m/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
         self._client = checked_force("force", f, len(self.robot.motors))
+        self.forced = bool(self._client.any())
 
     def push(self, marker: str, f: Array) -> None:
         """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
@@ -150,33 +168,34 @@ class Controller:
 
     def clear(self) -> None:
         """End all forces of the client; reaches go on."""
-        self._client = np.zeros(len(self.robot.motors))
+        self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 
-    def reach_toward(self, part: str, marker: str, target: ReachTarget) -> None:
+    def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
         """Draw a marker to a target with the motors of one part, against its attractor, until the next or `end_reach` (8.2).
 
-        Raises InvalidValue if none of the part's motors that may be moved moves the marker; UnknownName.
+        `part` None: with all motors that move the marker.  Raises InvalidValue if there are none that may be moved; UnknownName.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
-        self._reaches.aim(part, target)
+        self._reaches[part].aim(target)
 
-    def end_reach(self, part: str) -> None:
-        """End the pull on a part's marker, if there is one."""
-        self.robot.part(part)
+    def end_reach(self, part: str | None) -> None:
+        """End the pull on a part's marker, or on that of the whole body (None), if there is one."""
+        if part is not None:
+            self.robot.part(part)
         self._reaches.end(part)
 
-    def still_nears(self, part: str) -> bool:
+    def still_nears(self, part: str | None) -> bool:
         """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
-        return bool(reach_law().still_nears(self._packed.integers, self.robot.part(part).start, *self._reaches.arrays))
+        return self._reaches.go_on(part)
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
         q = checked("q", q, len(self.robot.motors))
-        self._attractor = q
-        self._state = self._at_rest(q)
-        self.last_forces = Forces(np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
+        self._attractor[:] = q
+        self._state[:] = self.law.at_rest(q)
+        self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
         """Stay where the part is: own velocity 0 and attractor at its measured q (n_part,) rad.
@@ -184,7 +203,8 @@ class Controller:
         The commanded velocity follows as fast as the acceleration limit lets it.
         """
         self.set_attractor(part, q)
-        self._state[[OWN_VELOCITY, OWN_ACCELERATION], self.robot.part(part).slice] = 0.0
+        where = self.robot.part(part).slice
+        self._state["velocity"][where] = self._state["acceleration"][where] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
         """Have a part that something else keeps still begin anew, as `reset` does for all; q (n_part,) rad measured.
@@ -193,42 +213,57 @@ class Controller:
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
-        self._state[:, where] = self._at_rest(self._attractor)[:, where]
+        self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """The constraint forces at a pose, as `step` computes them when it is given none."""
-        return forces_of(self._packed, pose, self.propagate)
+        """The law's own constraint forces at a pose, as `step` computes them when it is given none."""
+        return forces_of(self.law, pose, self.propagate, self._state)
 
-    def step(self, q: Array, dt: float, forces: Forces | None = None) -> Command:
-        """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model.
+    def own_forces(self, q: Array, dt: float, pose: Pose | None = None) -> dict[str, Array]:
+        """What `terms` give for a tick of dt [s] at the measured q (n,) rad; raises InvalidValue, which names the term."""
+        if not self.terms:
+            return {}
+        state = State(self.robot, q, self.velocity, dt, lambda: self._track.evaluate(q) if pose is None else pose)
+        found = {term.name: np.zeros(len(q)) for term in self.terms}
+        for term in self.terms:
+            found[term.name][self.law.felt] = term.force(state)[self.law.felt]
+        return found
 
-        Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), for a q that is not finite, and for
-        forces that are not or whose sum is beyond LARGEST_FORCE.
+    def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
+        """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model, or of the `pose`.
+
+        Forces that lack what depends on the law's state, or what `terms` give, are filled up.  Raises InvalidValue for a dt at which
+        the gains are unstable (`max_dt` and above), for a q that is not finite, and for forces that are not or whose sum is beyond
+        LARGEST_FORCE.
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
         n = len(self._attractor)
         q = checked("q", q, n)
         if forces is None:
-            forces = self.forces(self._track.evaluate(q))
+            pose = self._track.evaluate(q) if pose is None else pose
+            forces = self.forces(pose)
+        if not all(name in forces for name in self.force_names):
+            forces = self._filled(forces, q, dt, pose)
         total = checked_force("forces", forces.total, n) + self.client_force(q)
-        packed = self._packed
         if self._reaches:
-            reach_law().add_reaches(packed.integers, packed.floats, q, self._attractor, dt, total, *self._reaches.arrays)
+            self._reaches.add_forces(q, self._attractor, dt, total)
         if self.modality == "torque":
-            self._state[FEEDFORWARD] = gravity_torque(self.robot, q)
-        commands = self._compiled.step(packed.integers, packed.floats, q, dt, self._attractor, total, self._state)
-        self.last_forces = forces
+            self._state["feedforward"] = gravity_torque(self.robot, q)
+        commands = self.law.step(q, dt, self._attractor, total, self._state)
+        self._last_forces = forces
         return Command(*commands)
 
-    def _at_rest(self, q: Array) -> Array:
-        state: Array = self._compiled.at_rest(self._packed.integers, self._packed.floats, q)
-        return state
+    def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
+        """With all that it lacks."""
+        more = self.own_forces(q, dt, pose)
+        if any(name not in forces for name in moving_names()):
+            more |= self.forces(self._track.evaluate(q) if pose is None else pose)
+        return Forces(**{**more, **forces})
 
     def _add_client(self, q: Array, total: Array) -> None:
         """Add f_config and f_work (thesis eqs. 5.9-5.10); of a motor that slides f_work too counts in its unit, as a contact does."""
-        integers, floats = self._packed.integers, self._packed.floats
-        self._compiled.add_client(integers, floats, self._client, total)
+        self.law.add_client(self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))
-            self._compiled.add_client(integers, floats, projected * motor_units(self.robot) ** 2, total)
+            self.law.add_client(projected * motor_units(self.robot) ** 2, total)

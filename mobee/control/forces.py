@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
+from functools import lru_cache, reduce
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from mobee._core.law import moving_names, term_names
+from mobee._core.tables import Table
 from mobee.control.gains import Gains
-from mobee.control.load import law
-from mobee.control.pack import Law, pack
+from mobee.control.law import Law
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array, Robot
 
@@ -19,18 +22,66 @@ if TYPE_CHECKING:
 Propagate = Literal["tree", "part"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Forces:
-    """f_lim, f_cst and f_coll of eq. 5.7, each (n,) in rad/s^2 (force per unit mass), already bounded."""
+class Forces(Mapping[str, Array]):
+    """The forces that constrain the robot, by name, each (n,) in rad/s^2 (force per unit mass), already bounded.
 
-    limits: Array
-    constraints: Array
-    collision: Array
+    First those of the law, in the order in which they are added: `limits`, `constraints` and `collision`, f_lim, f_cst and f_coll of
+    eq. 5.7; then those of terms from outside.  Each is an attribute too.  Those of the law that depend on its state may lack.
+    """
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, *rows: Array, **more: Array) -> None:
+        """The law's in their order or by their names, and any others by theirs."""
+        if not more and len(rows) == len(term_names()):
+            self._rows = dict(zip(term_names(), rows, strict=True))
+            return
+        given = {**dict(zip(term_names(), rows, strict=False)), **more}
+        if len(rows) > len(term_names()) or len(given) < len(rows) + len(more):
+            raise InvalidValue(
+                f"forces: {len(rows)} without a name, {', '.join(more) or 'none'} by name; the law has {', '.join(term_names())}"
+            )
+        if lacking := [name for name in told_terms() if name not in given]:
+            raise InvalidValue(f"forces: {', '.join(lacking)} lacking")
+        self._rows = {name: given.pop(name) for name in term_names() if name in given} | given
+
+    def __getitem__(self, name: str) -> Array:
+        return self._rows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getattr__(self, name: str) -> Array:
+        if name.startswith("_") or name not in self:
+            raise AttributeError(f"there is no force {name!r}")
+        return self._rows[name]
+
+    def __repr__(self) -> str:
+        return f"Forces({', '.join(f'{name}={force!r}' for name, force in self.items())})"
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
 
     @property
     def total(self) -> Array:
         """Their sum, shape (n,), in [rad/s^2]."""
-        return self.limits + self.constraints + self.collision
+        return reduce(np.add, self._rows.values())
+
+
+def told_terms() -> tuple[str, ...]:
+    """The names of the law's terms that a pose alone decides: the model tells them, what depends on the law's state it cannot."""
+    return tuple(name for name in term_names() if name not in moving_names())
+
+
+def needs_contacts() -> bool:
+    """Whether the law has terms that the model cannot tell: then it tells the contacts."""
+    return bool(moving_names())
 
 
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:
@@ -39,19 +90,19 @@ def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", c
     `propagate`: how far down the body a contact is felt.  `contact_forces` False leaves f_coll
     at zero, for the control experiment in which touching has no effect.
     """
-    return forces_of(_packed(pose.robot, gains, contact_forces), pose, propagate)
+    return forces_of(_law(pose.robot, gains, contact_forces), pose, propagate)
 
 
-def forces_of(packed: Law, pose: Pose, propagate: Propagate) -> Forces:
-    """The constraint forces at one pose, of a packed law."""
+def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = None) -> Forces:
+    """The constraint forces at one pose, of a law with its numbers, in a state or at rest."""
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")
     if propagate not in ("tree", "part"):
         raise UnknownName("propagation", propagate, ("tree", "part"))
     torque = pose.projection if propagate == "tree" else pose.projection_of_part
-    return Forces(*law().forces_at(packed.integers, packed.floats, pose.q, torque))
+    return Forces(*law.forces(pose.q, torque, state))
 
 
 @lru_cache(maxsize=8)
-def _packed(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
-    return pack(robot, gains, contact_forces=contact_forces)
+def _law(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
+    return Law(robot, gains, contact_forces=contact_forces)

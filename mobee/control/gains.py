@@ -30,7 +30,7 @@ class Gains:
     All numbers are those of motors that turn.  For a motor that slides 1 rad is a share of its range (`mobee.robot.motor_units`), so
     that the law is the same in that unit: `limit_width` of 10 degrees is 5 % of its range, a `max_` of 12 rad/s^2 3.4 ranges/s^2.
 
-    `law`: how constraints and contacts become forces (see `constraints`, `collision`).  `damping` C in 1/s,
+    `law`: how constraints and contacts become forces (see `mobee.reference.forces`).  `damping` C in 1/s,
     `stiffness` K in 1/s^2, each of the `max_` in rad/s^2.  `limit_width` in rad; `constraint_width` in rad along the
     row's normal (published law: in units of a.q + b).  `contact_gain`: default law, rad/s^2 for a lever
     and penetration of 1 m; published law, deg/s^2 before it is squared.  `contact_slope`, `client_slope`: the slope
@@ -65,7 +65,7 @@ class Gains:
             value = getattr(self, name)
             if isinstance(value, list):  # as JSON has it
                 object.__setattr__(self, name, _tuples(value))
-            if name not in _NO_NUMBERS:
+            if name not in _NO_NUMBERS and value != self.__dataclass_fields__[name].default:  # 0 as default: a force that is not there
                 _require_positive(name, value)
         if self.law not in get_args(Law):
             raise UnknownName("law", self.law, get_args(Law))

@@ -1,201 +1,121 @@
-"""The whole law, compiled once, for the controller and for the offline plant's loop: forces, a step, the settle test.
-
-All of it works on a packed law (`pack`) and a state (STATE, n), see `layout`; the inner functions allocate nothing.
-"""
+"""The law of eq. 5.7 with its numbers for one robot; core/law.cpp has the formulas."""
 
 from __future__ import annotations
 
-import math
+import ctypes
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mobee.control.client import add_client_force
-from mobee.control.collision import collision_forces
-from mobee.control.constraints import clause_forces
-from mobee.control.dynamics import acceleration, bounded, led
-from mobee.control.layout import (
-    ACCELERATION,
-    ACTIVE,
-    BEGUN,
-    DAMPING,
-    F_MOTOR,
-    FEEDFORWARD,
-    FELT,
-    FINE,
-    HIGH,
-    I_ACTIVE,
-    I_FELT,
-    INTERVAL,
-    LOW,
-    MAX_ACCELERATION,
-    MAX_SPEED,
-    MAX_SPRING,
-    MAX_TORQUE,
-    MODALITY,
-    MOTOR,
-    MOTORS,
-    MOVING,
-    NEXT_LOOK,
-    OWN_ACCELERATION,
-    OWN_VELOCITY,
-    POSITION,
-    REACH,
-    REFERENCE,
-    SENT,
-    SETTLED,
-    SPEED,
-    STATE,
-    STIFFNESS,
-    TIMED_OUT,
-    TIMEOUT,
-    TORQUE,
-    VELOCITY,
-)
-from mobee.control.limits import limit_forces
-from mobee.control.modality import FRICTION, INERTIA
-from mobee.engine.compiled import entry_exact, inner_exact
-from mobee.robot.robot import Array, Ints
+from mobee._core import address
+from mobee._core import law as core
+from mobee._core.tables import INTERVAL, Table, numbers, view
+from mobee.control.gains import Gains
+from mobee.control.modality import Modality
+from mobee.robot.motor_units import fine_units, limit_zones, motor_units
+from mobee.robot.robot import Array, Clause, Ints, Robot
 
-_ROUNDING = 1e-9  # s, times are sums of ticks
+INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
+LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
+
+_OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 
-@inner_exact
-def constraint_forces(integers: Ints, floats: Array, q: Array, torque: Array, limits: Array, constraints: Array, collision: Array) -> None:
-    """Fill f_lim, f_cst and f_coll of eq. 5.7, each (n,) in rad/s^2, at q (n,) rad.
+class Law:
+    """The law as tables with names, made once; bare numbers, all of them checked before.  Several threads may use it at once."""
 
-    `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.
-    """
-    for i in range(integers[MOTORS]):
-        limits[i] = constraints[i] = collision[i] = 0.0
-    limit_forces(integers, floats, q, limits)
-    clause_forces(integers, floats, q, constraints)
-    collision_forces(integers, floats, torque, collision)
+    def __init__(
+        self,
+        robot: Robot,
+        gains: Gains,
+        modality: Modality = "velocity",
+        speed_scale: float = 1.0,
+        contact_forces: bool = True,
+        alive: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """`alive` (n,): motors that there are forces for; the others are never moved, as those of weight 0."""
+        live = np.ones(len(robot.motor_table), dtype=bool) if alive is None else alive
+        self.motors = _motors(robot, gains, speed_scale)
+        self.active: Ints = np.flatnonzero(live & (gains.weight(robot.motors) > 0))
+        """Indices of the motors that are ever moved."""
+        self.felt: Ints = np.flatnonzero(live)
+        """Indices of the motors on which forces are computed."""
+        self.parts = np.array([(p.start, p.start + len(p)) for p in robot.parts.values() if live[p.slice].any()], dtype=INTERVAL)
+        clauses = [clause for clause in robot.clauses if clause.a[:, live].any()]
+        self.clauses, self.rows, self.entries = _clauses(clauses, gains, motor_units(robot))
+        self._struct = core.Law(
+            *(view(table) for table in (self.motors, self.active, self.felt, self.parts, self.clauses, self.rows, self.entries)),
+            gains.law == "published_2014", contact_forces, gains.client_squash == "direction", core.MODALITIES.index(modality),
+            *(getattr(gains, name) for name in core.TERM_GAINS),
+            core.Settle(*(getattr(gains.settle, name) for name in core.SETTLE)),
+        )  # fmt: skip
+        self.address = ctypes.addressof(self._struct)
+        """Where the core finds the law."""
+        self._core = core.calls()
+        self._still: Table = np.zeros(len(self.motors), dtype=core.STATE)
 
+    def __len__(self) -> int:
+        return len(self.motors)
 
-@inner_exact
-def rest(integers: Ints, floats: Array, q: Array, state: Array, command: Array) -> None:
-    """Begin at rest at the measured q (n,) rad: fill the state, and the command (n,) of motors that are never moved."""
-    for i in range(integers[MOTORS]):
-        o = F_MOTOR + i * MOTOR
-        for row in range(STATE):
-            state[row, i] = 0.0
-        state[REFERENCE, i] = min(max(q[i], floats[o + LOW]), floats[o + HIGH])
-        command[i] = state[REFERENCE, i] if integers[MODALITY] == POSITION else 0.0
-    for k in range(integers[ACTIVE]):
-        i = integers[integers[I_ACTIVE] + k]
-        state[REFERENCE, i] = q[i]
+    def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
+        """The forces that constrain the robot at q, (len(term_names()), n) in rad/s^2.
 
+        `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.  `state`:
+        of the law, before the step; None: it is at rest.
+        """
+        found = np.empty((len(core.term_names()), len(self)))
+        given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
+        self._core.forces(self.address, *given, address(found))
+        return found
 
-@inner_exact
-def advance(integers: Ints, floats: Array, q: Array, dt: float, attractor: Array, force: Array, state: Array, command: Array) -> None:
-    """One step of eq. 5.7 by dt [s] from the measured q (n,) rad, and the command (n,) in the law's modality.
+    def at_rest(self, q: Array) -> Table:
+        """The state at rest at the measured q (n,)."""
+        state: Table = np.zeros(len(self), dtype=core.STATE)
+        self._core.begin(self.address, numbers(q, len(self)), address(state))
+        return state
 
-    `force` (n,) rad/s^2: the sum of the right-hand side.  Motors that are never moved keep their state and their command, but in
-    torque modality they too are told the torque that is fed forward.
-    """
-    for k in range(integers[ACTIVE]):
-        i = integers[integers[I_ACTIVE] + k]
-        o = F_MOTOR + i * MOTOR
-        own = state[OWN_VELOCITY, i]
-        a = acceleration(q[i], own, attractor[i], force[i], floats[o + STIFFNESS], floats[o + MAX_SPRING], floats[o + DAMPING])
-        v = bounded(own + a * dt, state[SENT, i], floats[o + MAX_SPEED], floats[o + MAX_ACCELERATION] * dt)
-        state[OWN_ACCELERATION, i] = (v - state[SENT, i]) / dt  # of what is sent: after `hold` the own velocity is 0 and that is not
-        state[OWN_VELOCITY, i] = v
-        state[SENT, i] = v
-        state[REFERENCE, i] = led(state[REFERENCE, i], q[i], v, dt, floats[o + REACH], floats[o + LOW], floats[o + HIGH])
-        if integers[MODALITY] == POSITION:
-            command[i] = state[REFERENCE, i]
-        elif integers[MODALITY] == VELOCITY:
-            command[i] = v
-    if integers[MODALITY] == TORQUE:
-        for k in range(integers[FELT]):
-            i = integers[integers[I_FELT] + k]
-            command[i] = torque_of(floats, i, state)
+    def add_client(self, f: Array, total: Array) -> None:
+        """Add L(f), f_config or f_work (eqs. 5.9 and 5.10), to a total, both (n,)."""
+        self._core.client(self.address, numbers(f, len(self)), address(total))
 
-
-@inner_exact
-def torque_of(floats: Array, motor: int, state: Array) -> float:
-    """The torque [N m] that gives a motor its velocity and acceleration and carries what is fed forward, within its maximum."""
-    wanted = INERTIA * state[OWN_ACCELERATION, motor] + FRICTION * state[OWN_VELOCITY, motor] + state[FEEDFORWARD, motor]
-    most = floats[F_MOTOR + motor * MOTOR + MAX_TORQUE]
-    return min(max(wanted, -most), most)
-
-
-@inner_exact
-def is_time(settle: Array, test: Array, t: float) -> bool:
-    """Whether the motion is looked at, at time t [s]; then the time of the next look is noted."""
-    if t < test[NEXT_LOOK] - _ROUNDING:
-        return False
-    missed = math.floor((t - test[NEXT_LOOK] + _ROUNDING) / settle[INTERVAL])
-    test[NEXT_LOOK] += (missed + 1) * settle[INTERVAL]
-    return True
+    def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
+        """Advance a state by dt [s] under the sum of all forces (n,); the commands: position, velocity, torque, (3, n)."""
+        n, commands = len(self), np.empty((3, len(self)))
+        given = numbers(q, n), dt, numbers(attractor, n), numbers(force, n)
+        self._core.step(self.address, *given, address(state), address(commands))
+        return commands
 
 
-@inner_exact
-def is_slow(settle: Array, velocity: float, change: float, unit: float) -> bool:
-    """Whether a motor that is commanded so counts as at rest; `unit`: what 1 rad of the thresholds is for it."""
-    return abs(velocity) <= settle[SPEED] * unit and abs(change) <= settle[ACCELERATION] * unit
+def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
+    """A row for each motor."""
+    table: Table = np.zeros(len(robot.motor_table), dtype=core.MOTOR_GAINS)
+    table["low"], table["high"] = robot.limits.T
+    for name in _OF_MOTORS:
+        table[name] = gains.of_robot(name, robot)
+    width = gains.of_robot("limit_width", robot)
+    table["spring_knee"] = table["max_spring"] / gains.of_robot("stiffness", robot)
+    table["client_knee"] = table["max_client"] / table["client_slope"]
+    table["limit_slope"] = gains.of_robot("max_limit", robot) / width
+    table["below"], table["above"] = limit_zones(robot, width).T
+    table["max_speed"] = INSIDE * speed_scale * np.array([m.max_velocity for m in robot.motor_table])
+    table["max_acceleration"] = INSIDE * np.array([m.max_acceleration for m in robot.motor_table])
+    table["max_torque"] = [m.max_torque for m in robot.motor_table]
+    table["leash"] = LEASH * table["max_speed"]
+    table["unit"], table["fine"] = motor_units(robot), fine_units(robot)
+    return table
 
 
-@inner_exact
-def unsettled(settle: Array, test: Array, t: float) -> int:
-    """What a part is that has not settled by time t [s]: MOVING or TIMED_OUT."""
-    return TIMED_OUT if t - test[BEGUN] >= settle[TIMEOUT] - _ROUNDING else MOVING
-
-
-@inner_exact
-def settle_look(floats: Array, settle: Array, test: Array, t: float, state: Array, first: int, stop: int) -> int:
-    """Judge the motion of the motors first to stop at time t [s]: MOVING, SETTLED or TIMED_OUT; between two looks always moving."""
-    if is_time(settle, test, t):
-        slow = True
-        for i in range(first, stop):
-            slow = slow and is_slow(settle, state[OWN_VELOCITY, i], state[OWN_ACCELERATION, i], floats[F_MOTOR + i * MOTOR + FINE])
-        if slow:
-            return SETTLED
-    return unsettled(settle, test, t)
-
-
-@entry_exact("Tuple((float64[::1], float64[::1], float64[::1]))(int64[::1], float64[::1], float64[::1], float64[::1])")
-def forces_at(integers: Ints, floats: Array, q: Array, torque: Array) -> tuple[Array, Array, Array]:
-    """What `constraint_forces` fills, in new arrays."""
-    limits, constraints, collision = np.empty(len(q)), np.empty(len(q)), np.empty(len(q))
-    constraint_forces(integers, floats, q, torque, limits, constraints, collision)
-    return limits, constraints, collision
-
-
-@entry_exact("float64[:,::1](int64[::1], float64[::1], float64[::1])")
-def at_rest(integers: Ints, floats: Array, q: Array) -> Array:
-    """The state of `rest`, a new array."""
-    state = np.empty((STATE, len(q)))
-    rest(integers, floats, q, state, np.empty(len(q)))
-    return state
-
-
-@entry_exact("float64[:,::1](int64[::1], float64[::1], float64[::1], float64, float64[::1], float64[::1], float64[:,::1])")
-def step(integers: Ints, floats: Array, q: Array, dt: float, attractor: Array, force: Array, state: Array) -> Array:
-    """`advance` a state, which changes, and give the commands in all modalities, in a new array: position, velocity, torque."""
-    commands = np.empty((3, len(q)))
-    advance(integers, floats, q, dt, attractor, force, state, commands[0])
-    for i in range(len(q)):
-        commands[0, i] = state[REFERENCE, i]
-        commands[1, i] = state[OWN_VELOCITY, i]
-        commands[2, i] = torque_of(floats, i, state)
-    return commands
-
-
-@entry_exact("void(int64[::1], float64[::1], float64[::1], float64[::1])")
-def add_client(integers: Ints, floats: Array, f: Array, total: Array) -> None:
-    """Add L(f), f_config or f_work (eqs. 5.9 and 5.10), to a total, both (n,)."""
-    add_client_force(integers, floats, f, total)
-
-
-@entry_exact("int64(float64[::1], float64[::1], float64, float64[:,::1])")
-def look(settle: Array, test: Array, t: float, motion: Array) -> int:
-    """`settle_look` at commanded velocities and accelerations, (2, k), divided by FINE of the motors."""
-    if is_time(settle, test, t):
-        slow = True
-        for i in range(motion.shape[1]):
-            slow = slow and is_slow(settle, motion[0, i], motion[1, i], 1.0)
-        if slow:
-            return SETTLED
-    return unsettled(settle, test, t)
+def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Table, Table, Table]:
+    """The clauses, which say where their rows are, which say where their entries are."""
+    spans, rows, entries = list[tuple[int, int]](), list[tuple[float, float, tuple[int, int]]](), list[tuple[int, float, float]]()
+    for clause in clauses:
+        spans.append((len(rows), len(rows) + len(clause.b)))
+        for a, b in zip(clause.a, clause.b, strict=True):
+            length = float(np.linalg.norm(a * units))
+            moved = np.flatnonzero(a)
+            # The published law's rows are not normalised: its width is in units of a.q + b.
+            zone = gains.constraint_width * (1.0 if gains.law == "published_2014" else length)
+            rows.append((float(b), zone, (len(entries), len(entries) + len(moved))))
+            entries += [(int(motor), float(a[motor]), float(a[motor] * units[motor] / length)) for motor in moved]
+    return np.array(spans, dtype=INTERVAL), np.array(rows, dtype=core.CLAUSE_ROW), np.array(entries, dtype=core.CLAUSE_ENTRY)

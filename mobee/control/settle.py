@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from mobee.control.layout import MOVING, SETTLED, TIMED_OUT
-from mobee.control.load import law
+from mobee._core import law as core
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 
 Verdict = Literal["moving", "settled", "timeout"]
-_VERDICTS: dict[int, Verdict] = {MOVING: "moving", SETTLED: "settled", TIMED_OUT: "timeout"}
+VERDICTS: tuple[Verdict, ...] = ("moving", "settled", "timeout")
+"""In the order of the core's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,6 @@ class Settle:
         if not 0 <= self.first_look < np.inf:
             raise InvalidValue(f"settle first_look {self.first_look} s: must be a finite time, not negative")
 
-    @property
-    def numbers(self) -> Array:
-        """As the compiled test reads them, (5,)."""
-        return np.array([self.speed, self.acceleration, self.first_look, self.interval, self.timeout])
-
 
 class SettleTest:
     """One action's test: looks at the commanded motion now and then, as the original's poll did."""
@@ -49,8 +45,9 @@ class SettleTest:
     def __init__(self, settle: Settle, start: float) -> None:
         """Begin at time `start` [s]."""
         self.settle = settle
-        self._numbers = settle.numbers
-        self._memory = np.array([start, start + settle.first_look])
+        self._thresholds = core.Settle(*(getattr(settle, name) for name in core.SETTLE))
+        self._memory = core.SettleTest(start, start + settle.first_look)
+        self._look = core.calls().look
 
     def look(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
         """Judge the part's motion at time t [s]; between two looks the answer is always "moving".
@@ -58,4 +55,6 @@ class SettleTest:
         `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,); of motors that
         slide divided by their `fine_units`.
         """
-        return _VERDICTS[law().look(self._numbers, self._memory, t, np.array([speeds, accelerations], dtype=np.float64))]
+        motion = np.array([speeds, accelerations], dtype=np.float64)
+        found: int = self._look(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])
+        return VERDICTS[found]

@@ -1,6 +1,6 @@
-"""The compiled engine: kinematics, contacts and projected forces of one pose or of many, over packed arrays.
+"""The engine: kinematics, contacts and projected forces of one pose or of many, found by the core.
 
-`engine_of(robot)` is all that the rest of the library needs; importing this package alone compiles and imports nothing.
+`engine_of(robot)` is all that most of the library needs; importing this package alone loads nothing.
 """
 
 from __future__ import annotations
@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 
 
 def engine_of(robot: Robot) -> Engine:
-    """The engine of a robot; the first call of a process loads the machine code, the first after an install compiles it."""
-    from mobee.engine.load import load
-
-    load()
+    """The engine of a robot; the first call of a process loads the core."""
     from mobee.engine.engine import Engine
 
     return Engine(robot)

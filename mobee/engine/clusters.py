@@ -9,30 +9,33 @@ from __future__ import annotations
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mobee.engine.layout import ROW_BOUND, ROW_KIND, ROW_POSITION
+from mobee.engine.volumes import Volumes
 from mobee.robot.robot import Array, Ints, Robot
 
 SMALL = 0.25  # of the robot's own radius; measured on the benchmark: 0.1 and 0.5 make the broad phase a fifth slower
 SAMPLES = 16
+Flags = NDArray[np.bool_]
+
 _CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 
 
-def clusters(robot: Robot, rows: Array, link: Ints, role: Ints, own: int) -> list[list[int]]:
+def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
     """Indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
     groups = _CACHE.get(robot)  # what is carried changes while the robot moves, its own groups never do
     if groups is None:
-        groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], role[:own])
+        groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], field[:own])
     return groups + [[index] for index in range(own, len(rows))]
 
 
-def _own_clusters(robot: Robot, rows: Array, link: Ints, role: Ints) -> list[list[int]]:
+def _own_clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags) -> list[list[int]]:
     centers = _sampled_centers(robot, rows, link)
     groups: list[list[int]] = []
-    for kind in range(2):
-        members = [[int(i) for i in np.flatnonzero((link == k) & (role == kind))] for k in range(len(robot.links))]
-        groups += _merge(robot, members, centers, rows[:, ROW_BOUND])
-    return [sorted(group, key=lambda index: rows[index, ROW_KIND]) for group in groups]  # runs of one kind are guessed right
+    for kind in (False, True):
+        members = [[int(i) for i in np.flatnonzero((link == k) & (field == kind))] for k in range(len(robot.links))]
+        groups += _merge(robot, members, centers, rows["bound"])
+    return [sorted(group, key=lambda index: rows["kind"][index]) for group in groups]  # runs of one kind are guessed right
 
 
 def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array) -> list[list[int]]:
@@ -58,7 +61,7 @@ def _radius(centers: Array, bound: Array, group: list[int]) -> float:
     return float((np.sqrt((between * between).sum(axis=2)) + bound[group]).max(axis=1).mean())
 
 
-def _sampled_centers(robot: Robot, rows: Array, link: Ints) -> Array:
+def _sampled_centers(robot: Robot, rows: Volumes, link: Ints) -> Array:
     """Where the shapes are in random poses, (SAMPLES, S, 3)."""
     rng = np.random.default_rng(0)
     low, high = np.clip(robot.limits, -10.0, 10.0).T  # rad; some joints turn without end
@@ -78,5 +81,5 @@ def _sampled_centers(robot: Robot, rows: Array, link: Ints) -> Array:
         turn.append(carrier_turn @ own)
         shift.append((carrier_turn @ (joint.point - own @ joint.point)[:, :, None])[:, :, 0] + carrier_shift)
     turns, shifts = np.stack(turn, axis=1)[:, link], np.stack(shift, axis=1)[:, link]
-    placed: Array = (turns @ rows[:, ROW_POSITION : ROW_POSITION + 3, None])[..., 0] + shifts
+    placed: Array = (turns @ rows["position"][:, :, None])[..., 0] + shifts
     return placed

@@ -1,18 +1,38 @@
-"""The engine of one robot: keeps what compiled code works on, for any number of threads."""
+"""The engine of one robot: keeps what the core works on, for any number of threads."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from mobee._core import engine as core
 from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import ATTACHED, Snapshot
-from mobee.engine import evaluate
-from mobee.engine.pack import Carried, Packed, pack
-from mobee.engine.room import Room
-from mobee.engine.rows import NUMBERS, REALS
-from mobee.engine.scene import Scene, scene
+from mobee.engine.hands import Hands, hand_numbers
+from mobee.engine.robot_tables import Carried, robot_tables
 from mobee.errors import UnknownName
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.per_robot import per_robot
+from mobee.robot.robot import Array, Robot
+
+GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
+PER_CELL = 8  # objects, aimed at
+
+_NOBODY = hand_numbers(())
+
+
+@per_robot
+def robot_handle(robot: Robot) -> core.Handle:
+    """The robot in the core."""
+    return core.robot(*robot_tables(robot).for_core())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A robot among the free objects of one snapshot.  It never changes."""
+
+    snapshot: Snapshot
+    handle: core.Handle
 
 
 class Engine:
@@ -21,52 +41,39 @@ class Engine:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._shapes = tuple(shape.name for shape in robot.shapes)
-        self._packed: tuple[tuple[bytes, ...], Packed] = (), pack(robot)
+        self._bare = robot_handle(robot)
+        self._laden: tuple[tuple[bytes, ...], core.Handle] = (), self._bare
         self._scene: Scene | None = None
-        self._rooms: list[Room] = []  # of evaluations that have ended
+        self._rooms: list[core.Room] = []  # of evaluations that have ended
 
     def transforms(self, q: Array) -> Array:
         """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
-        packed = self._packed[1]
-        return evaluate.link_poses(packed.integers, packed.floats, q)
+        return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
         """How the point (3,) of a link, root frame at zero pose, moves with each motor in the poses q (B, n): (B, 6, n)."""
-        packed = self._packed[1]
-        return evaluate.jacobians(packed.integers, packed.floats, q, link, np.tile(point, (len(q), 1)))
+        return core.jacobians(self._bare, q, link, point)
 
-    def contacts(self, q: Array, snapshot: Snapshot, reaching: int, cut: bool = False) -> tuple[ContactTable, Array]:
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
 
-        `reaching`: links that spare the targets, see `hands`; `cut`: see `project`.
+        `reaching`: who spares the targets; `cut`: a part's motors feel only what happens to its own links, as in the original
+        program.  The results are the same for any number of threads.
         """
-        here = self.scene_of(snapshot)
-        packed, own = here.packed, len(self.robot.shapes)
+        scene = self._scene
+        if scene is None or scene.snapshot is not snapshot:
+            scene = self.scene_of(snapshot)
         try:
             room = self._rooms.pop()  # as one step: other threads take rooms too
         except IndexError:
-            room = Room()
-        room.settle(here)
-        torque = np.zeros(q.shape)
-        written: list[tuple[Ints, Array]] = []
-        done, used = 0, 0
-        while done < len(q):
-            if used:
-                written.append((room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()))
-            done, used = evaluate.contacts(
-                packed.integers, packed.floats, packed.vertices, here.integers, here.floats, here.carried, own, reaching, cut, q, done,
-                room.slots, room.work, room.lists, room.spare, room.flags, room.numbers, room.reals, torque,
-            )  # fmt: skip
-        numbers, reals = room.numbers[: used * NUMBERS].copy(), room.reals[: used * REALS].copy()
+            room = core.Room(len(self.robot.motor_table))
+        numbers, reals, torque = room.evaluate(scene.handle, q, hand_numbers(reaching) if reaching else _NOBODY, cut, threads)
         self._rooms.append(room)
-        if written:
-            numbers = np.concatenate([*(one for one, _ in written), numbers])
-            reals = np.concatenate([*(one for _, one in written), reals])
-        return self.table(snapshot, numbers, reals), torque
+        return ContactTable(self._shapes, snapshot.names, numbers, reals), torque
 
-    def table(self, snapshot: Snapshot, numbers: Ints, reals: Array) -> ContactTable:
-        """The table of what compiled code has written."""
-        return ContactTable(self._shapes, snapshot.names, numbers.reshape(-1, NUMBERS), reals.reshape(-1, REALS))
+    def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
+        """The table of what the core has written."""
+        return ContactTable(self._shapes, snapshot.names, numbers, reals)
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
         """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
@@ -74,21 +81,26 @@ class Engine:
         if known is not None and known.snapshot is snapshot:
             return known
         carried = [k for k, role in enumerate(snapshot.roles) if role == ATTACHED] if snapshot.attached else []
-        new = scene(self._packed_with(snapshot, carried), snapshot, np.array(carried, dtype=np.int64))
+        count = len(snapshot.roles)
+        side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
+        robot = self._robot_with(snapshot, carried)
+        new = Scene(snapshot, core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side))
         self._scene = new
         return new
 
-    def _packed_with(self, snapshot: Snapshot, carried: list[int]) -> Packed:
-        """The robot with what it carries; packed anew only when that has changed."""
+    def _robot_with(self, snapshot: Snapshot, carried: list[int]) -> core.Handle:
+        """The robot with what it carries; made anew only when that has changed."""
+        if not carried:
+            return self._bare
         links = [snapshot.objects[snapshot.names[k]].link or "" for k in carried]
         key = tuple(link.encode() + snapshot.rows[k].tobytes() for link, k in zip(links, carried, strict=True))
-        known = self._packed
+        known = self._laden
         if known[0] == key:
             return known[1]
         for link in links:
             if link not in self.robot.links:
                 raise UnknownName("link", link, self.robot.links)
         things = [Carried(self.robot.links.index(link), snapshot.rows[k]) for link, k in zip(links, carried, strict=True)]
-        new = pack(self.robot, things)
-        self._packed = key, new
+        new = core.robot(*robot_tables(self.robot, things).for_core())
+        self._laden = key, new
         return new

@@ -1,4 +1,4 @@
-"""The hands that reach, as one number for compiled code: they do not feel the targets.
+"""The hands that reach: they do not feel the targets.
 
 A hand is the link of its marker with all that this carries; and the fields of the links before it whose fields the marker is in, for
 they would keep it from everything.
@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-BITS = 15  # for each link
 MOST = 2
-_ALL = (1 << BITS) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +19,13 @@ class Hand:
     fields: int
 
 
-def hands(*given: Hand) -> int:
-    """At most MOST hands as one number, 0 for none."""
-    return sum((one.link + 1 | one.fields + 1 << BITS) << 2 * BITS * place for place, one in enumerate(given))
+Hands = tuple[Hand, ...]
+NOBODY: Hands = ()
 
 
-def hands_of(number: int) -> tuple[Hand, ...]:
-    """Those that `hands` made the number of."""
-    shifted = [number >> 2 * BITS * place for place in range(MOST)]
-    return tuple(Hand((one & _ALL) - 1, (one >> BITS & _ALL) - 1) for one in shifted if one)
+def hand_numbers(reaching: Hands) -> list[int]:
+    """`Hands` of core/scene.hpp: the two links of each, -1 where there is none."""
+    found = [number for hand in reaching for number in (hand.link, hand.fields)]
+    if len(found) > 2 * MOST:
+        raise ValueError(f"{len(reaching)} hands reach at once; at most {MOST} may")
+    return found + [-1] * (2 * MOST - len(found))

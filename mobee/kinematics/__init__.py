@@ -1,4 +1,4 @@
-"""Forward kinematics, Jacobians and quaternions of a tree in zero-position form."""
+"""Forward kinematics, Jacobians and quaternions of a tree in zero-position form, of many poses at once; defined in `mobee.reference`."""
 
 from mobee.kinematics.forward import link_transforms
 from mobee.kinematics.jacobian import joint_axes, point_jacobian

@@ -79,7 +79,7 @@ class CuriousAgent(Decider):
     def state(self) -> int:
         """Where the part is: measured at first and after an interruption, else from the last outcome."""
         if self._state is None:
-            self._state = self._state_of(self.plant.measure(self.part))
+            self._state = self.space.state_of_part(self.plant.measure(self.part).tolist())
         return self._state
 
     def decide(self, state: int) -> int:
@@ -99,21 +99,25 @@ class CuriousAgent(Decider):
         With a store the transition is on disk when this returns; if it cannot be written nothing is learnt.
         """
         state, action = self._decided()
-        following = self._state_of(outcome.q)
+        q = outcome.q.tolist()
+        following = self.space.state_of_part(q)
+        weigh = self.model.observe if self.store is None else self.model.gain
         transition = Transition(
             n=self.transitions + 1,
             s=state,
             a=action,
             s_next=following,
-            reward=self.model.gain(state, action, following),
+            reward=weigh(state, action, following),
             settled=outcome.settled,
             duration=outcome.duration,
-            q=tuple(outcome.q.tolist()),
+            q=tuple(q),
             touched=outcome.touched,
         )
-        if self.store is not None:
+        if self.store is None:
+            self._go_on(transition)
+        else:
             self.store.append(transition)
-        self._learn(transition)
+            self._learn(transition)
         self._state, self._pending = following, None
         return transition.reward
 
@@ -148,6 +152,3 @@ class CuriousAgent(Decider):
         if self._pending is None:
             raise MobeeError(f"the agent of {self.part} has no action under way: call decide(state) first.")
         return self._pending
-
-    def _state_of(self, q: Array) -> int:
-        return self.space.state_of(q[self.space.columns])

@@ -18,5 +18,5 @@ def widened(array: NDArray[Scalar]) -> NDArray[Scalar]:
 def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
     """A view that cannot be written to."""
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view

@@ -91,6 +91,10 @@ class Decider:
 
     def _learn(self, transition: Transition) -> None:
         self.model.observe(transition.s, transition.a, transition.s_next)
+        self._go_on(transition)
+
+    def _go_on(self, transition: Transition) -> None:
+        """The model has observed this one."""
         self.transitions, self.last = transition.n, transition
         self._plans.keep()
 

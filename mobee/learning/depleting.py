@@ -27,14 +27,14 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     model, actions = agent.model, len(agent.model.space.actions(state))
     beliefs, counts, totals = model.debiased(), *_next_counts(model)
     gains = model.reward.copy()
-    _gains().expected_gains(beliefs.probabilities, counts, totals, model.tries, gains)
+    _core().expected_gains(beliefs.table, counts, totals, model.tries, gains)
     _, action_values = agent.plan(gains, key="depleting")
     scores = action_values[state, :actions]
     equal = scores >= scores.max() - EQUAL * gains.max()
     if np.count_nonzero(equal) == 1:
         return scores
     left, steps = gains.copy(), round(HORIZONS / (1.0 - agent.discount))
-    _gains().deplete(beliefs.probabilities, beliefs.outcomes, counts, totals, action_values, state, steps, left)
+    _core().deplete(beliefs.table, counts, totals, action_values, state, steps, left)
     _, afterwards = agent.plan(left, key="depleted")
     later = afterwards[state, :actions] - left[state, :actions]
     return np.where(equal, gains[state, :actions] + later, -np.inf)
@@ -49,8 +49,8 @@ def _next_counts(model: TransitionModel) -> tuple[Array, Array]:
 
 
 @cache
-def _gains() -> ModuleType:
-    """The compiled functions, loaded when they are first needed."""
-    from mobee.engine.load import load_only
+def _core() -> ModuleType:
+    """Loaded when it is first needed."""
+    from mobee._core import observations
 
-    return load_only("mobee.learning.gains")
+    return observations

@@ -54,5 +54,7 @@ EXPLORERS: dict[str, Explorer] = {
 
 def choose(scores: Array, rng: np.random.Generator) -> int:
     """The action with the highest score, uniformly at random among those within 1e-12 of it."""
-    ties = np.flatnonzero(scores >= scores.max() - TIE)
-    return int(ties[0] if len(ties) == 1 else ties[int(rng.random() * len(ties))])
+    listed = scores.tolist()  # NumPy takes longer for so few numbers
+    least = max(listed) - TIE
+    ties = [action for action, score in enumerate(listed) if score >= least]
+    return ties[0] if len(ties) == 1 else ties[int(rng.random() * len(ties))]

@@ -12,7 +12,7 @@ import numpy as np
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import equidistant_goals, lattice_digits, lattice_strides, nearest_goals
 from mobee.learning.space import MAX_STATES, Space, checked_joints, checked_neighbours
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 Levels = Sequence[float] | Sequence[Sequence[float]] | Mapping[str, Sequence[float]]
 
@@ -75,9 +75,11 @@ class Lattice(Space):
         levels = list(first) if set(self.levels) == {first} else [list(one) for one in self.levels]
         return self._made | {"levels": levels, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
 
-    def _cell(self, q: Array) -> int:
-        # Cells are boxes.  Bare lists: NumPy takes longer for so few numbers.
-        return sum(n * bisect_left(borders, x) for n, borders, x in zip(self._strides, self._borders, q.tolist(), strict=True))
+    def _cell(self, q: list[float]) -> int:
+        state = 0
+        for stride, borders, x in zip(self._strides, self._borders, q, strict=True):  # cells are boxes
+            state += stride * bisect_left(borders, x)
+        return state
 
 
 def _borders(levels: Sequence[float], low: float, high: float) -> list[float]:

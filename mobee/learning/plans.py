@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from mobee.learning.value_iteration import OutcomeModel, value_iteration
 from mobee.robot.robot import Array
 
 
-@dataclass(frozen=True, slots=True)
-class _Made:
+class _Made(NamedTuple):
     """A plan, and for what it was asked."""
 
     reward: Array | None
@@ -43,19 +42,16 @@ class Plans:
         self, key: str, asked: Array | None, believed: OutcomeModel | None, reward: Array, beliefs: OutcomeModel
     ) -> tuple[Array, Array]:
         """Plan for a reward (S, A) with beliefs, and remember it under what it was asked for."""
-        plan = (self._warm if self.relative else self._cold)(key, reward, beliefs)
+        if self.relative:
+            before = self._made.get(key)
+            start = self._starts.get(key) if before is None else before.plan[0]
+            plan = value_iteration(beliefs, reward, self.discount, self.tolerance, start, relative=True, method="modified")
+        else:
+            plan = value_iteration(beliefs, reward, self.discount, self.tolerance)
         for values in plan:
-            values.flags.writeable = False
+            values.setflags(write=False)
         self._made[key] = _Made(asked, believed, plan)
         return plan
-
-    def _warm(self, key: str, reward: Array, beliefs: OutcomeModel) -> tuple[Array, Array]:
-        before = self._made.get(key)
-        start = self._starts.get(key) if before is None else before.plan[0]
-        return value_iteration(beliefs, reward, self.discount, self.tolerance, start, relative=True, method="modified")
-
-    def _cold(self, key: str, reward: Array, beliefs: OutcomeModel) -> tuple[Array, Array]:
-        return value_iteration(beliefs, reward, self.discount, self.tolerance)
 
     def keep(self) -> None:
         """A transition was observed: what was planned before it is where the next plans start."""

@@ -51,6 +51,7 @@ class Space:
         self.rest: float | list[float] = rests.tolist()
         self.columns: Ints = indices - part.start
         """Where the joints stand among the motors of the part, shape (d,)."""
+        self._columns: list[int] = self.columns.tolist()
         self.samples: Array = _checked_samples(samples, len(joints))
         """The centre of each state, shape (S, d), in [rad]."""
         self.goals: Ints = _checked_goals(goals, len(self.samples))
@@ -84,7 +85,7 @@ class Space:
         """The state at whose sample the action sets the attractor."""
         if not 0 <= action < self._counts[self._checked_state(state)]:
             raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {self._counts[state] - 1}.")
-        return int(self.goals[state, action])
+        return self.goals.item(state, action)
 
     def state_of(self, q: ArrayLike) -> int:
         """The state whose sample is nearest in fractions of the joint ranges; a lattice takes the lower one on a border.
@@ -100,9 +101,11 @@ class Space:
                 f"q has shape {given.shape}: give the {len(self.joints)} joints ({', '.join(self.joints)}) "
                 f"or all {self._targets.shape[1]} motors of {self.part}, in rad."
             )
-        if not isfinite(sum(given.tolist())):  # a third of the time that NumPy takes for so few
-            raise InvalidValue(f"q of {self.part} is not finite: {given.tolist()}.")
-        return self._cell(given)
+        return self._state_of(given.tolist())
+
+    def state_of_part(self, q: Sequence[float]) -> int:
+        """The state of a pose of the whole part, one number for each of its motors, in rad; see `state_of`."""
+        return self._state_of([q[column] for column in self._columns])
 
     def target(self, state: int) -> Array:
         """The state's sample as a pose of the whole part, its other motors at rest: shape (n_part,), in [rad]."""
@@ -121,9 +124,14 @@ class Space:
         digest = hashlib.sha256(content).hexdigest()[:16]
         return {"robot": self.robot.name, "joints": list(self.joints), "rest": self.rest, "digest": digest}
 
-    def _cell(self, q: Array) -> int:
-        """The state of a pose of the joints, shape (d,), in [rad]."""
-        return nearest(self._tree, (q - self._low) / self._spans)
+    def _state_of(self, q: list[float]) -> int:
+        if not isfinite(sum(q)):  # lists: NumPy takes longer for so few numbers
+            raise InvalidValue(f"q of {self.part} is not finite: {q}.")
+        return self._cell(q)
+
+    def _cell(self, q: list[float]) -> int:
+        """The state of a pose of the joints, one number each, in [rad]."""
+        return nearest(self._tree, (np.array(q) - self._low) / self._spans)
 
     @cached_property
     def _tree(self) -> Any:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from mobee.errors import InvalidValue, UnknownName
@@ -10,15 +13,19 @@ from mobee.learning.bins import read_only, widened
 from mobee.learning.divergence import information_gain
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import Tabled
 from mobee.robot.robot import Array, Ints
 
-STAY, GOAL = 0, 1  # the first two bins of every state-action
+if TYPE_CHECKING:
+    from mobee._core.observations import OutcomeCounts
+    from mobee._core.value_iteration import TransitionTable
+
 INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # their imagined counts: Algorithm 8 and table 7.1
-NEW_BIN = 1.0  # the imagined count of every other bin: Algorithm 6
+NEW_BIN = 1.0  # the imagined count of bins beyond the first two, which are for staying and for the goal: Algorithm 6
 DIVERGENCES = ("kail", "kl")
 
 
-class TransitionModel:
+class TransitionModel(Tabled):
     """Outcome counts of every state-action in bins of variable number, and the last information gain as reward (thesis 6.4.3).
 
     An observation takes the same few microseconds however large the space, and memory grows with what was observed.
@@ -43,15 +50,14 @@ class TransitionModel:
             raise InvalidValue(f"forgetting={forgetting!r}: valid are 0 (exclusive) to 1, which forgets nothing.")
         self.space, self.initial, self.divergence, self.forgetting = space, initial, divergence, float(forgetting)
         stay, goal = INITIAL[initial]
-        self._first_two = stay + goal
-        exists = space.goals != NO_ACTION
+        goals = np.ascontiguousarray(space.goals)
+        exists = goals != NO_ACTION
         self._imagined: Array = np.array([stay, goal])  # of each bin, as long as the bins of the widest state-action
         self._counts: Array = np.where(exists[:, :, None], self._imagined, 0.0)  # (S, A, bins), 0 where there is no bin
         self._probabilities: Array = self._counts / (stay + goal)
         states = np.broadcast_to(np.arange(len(space))[:, None], exists.shape)
-        self._outcomes: Ints = np.where(exists[:, :, None], np.stack([states, space.goals], axis=-1), 0)
+        self._outcomes: Ints = np.where(exists[:, :, None], np.stack([states, goals], axis=-1), 0)
         self._bins: Ints = np.where(exists, 2, 0)
-        self._later: dict[tuple[int, int, int], int] = {}  # which bin: of outcomes that are neither stay nor goal
         self._weight: Array = np.zeros(exists.shape)  # sum of the real counts
         self._tries: Ints = np.zeros(exists.shape, dtype=np.intp)
         dense = divergence == "kl"
@@ -59,6 +65,10 @@ class TransitionModel:
         self._reward: Array = np.where(exists, first, -np.inf)
         self._totals: Array = np.where(exists, float(len(space)) if dense else stay + goal, 0.0)
         self._debiased: dict[tuple[float, float], DebiasedCounts] = {}
+        self._counted: OutcomeCounts | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_counted": None, "_table": None}  # a copy has arrays of its own
 
     @property
     def reward(self) -> Array:
@@ -115,68 +125,67 @@ class TransitionModel:
 
     def gain(self, state: int, action: int, outcome: int) -> float:
         """The reward that observing this outcome would pay now, in nats; changes nothing."""
-        return self._gain(state, action, self._bin(state, action, outcome))
+        self._check(state, action, outcome)
+        counted = self._counted or self._count()
+        found: float = _core().gain(counted.at, int(state), int(action), int(outcome))
+        return found
 
     def observe(self, state: int, action: int, outcome: int) -> float:
         """Count one real transition and return its reward in nats (Algorithm 6).
 
         Raises InvalidValue for a state or action that the space does not have.
         """
-        chosen = self._bin(state, action, outcome)
-        reward = self._gain(state, action, chosen)
-        used = self._bins.item(state, action)
-        if self.forgetting < 1.0:
-            known, imagined = self._counts[state, action, :used], self._imagined[:used]
-            known[:] = (known - imagined) * self.forgetting + imagined
-        if chosen == used:
-            self._append(state, action, outcome)
-            used += 1
-        counts = self._counts[state, action]
-        counts[chosen] += 1.0
-        weight = self._weight.item(state, action) * self.forgetting + 1.0
-        self._weight[state, action] = weight
-        total = weight + self._imagined_total(used)
-        np.divide(counts, total, out=self._probabilities[state, action])
-        self._totals[state, action] = total if self.divergence == "kail" else weight + len(self.space)
-        self._reward[state, action] = reward
-        self._tries[state, action] += 1
+        self._check(state, action, outcome)
+        observed, counted = (int(state), int(action), int(outcome)), self._counted or self._count()
+        reward: float = _core().observe(counted.at, *observed)
+        if reward < 0.0:
+            self._widen()
+            counted = self._count()
+            reward = _core().observe(counted.at, *observed)
         for beliefs in self._debiased.values():
-            beliefs.update(state, action, counts[:used] - self._imagined[:used], weight)
+            beliefs.update(counted, *observed[:2])
         return reward
 
-    def _gain(self, state: int, action: int, chosen: int) -> float:
-        used = self._bins.item(state, action)
-        real, weight = 0.0, self._weight.item(state, action) * self.forgetting
-        imagined = self._imagined.item(chosen) if chosen < used else NEW_BIN
-        if chosen < used:
-            real = (self._counts.item(state, action, chosen) - imagined) * self.forgetting
-        if self.divergence == "kl":
-            return information_gain(1.0 + real, len(self.space) + weight)
-        return information_gain(imagined + real, self._imagined_total(max(used, chosen + 1)) + weight)
-
-    def _bin(self, state: int, action: int, outcome: int) -> int:
-        """The bin of an outcome, the next free one if it is new."""
-        goal = self.space.goal(state, action)
-        if outcome == state:
-            return STAY
-        if outcome == goal:
-            return GOAL
-        if not 0 <= outcome < len(self.space):
+    def _check(self, state: int, action: int, outcome: int) -> None:
+        self.space.goal(state, action)
+        if not 0 <= outcome < len(self._reward):
             raise InvalidValue(f"{self.space.part} has no state {outcome!r}: valid are 0 to {len(self.space) - 1}.")
-        return self._later.get((state, action, outcome)) or self._bins.item(state, action)
 
-    def _append(self, state: int, action: int, outcome: int) -> None:
-        bin_ = self._bins.item(state, action)
-        if bin_ == len(self._imagined):
-            self._imagined = np.append(self._imagined, NEW_BIN)
-            self._counts, self._probabilities = widened(self._counts), widened(self._probabilities)
-            self._outcomes = widened(self._outcomes)
-            for beliefs in self._debiased.values():
-                beliefs.widen()
-        self._later[state, action, outcome] = bin_
-        self._counts[state, action, bin_] = NEW_BIN
-        self._outcomes[state, action, bin_] = outcome
-        self._bins[state, action] = bin_ + 1
+    def _widen(self) -> None:
+        """Make room for one more bin."""
+        self._imagined = np.append(self._imagined, NEW_BIN)
+        self._counts, self._probabilities = widened(self._counts), widened(self._probabilities)
+        self._outcomes = widened(self._outcomes)
+        self._counted = self._table = None
+        for beliefs in self._debiased.values():
+            beliefs.widen()
 
-    def _imagined_total(self, used: int) -> float:
-        return self._first_two + (used - 2) * NEW_BIN
+    def _count(self) -> OutcomeCounts:
+        """The counts where the core finds them."""
+        arrays = {
+            "count": self._counts,
+            "probability": self._probabilities,
+            "outcome": self._outcomes,
+            "used": self._bins,
+            "weight": self._weight,
+            "total": self._totals,
+            "reward": self._reward,
+            "tries": self._tries,
+            "imagined": self._imagined,
+        }
+        over_states = len(self.space) if self.divergence == "kl" else 0
+        self._counted = _core().OutcomeCounts(arrays, over_states, self.forgetting)
+        return self._counted
+
+    def _tabled(self) -> TransitionTable:
+        from mobee._core.value_iteration import TransitionTable
+
+        return TransitionTable(self._probabilities, self._outcomes, self._bins)
+
+
+@cache
+def _core() -> Any:
+    """Loaded when it is first needed."""
+    from mobee._core import observations
+
+    return observations

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 from types import ModuleType
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array, Ints
+
+if TYPE_CHECKING:
+    from mobee._core.value_iteration import TransitionTable
 
 METHODS = ("jacobi", "modified")
 BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to take an action out of the plan."
@@ -25,6 +28,25 @@ class OutcomeModel(Protocol):
     @property
     def probabilities(self) -> Array:
         """Their probabilities, shape (S, A, B), all 0 where a state has no such action."""
+
+
+class Tabled:
+    """An `OutcomeModel` that knows when its tables move, so that plans need not look at them again.
+
+    What the core knows of them stays with the object: copies make their own.
+    """
+
+    _table: TransitionTable | None = None
+
+    @property
+    def table(self) -> TransitionTable:
+        """Outcomes and probabilities, where they are now."""
+        if self._table is None:
+            self._table = self._tabled()
+        return self._table
+
+    def _tabled(self) -> TransitionTable:
+        raise NotImplementedError
 
 
 def value_iteration(
@@ -58,23 +80,30 @@ def value_iteration(
     Raises:
         InvalidValue: with what is valid.
     """
-    probabilities, outcomes, reward = tables(model, reward, discount)
+    core = _core()
+    if isinstance(model, Tabled):
+        table = model.table
+        reward = _checked_reward(reward, table.shape, discount)
+    else:
+        probabilities, outcomes, reward = tables(model, reward, discount)
+        table = core.TransitionTable(probabilities, outcomes)
+    states = table.shape[0]
     if not tolerance > 0.0:
         raise InvalidValue(f"tolerance={tolerance!r}: valid is a number above 0.")
-    values = np.zeros(len(outcomes)) if start is None else np.array(start, dtype=np.float64)
-    if values.shape != (len(outcomes),):
-        raise InvalidValue(f"start has shape {values.shape}: give one value for each of the {len(outcomes)} states.")
+    values = np.zeros(states) if start is None else np.array(start, dtype=np.float64)
+    if values.shape != (states,):
+        raise InvalidValue(f"start has shape {values.shape}: give one value for each of the {states} states.")
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
-    sweeps, action_values = load_planning(), np.empty(reward.shape)
-    done = sweeps.solve(probabilities, outcomes, reward, values, action_values, discount, tolerance, relative, method == "modified")
-    if done == sweeps.BAD_REWARD:
+    action_values = np.empty(reward.shape)
+    done = core.solve(table, reward, values, action_values, float(discount), float(tolerance), bool(relative), method == "modified")
+    if done > 0:
+        return values, action_values
+    if done == core.BAD_REWARD:
         raise InvalidValue(BAD_REWARD)
-    if done == sweeps.BAD_START:
+    if done == core.BAD_START:
         raise InvalidValue("start holds NaN or an infinity: give finite values.")
-    if done == sweeps.BAD_OUTCOME:
-        raise InvalidValue(f"the model leads to a state that it does not have: valid are 0 to {len(outcomes) - 1}.")
-    return values, action_values
+    raise InvalidValue(f"the model leads to a state that it does not have: valid are 0 to {states - 1}.")
 
 
 def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, Ints, Array]:
@@ -83,19 +112,24 @@ def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, 
     Raises InvalidValue if the shapes do not fit or the discount is out of range.
     """
     probabilities = np.asarray(model.probabilities, dtype=np.float64, order="C")
-    outcomes, reward = np.asarray(model.outcomes, dtype=np.int64, order="C"), np.asarray(reward, dtype=np.float64, order="C")
-    if not 0.0 <= discount < 1.0:
-        raise InvalidValue(f"discount={discount!r}: valid is 0 <= discount < 1.")
+    outcomes = np.asarray(model.outcomes, dtype=np.int64, order="C")
     if outcomes.ndim != 3 or probabilities.shape != outcomes.shape:
         raise InvalidValue(f"outcomes of shape {outcomes.shape}, probabilities of {probabilities.shape}: valid is (S, A, B) for both.")
-    if reward.shape != outcomes.shape[:2]:
-        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {outcomes.shape[:2]}.")
-    return probabilities, outcomes, reward
+    return probabilities, outcomes, _checked_reward(reward, outcomes.shape, discount)
+
+
+def _checked_reward(reward: Array, shape: tuple[int, ...], discount: float) -> Array:
+    if not 0.0 <= discount < 1.0:
+        raise InvalidValue(f"discount={discount!r}: valid is 0 <= discount < 1.")
+    reward = np.asarray(reward, np.float64, "C")
+    if reward.shape != shape[:2]:
+        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {shape[:2]}.")
+    return reward
 
 
 @cache
-def load_planning() -> ModuleType:
-    """The compiled sweeps, imported when they are first needed."""
-    from mobee.engine.load import load_only
+def _core() -> ModuleType:
+    """Loaded when it is first needed."""
+    from mobee._core import value_iteration
 
-    return load_only("mobee.learning.sweeps")
+    return value_iteration

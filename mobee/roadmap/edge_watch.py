@@ -6,12 +6,12 @@ import numpy as np
 
 from mobee.collision.snapshot import Snapshot
 from mobee.collision.world_object import WorldObject
-from mobee.engine.layout import ROW_BOUND, convex_row, volume_row
+from mobee.engine.volumes import bound
 from mobee.model import Model
 from mobee.roadmap.edges import STEP, Flags, check_edges, points
 from mobee.roadmap.ik.solids import solid_model
 from mobee.roadmap.ik.vectors import lengths
-from mobee.robot.robot import Array, Ints, Shape
+from mobee.robot.robot import Array, Ints
 
 _LONGER = 1.1  # than the straight lines over the middle is the way of a shape, at most: its motors turn by no more than about 1 rad
 _MARGIN = 1e-6  # m
@@ -29,7 +29,7 @@ class EdgeWatch:
         solid = solid_model(model)
         robot = solid.robot
         meets = [index for index in range(len(robot.shapes)) if index not in robot.base_shapes]
-        self._bounds = [_bound(robot.shapes[index]) for index in meets]
+        self._bounds = [bound(robot.shapes[index], robot.shapes[index].vertices) for index in meets]
         self._middles = points(solid, q)[meets]
         half = points(solid, 0.5 * (q[edges[:, 0]] + q[edges[:, 1]]))[meets]
         first, second = self._middles[:, edges[:, 0]], self._middles[:, edges[:, 1]]
@@ -59,8 +59,8 @@ class EdgeWatch:
         A shape on its way is never farther from both of its ends than half of that way.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
-        for middles, bound, ways in zip(self._middles, self._bounds, self._half_ways, strict=True):
-            gap = apart(middles, thing) - bound
+        for middles, radius, ways in zip(self._middles, self._bounds, self._half_ways, strict=True):
+            gap = apart(middles, thing) - radius
             found |= np.minimum(gap[self._edges[:, 0]], gap[self._edges[:, 1]]) < ways
         return found
 
@@ -88,8 +88,3 @@ def _changed(old: Snapshot, new: Snapshot, targets_too: bool) -> list[WorldObjec
             if one.role != "ghost" and (there.get(name) is not one or (targets_too and one.role == "target")):
                 found.append(one)
     return found
-
-
-def _bound(shape: Shape) -> float:
-    row = volume_row(shape) if shape.vertices is None else convex_row(shape, shape.vertices, 0)
-    return float(row[ROW_BOUND])

@@ -1,48 +1,75 @@
-"""The actions under way on an offline plant: which parts act, and how each ended, as the compiled loop judges them."""
+"""The actions under way on an offline plant: which parts act, and how each ended, as the plant's ticks judge them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mobee.collision.touch import touched_by
-from mobee.control.layout import SETTLED
+from mobee._core.law import VERDICTS
+from mobee._core.plant import PART
+from mobee._core.tables import Table
+from mobee.errors import InvalidValue
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Ints, Robot
-from mobee.simulation.layout import ACTING, FIRST, PART, STOP, VERDICT
+from mobee.robot.robot import Array, Robot
 
-if TYPE_CHECKING:
-    from mobee.pose import Pose
+_SETTLED = VERDICTS.index("settled")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Acting:
+    """What an action of a part has to know of it: its row in the table, its motors and their limits."""
+
+    row: int
+    motors: tuple[str, ...]
+    where: slice
+    low: Array
+    high: Array
+    alive: bool
 
 
 class Actions:
-    """`parts` (P, PART), see `layout`, and `tests` (P, 2), their settle tests: what the loop reads and changes."""
+    """`parts`: a row for each part, see `mobee._core.plant.PART`, which a plant's ticks read and change."""
 
-    __slots__ = ("_names", "parts", "tests")
+    __slots__ = ("_begun", "_names", "_next_look", "_of", "_under_way", "_verdict", "parts")
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, alive: NDArray[np.bool_]) -> None:
         self._names = tuple(robot.parts)
-        self.parts: Ints = np.array([[p.start, p.start + len(p), 0, 0] for p in robot.parts.values()], dtype=np.int64).reshape(-1, PART)
-        self.tests: Array = np.zeros((len(self.parts), 2))
+        self._of: dict[str, _Acting] = {}
+        self.parts: Table = np.zeros(len(self._names), dtype=PART)
+        self._begun, self._next_look = self.parts["begun"], self.parts["next_look"]
+        self._under_way, self._verdict = self.parts["under_way"], self.parts["verdict"]
+        for row, (name, part) in enumerate(robot.parts.items()):
+            self.parts[row]["motors"] = part.start, part.start + len(part)
+            low, high = robot.limits[part.slice].T.copy()
+            self._of[name] = _Acting(row, part.motors, part.slice, low, high, bool(alive[part.slice].any()))
 
     @property
     def under_way(self) -> tuple[str, ...]:
         """The parts that act, in their order."""
-        return tuple(self._names[p] for p in np.flatnonzero(self.parts[:, ACTING]))
+        return tuple(name for name, acts in zip(self._names, self._under_way.tolist(), strict=True) if acts)
+
+    def require_possible(self, part: str, target: Array) -> None:
+        """Raise InvalidValue if no motor of a part lives, or if a target with a number for each of its motors is outside their limits."""
+        of = self._of[part]
+        if not of.alive:
+            raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
+        if np.shape(target) != of.low.shape or ((target >= of.low) & (target <= of.high)).all():
+            return
+        i = int(np.flatnonzero(~((target >= of.low) & (target <= of.high)))[0])
+        raise InvalidValue(f"target {target[i]:.4g} rad for {of.motors[i]}: must be within {of.low[i]:.4g} to {of.high[i]:.4g} rad")
 
     def begin(self, part: str, asked: float, first_look: float) -> None:
         """Start a part's settle test, asked for at a time [s]; it is looked at `first_look` s later first."""
-        index = self._names.index(part)
-        self.tests[index] = asked, asked + first_look
-        self.parts[index, ACTING] = 1
+        row = self._of[part].row
+        self._begun[row], self._next_look[row], self._under_way[row] = asked, asked + first_look, 1
 
     def end_all(self) -> None:
         """Forget what is under way."""
-        self.parts[:, ACTING] = 0
+        self._under_way[:] = 0
 
-    def outcome(self, part: str, q: Array, sampled: float, pose: Pose) -> Outcome:
-        """How a part's last action ended, by the encoders q (n,) rad read at time `sampled` [s]."""
-        index = self._names.index(part)
-        first, stop, verdict = self.parts[index, [FIRST, STOP, VERDICT]]
-        return Outcome(q[first:stop].copy(), bool(verdict == SETTLED), sampled - float(self.tests[index, 0]), touched_by(pose, part))
+    def outcome(self, part: str, q: Array, sampled: float, touched: tuple[str, ...]) -> Outcome:
+        """How a part's last action ended, by the encoders q (n,) rad read at time `sampled` [s], in contact with these objects."""
+        of = self._of[part]
+        return Outcome(q[of.where].copy(), bool(self._verdict[of.row] == _SETTLED), sampled - float(self._begun[of.row]), touched)

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core import address
+from mobee._core import motors as core
+from mobee._core.tables import Table, numbers, view
 from mobee.errors import InvalidValue
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Ints, Robot
-from mobee.simulation import layout
-from mobee.simulation.layout import SERVO_GAIN as SERVO_GAIN
-from mobee.simulation.load import compiled
 from mobee.simulation.parameters import MotorParameters as MotorParameters
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 
 NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given
-_MODES: dict[Mode, int] = {
-    "position": layout.POSITION,
-    "velocity": layout.VELOCITY_MODE,
-    "torque": layout.TORQUE,
-    "hold": layout.HOLD,
-}
+SERVO_GAIN = 8.0  # 1/s, position mode and a hold that has come to rest; as in core/motors.cpp
+_HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 
 
 class Motors:
@@ -46,71 +43,66 @@ class Motors:
         self.seed = int(seed) % 2**64
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
         """Indices of the motors that live, ascending."""
-        self._compiled = compiled()
-        self.state = np.zeros((layout.STATE, n))
-        """What `layout` says, for compiled code."""
-        for row in (layout.Q, layout.MOTOR_Q, layout.DRAGGED, layout.REST):
-            self.state[row] = q
-        self.whole = np.zeros((layout.WHOLE, n), dtype=np.int64)
-        self.whole[layout.MODE], self.whole[layout.RESTING] = layout.HOLD, 1
-        self.fixed = np.zeros((layout.FIXED, n))
-        self.fixed[[layout.LOW, layout.HIGH]] = robot.limits.T
-        for row, name in (
-            (layout.MAX_VELOCITY, "max_velocity"),
-            (layout.MAX_ACCELERATION, "max_acceleration"),
-            (layout.MAX_TORQUE, "max_torque"),
-        ):
-            self.fixed[row] = [getattr(motor, name) for motor in robot.motor_table]
-        self.fixed[layout.PLAY] = parameters.of_robot("backlash", robot) / 2.0
-        self.fixed[layout.FRICTION] = parameters.of_robot("friction", robot)
+        self.state: Table = np.zeros(n, dtype=core.STATE)
+        """A row for each motor, see `mobee._core.motors.STATE`: always the same array, which a plant advances."""
+        for name in ("q", "motor_q", "dragged", "rest"):
+            self.state[name] = q
+        self.state["mode"], self.state["resting"] = _HOLD, 1
+        self.numbers = _numbers(robot, parameters)
+        """What does not change while the substep is the same, see `mobee._core.motors.NUMBERS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
-        self.line, self.at = np.zeros((1, n)), np.zeros(1, dtype=np.int64)
+        self._line = np.zeros((1, n))
+        self.struct = core.Motors(view(self.living), view(self.numbers), address(self.state), address(self._line), 1, 0)
+        """The motors as the core reads them."""
+        self.address = ctypes.addressof(self.struct)
+        self._core = core.calls()
+        self._noise = 0.0, np.zeros(n)
         self._dt = 0.0
         self.begin_substeps(parameters.substep)
 
     @property
     def q(self) -> Array:
         """Positions of the joint sides [rad]."""
-        return self._row(layout.Q)
+        return self.state["q"].copy()
 
     @property
     def velocities(self) -> Array:
         """Velocities of the joint sides [rad/s]."""
-        return self._row(layout.VELOCITY)
+        return self.state["velocity"].copy()
 
     @property
     def efforts(self) -> Array:
         """What the motors exert [N m]."""
-        return self._row(layout.EFFORT)
+        return self.state["effort"].copy()
 
     @efforts.setter
     def efforts(self, torque: Array) -> None:
-        self.state[layout.EFFORT] = torque
+        self.state["effort"] = torque
 
     @property
     def motor_velocities(self) -> Array:
         """Velocities on the motor side of the play [rad/s]."""
-        return self._row(layout.MOTOR_V)
+        return self.state["motor_velocity"].copy()
 
     @property
     def torques(self) -> Array:
         """What left the delay line in the last substep [N m], 0 where a motor is not in torque mode."""
-        return self._row(layout.LEFT)
+        return self.state["left"].copy()
 
     @property
     def in_torque(self) -> NDArray[np.bool_]:
         """Which motors are in torque mode."""
-        found: NDArray[np.bool_] = self.whole[layout.MODE] == layout.TORQUE
+        found: NDArray[np.bool_] = self.state["mode"] == _TORQUE
         return found
 
     @property
     def load(self) -> Array:
         """What pulls from outside against the motors in torque mode, gravity for one [N m]: for them a torque to overcome."""
-        return self._row(layout.LOAD)
+        return self.state["load"].copy()
 
     @load.setter
     def load(self, torque: Array) -> None:
-        self.state[layout.LOAD] = torque
+        self.state["load"] = torque
 
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
         """Set what is in force for the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
@@ -119,13 +111,13 @@ class Motors:
         carry their weight until the first torque arrives.
         """
         if reference is not None:
-            self.state[layout.REFERENCE, where] = reference
-        code = _MODES[mode]
-        if (self.whole[layout.MODE, where] != code).any():
+            self.state["reference"][where] = reference
+        code = core.MODES.index(mode)
+        if (self.state["mode"][where] != code).any():
             if mode == "torque":
                 self.load = gravity_torque(self._robot, self.q)
-            entering = np.arange(self.state.shape[1])[where]
-            self._compiled.drive.enter_all(entering, self.whole, self.state, self.line, code)
+            for first in range(*where.indices(len(self.state))):
+                self._core.enter(self.address, first, first + 1, code)
 
     def drive(self, dt: float) -> Array:
         """Advance the motor side by one substep of dt [s]; the joint-side velocity [rad/s] it asks for, (n,).
@@ -133,21 +125,20 @@ class Motors:
         That is zero while the play is not taken up.
         """
         self.begin_substeps(dt)
-        self._compiled.drive.drive_all(self.living, self.whole, self.fixed, self.state, self.line, self.at, dt)
-        velocity: Array = (self.state[layout.DRAGGED] - self.state[layout.Q]) / dt
+        self._core.drive(self.address, dt)
+        velocity: Array = (self.state["dragged"] - self.state["q"]) / dt
         return velocity
 
     def integrate(self) -> None:
         """Kinematic joint side: go where `drive` asked, as far as the hard stops."""
-        self._compiled.drive.integrate_all(self.living, self.whole, self.fixed, self.state, self._dt)
+        self._core.integrate(self.address, self._dt)
 
     def adopt(self, q: Array) -> None:
         """Take the joint side (n,) rad at the end of the substep, as a physics engine says.
 
         The motor side follows into the play: nothing winds up while a joint is blocked.  In torque mode it goes with the joint.
         """
-        given = np.array(q, dtype=np.float64)
-        self._compiled.drive.adopt_all(self.living, self.whole, self.fixed, self.state, given, self._dt)
+        self._core.adopt(self.address, numbers(q, len(self.state)), self._dt)
 
     def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
         """The joint positions [rad] at tick k with white noise whose strength does not depend on the tick's length dt [s].
@@ -155,17 +146,14 @@ class Motors:
         The noise is a pure function of seed, tick and motor: asked twice, it is the same.
         """
         noisy = self.q
-        self._compiled.noise.read(self.seed, k, self.noise(dt), self.living, self.state[layout.Q], noisy)
+        self._core.read(self.address, self.seed, k, self.noise(dt).tobytes(), address(noisy))
         return noisy[where]
-
-    def _row(self, row: int) -> Array:
-        copied: Array = self.state[row].copy()
-        return copied
 
     def noise(self, dt: float) -> Array:
         """The standard deviations of the encoders at ticks of dt [s], (n,) [rad], or [m] of motors that slide."""
-        common = float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt))
-        return common * fine_units(self._robot)
+        if self._noise[0] != dt:
+            self._noise = dt, float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt)) * fine_units(self._robot)
+        return self._noise[1]
 
     def begin_substeps(self, dt: float) -> None:
         """Let substeps last dt [s] from now on; what is on its way to the motors stays in order, the newest last."""
@@ -173,14 +161,26 @@ class Motors:
             return
         self._dt = dt
         with np.errstate(divide="ignore"):
-            self.fixed[layout.SHARE] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
-        before, delay = self.whole[layout.DELAY].copy(), np.round(self._delay / dt).astype(np.int64)
-        rows, old = int(delay.max()) + 1, len(self.line)
-        oldest_first = np.roll(self.line, old - 1 - int(self.at[0]), axis=0)
-        still = np.where(self.in_torque, self.state[layout.LOAD], self.state[layout.MOTOR_V])
+            self.numbers["share"] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
+        before, delay = self.numbers["delay"].copy(), np.round(self._delay / dt).astype(np.int64)
+        rows, old = int(delay.max()) + 1, len(self._line)
+        oldest_first = np.roll(self._line, old - 1 - self.struct.newest, axis=0)
+        still = np.where(self.in_torque, self.state["load"], self.state["motor_velocity"])
         line = np.tile(still, (rows, 1))
         for motor, steps in enumerate(np.minimum(before, delay)):
             if steps:
                 line[rows - steps :, motor] = oldest_first[old - steps :, motor]
-        self.whole[layout.DELAY] = delay
-        self.line, self.at = line, np.array([rows - 1])
+        self.numbers["delay"] = delay
+        self._line = line
+        self.struct.line, self.struct.rows, self.struct.newest = address(line), rows, rows - 1
+
+
+def _numbers(robot: Robot, parameters: MotorParameters) -> Table:
+    """A row for each motor."""
+    table: Table = np.zeros(len(robot.motor_table), dtype=core.NUMBERS)
+    table["low"], table["high"] = robot.limits.T
+    for name in ("max_velocity", "max_acceleration", "max_torque"):
+        table[name] = [getattr(motor, name) for motor in robot.motor_table]
+    table["play"] = parameters.of_robot("backlash", robot) / 2.0
+    table["friction"] = parameters.of_robot("friction", robot)
+    return table

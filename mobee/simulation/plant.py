@@ -11,6 +11,7 @@ import numpy as np
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
 from mobee.control.modality import Modality
+from mobee.control.terms import Term
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
@@ -21,6 +22,8 @@ from mobee.simulation.described import described
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
 from mobee.simulation.reaches import ReachesUnderWay
+from mobee.simulation.runner import Runner
+from mobee.simulation.touching import Touching
 from mobee.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -49,6 +52,7 @@ class OfflinePlant:
         active: names or patterns of parts and motors that live; the others are rigid at home, without noise, and cost nothing.
         command_age: ticks between the encoders and the motion under their command, 1 as live.
         hashed: whether `hash` is kept.
+        terms: further forces of the law, functions in Python, which are called in every tick.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -68,9 +72,10 @@ class OfflinePlant:
         active: Sequence[str] | None = None,
         command_age: int = 1,
         hashed: bool = False,
+        terms: Sequence[Term] = (),
     ) -> None:
         alive = living(model.robot, active)
-        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive)
+        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive, terms)
         if not 0 < dt < self.controller.max_dt:
             raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
         if isinstance(command_age, bool) or not isinstance(command_age, int) or command_age < 1:
@@ -82,12 +87,12 @@ class OfflinePlant:
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
         self._options = {"gains": self.controller.gains, "motors": parameters, "dt": dt, "propagate": propagate, "modality": modality}
         self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
-        from mobee.simulation.runner import Runner  # machine code, which `import mobee` does not load
-
-        self._runner = Runner(self._controller, self.motors, alive, dt, command_age)
+        if terms:  # a plant without them is described as before there were any
+            self._options["terms"] = [term.name for term in terms]
+        self._actions, self._touching = Actions(self.robot, alive), Touching(model)
+        self._runner = Runner(self._controller, self.motors, alive, dt, command_age, self._actions.parts)
         self._alive = alive
         self._ticks = 0
-        self._actions = Actions(self.robot)
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._digest = hashlib.sha256() if hashed else None
@@ -140,16 +145,9 @@ class OfflinePlant:
 
     def begin(self, part: str, target: Array) -> None:
         """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; a reach of the part is over."""
-        where = self.robot.part(part)
-        if not self._alive[where.slice].any():
-            raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
-        limits = self.robot.limits[where.slice]
-        if np.shape(target) == (len(where),):
-            outside = ~((target >= limits[:, 0]) & (target <= limits[:, 1]))
-            for i in np.flatnonzero(outside)[:1]:
-                low, high = limits[i]
-                raise InvalidValue(f"target {target[i]:.4g} rad for {where.motors[i]}: must be within {low:.4g} to {high:.4g} rad")
-        self.controller.set_attractor(part, target)
+        self.robot.part(part)
+        self._actions.require_possible(part, target)
+        self._controller.set_attractor(part, target)
         self._reaches.drop(part)
         self._test(part)
 
@@ -190,9 +188,12 @@ class OfflinePlant:
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")
-        while not (done := [part for part in acting if part not in self._actions.under_way]):
+        done: list[str] = []
+        while not done:
             self._run(CHUNK)
-        return [(part, self._reaches.after(part) or self._outcome(part, self.model.evaluate(self._q))) for part in done]
+            now = self._actions.under_way
+            done = [part for part in acting if part not in now]
+        return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
 
     def tick(self) -> None:
         """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
@@ -211,17 +212,25 @@ class OfflinePlant:
 
     def _run(self, most: int, traced: bool = False) -> Array:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
-        kept = traced or self._digest is not None
+        self._prepare(most, traced)
+        self._runner.run()
+        return self._conclude()
+
+    def _prepare(self, most: int, traced: bool = False) -> None:
+        """Have the core's plant ready for up to that many ticks."""
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
-        rows, done, lost = self._runner.run(self._ticks, most, self._actions.parts, self._actions.tests, kept, traced)
+        self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
+
+    def _conclude(self) -> Array:
+        """Take in what the ticks left: the record, see `_run`."""
+        rows, done, lost = self._runner.results()
         if done:
             self._pose = None
             self._ticks += done
             self._q = self._runner.q.copy()
-            n = len(self._q)
             if self._digest is not None:
-                self._digest.update(np.ascontiguousarray(rows[:, :n]).astype("<f8").tobytes())
+                self._digest.update(np.ascontiguousarray(rows[:, : len(self._q)]).astype("<f8").tobytes())
         if lost:
             self._actions.end_all()
             for part in self._reaches.running:
@@ -237,8 +246,7 @@ class OfflinePlant:
         """Let the parts whose reach has settled or timed out be drawn back by their attractors."""
         for part in self._reaches.running:
             if part not in self._actions.under_way:
-                pose = self.model.evaluate(self._q)
-                if self._reaches.ended(part, self._outcome(part, pose), pose):
+                if self._reaches.ended(part, self._outcome(part), self.model.evaluate(self._q)):
                     self._test(part)
 
     def _test(self, part: str) -> None:
@@ -249,5 +257,6 @@ class OfflinePlant:
         if others := [other for other in self._actions.under_way if other != part]:
             raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
 
-    def _outcome(self, part: str, pose: Pose) -> Outcome:
-        return self._actions.outcome(part, self._q, self.time - self.dt, pose)
+    def _outcome(self, part: str) -> Outcome:
+        self.model.evaluate(self._q)  # the world follows it
+        return self._actions.outcome(part, self._q, self.time - self.dt, self._touching.by(part, self._q))

@@ -1,20 +1,22 @@
-"""Hands the compiled loop what it works on, and takes back what it leaves."""
+"""The ticks of one plant in the core, core/plant.cpp: hands it what it works on, and takes back what it leaves."""
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.control import Controller, Forces
-from mobee.control.layout import FEEDFORWARD, MODALITY, POSITION, REFERENCE, TORQUE
+from mobee._core import address
+from mobee._core import plant as core
+from mobee._core.law import term_names
+from mobee._core.tables import Table, View, view
+from mobee.control import Controller
 from mobee.engine import engine_of
-from mobee.engine.hands import Hand, hands
+from mobee.engine.hands import NOBODY, Hand, Hands
 from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
-from mobee.robot.robot import Array, Ints
-from mobee.simulation.load import compiled_loop
+from mobee.robot.robot import Array
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 
@@ -24,84 +26,109 @@ SKIN = 0.04  # m
 class Runner:
     """The loop of one plant: its memory, the commands on their way, the encoders and forces of the last tick."""
 
-    def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int) -> None:
+    def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
+        """`parts`: the actions, see `mobee._core.plant.PART`."""
         n = len(alive)
-        robot = controller.robot
-        self._controller, self._motors, self._dt = controller, motors, dt
-        self._substeps = motors.parameters.substeps(dt)
+        self._controller, self._motors, self._alive, self._dt = controller, motors, alive, dt
         self._cut = controller.propagate == "part"
-        self._alive = alive
         self._fields = self._neighbours(solids=False)
         self._solids: Neighbours | None = None  # where they are asked for
         self._whole: Neighbours | None = None
-        self._reaching: dict[tuple[tuple[Hand, ...], bool], tuple[Neighbours, int]] = {}  # for hands that have reached, with these
-        self._mode = int(controller.law.integers[MODALITY])
+        self._reaching: dict[tuple[Hands, bool], tuple[Neighbours, Hands]] = {}  # for hands that have reached, with these
+        substeps = motors.parameters.substeps(dt)
+        self._substep = dt / substeps
         self._commands = np.zeros((command_age, n))
-        if self._mode == POSITION:
-            self._commands[:] = controller.state[REFERENCE]
-        self._seed, self._noise = np.uint64(motors.seed), motors.noise(dt)
-        self._noisy = bool(self._noise.any())
-        self.q: Array = robot.home.copy()
-        self._torque = np.zeros(n)
-        self._forces = np.zeros((3, n))
-        self._loop = compiled_loop()
-
-    def run(self, ticks: int, most: int, parts: Ints, tests: Array, kept: bool, solids: bool) -> tuple[Array, int, bool]:
-        """Run up to that many ticks after those there have been; the record, how many were run, whether the state is lost.
-
-        `kept`: the record is; `solids`: contacts of solids are found too, for its sake.
-        """
-        controller, motors = self._controller, self._motors
-        motors.begin_substeps(self._dt / self._substeps)
-        if self._mode == TORQUE or controller.pushed:  # forces that depend on the pose, beyond what the loop knows
-            most = 1
-            client = self._pose_forces(motors.encoders(ticks + 1, self._dt))
-        else:
-            client = controller.client_force(self.q)
-        record = np.zeros((most if kept else 0, 3 * len(self.q) + 2))
-        done, why = self._loop.run(
-            *self._scene(solids), controller.contact_forces or solids,
-            controller.law.integers, controller.law.floats, controller.law.settle, controller.state, controller.goal, client, self._forces,
-            *controller.reaches,
-            motors.living, motors.whole, motors.fixed, motors.state, motors.line, motors.at, self._commands, self._mode,
-            self._substeps, self._seed, self._noise, self._noisy, parts, tests, self.q, self._torque, record, ticks, self._dt, most,
+        if controller.modality == "position":
+            self._commands[:] = controller.state["reference"]
+        self._noise = motors.noise(dt)
+        self._client, self._torque, self._total = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._forces = np.zeros((len(controller.force_names), n))
+        self.q: Array = controller.robot.home.copy()
+        """The encoders of the last tick, (n,) rad."""
+        self._struct = core.Plant(
+            law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
+            client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
+            commands=address(self._commands),
+            command_age=command_age, substeps=substeps, dt=dt, seed=motors.seed,
+            noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
+            torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
-        if done:
-            controller.last_forces = Forces(*self._forces.copy())
-        return record[:done], done, why == self._loop.LOST
+        self._parts, self._record, self._reaches_at = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), 0
+        self._clients_act = False
+        self.address = ctypes.addressof(self._struct)
+        """Where the core finds the plant."""
+        self._core = core.calls()
 
-    def _scene(self, solids: bool) -> tuple[Any, ...]:
-        """The robot in the world of now, and its memory; with all its links where a link is meant by its name."""
+    def prepare(self, ticks: int, most: int, kept: bool, solids: bool) -> None:
+        """Have `run` go on for up to that many ticks after those there have been.
+
+        `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record.
+        """
+        controller, motors, struct = self._controller, self._motors, self._struct
+        motors.begin_substeps(self._substep)
+        if controller.modality == "torque" or controller.pushed or controller.terms:  # forces beyond what the core knows, of this pose
+            most, self._clients_act = 1, True
+            self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt))
+        elif controller.forced or self._clients_act:
+            self._clients_act = controller.forced
+            self._client[:] = controller.client_force(self.q)
+        if kept:
+            self._record = np.zeros((most, 3 * len(self.q) + core.RECORD_DEPTHS))
+            struct.record = address(self._record)
+        elif len(self._record):
+            self._record, struct.record = self._record[:0], None
+        reaches = controller.reaches
+        if reaches.address != self._reaches_at or reaches:
+            struct.reaches = View(reaches.address, len(reaches))
+            self._reaches_at = reaches.address
+        struct.near = self._near(solids) if controller.contact_forces or solids else None
+        struct.ticks, struct.most = ticks, most
+
+    def run(self) -> None:
+        """Run what was prepared."""
+        self._core.run(self.address)
+
+    def results(self) -> tuple[Array, int, bool]:
+        """The record (ticks, 3 n + 2), how many ticks were run, whether the motors' state is not finite any more."""
+        done, end = self._struct.done, self._struct.end
+        if done:
+            self._controller.note_forces(self._forces)
+        return self._record[:done], done, end == core.STATE_LOST
+
+    def _near(self, solids: bool) -> int:
+        """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
         model = self._controller.model
         snapshot = model.world.snapshot
-        near, reaching = self._fields, hands()
+        near, reaching = self._fields, NOBODY
         if snapshot.attached:
-            near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN)
-            reaching = hands(*model.hands)
+            near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN, self._cut)
+            reaching = model.hands
         elif model.hands:
             near, reaching = self._sparing(model.hands, solids)
         elif solids:
             near = self._solids = self._solids or self._neighbours(solids=True)
-        return (*near.scene(snapshot, reaching, self._cut), *near.memory)
+        return near.enter(snapshot, reaching)
 
     def _neighbours(self, solids: bool) -> Neighbours:
-        return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN)
+        return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN, self._cut)
 
-    def _sparing(self, reaching: tuple[Hand, ...], solids: bool) -> tuple[Neighbours, int]:
-        """Those of a robot whose hands are apart from what carries them, and their `hands`."""
+    def _sparing(self, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
+        """Those of a robot whose hands are apart from what carries them, and their hands."""
         known = self._reaching.get((reaching, solids))
         if known is None:
             robot = self._controller.robot
             stiff = stiffened(robot, self._alive, self._cut, solids, apart=[link for hand in reaching for link in (hand.link, hand.fields)])
             new = {robot.links.index(name): index for index, name in enumerate(stiff.links)}
-            known = Neighbours(engine_of(stiff), SKIN), hands(*(Hand(new[hand.link], new[hand.fields]) for hand in reaching))
-            self._reaching[reaching, solids] = known
+            hands = tuple(Hand(new[hand.link], new[hand.fields]) for hand in reaching)
+            known = self._reaching[reaching, solids] = Neighbours(engine_of(stiff), SKIN, self._cut), hands
         return known
 
     def _pose_forces(self, q: Array) -> Array:
-        """What clients push with at q (n,), after what carries the robot's weight has been set: both depend on the pose."""
+        """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
         controller, motors = self._controller, self._motors
-        if self._mode == TORQUE:
-            controller.state[FEEDFORWARD] = gravity_torque(controller.robot, q)
+        if controller.terms and np.isfinite(q).all():
+            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt).values())
+        if controller.modality == "torque":
+            controller.state["feedforward"] = gravity_torque(controller.robot, q)
             motors.load = gravity_torque(controller.robot, motors.q)
         return controller.client_force(q)

@@ -11,6 +11,7 @@ from mobee_cli.errors import ENVIRONMENT, UserError
 BENCHES = {
     "lockstep": "the live processes in lockstep, in multiples of real time",
     "agree": "the live processes in lockstep against the offline plant: one law",
+    "start": "import, first pose, and the whole system: time and memory",
     "live": "the live processes in real time: how late commands are",
     "plant": "the offline plant beside MuJoCo's stepper",
     "vi": "planning: value iteration beside SciPy and quantecon",
@@ -19,6 +20,7 @@ BENCHES = {
     "trm": "a map of 5000 poses by least squares and by evolution",
     "edges": "checking the edges of a map of 5000 poses",
     "model": "the egocentric model beside MuJoCo and python-fcl",
+    "against": "another checkout beside this one, in processor time",
 }
 _NOTES = """Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."""
 
@@ -35,14 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
+    from experiments.bench.against import AgainstFailed
     from experiments.bench.cma_peer import CmaMissing
     from experiments.bench.mink_peer import MinkMissing
     from experiments.bench.mujoco_peer import MujocoMissing
     from experiments.bench.vi_peers import QuanteconMissing
     from experiments.launched import LaunchFailed
+    from mobee.errors import NotInstalled
 
     try:
         code: int = importlib.import_module(f"mobee_cli.bench.{arguments.bench}").run(arguments)
-    except (CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed) as error:
+    except (AgainstFailed, CmaMissing, MinkMissing, MujocoMissing, QuanteconMissing, LaunchFailed, NotInstalled) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     return code

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee.learning.value_iteration import load_planning
 from services.agents.config import Config
 from services.agents.node import AgentNode
 from services.agents.reach_node import ReachNode
@@ -19,7 +18,6 @@ def main(argv: Sequence[str] | None = None) -> None:
     with explained("services.agents"):
         robot = robot_of(config)
         robot.part(config.part)
-        load_planning()  # before the bus hears of it: planning is compiled, and who loads it in the first plan seems frozen
         with Service(f"agent_{config.part}", config, robot) as service:
             (ReachNode if config.targets else AgentNode)(service, config, robot).run()
 

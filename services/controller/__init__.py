@@ -1,7 +1,7 @@
 """The MoBeE controller as a process: goals and forces in, motor commands out.
 
 Reads: tick, model/forces, model/targets, estop.
-Writes: commands, {part}/motion, {part}/reach.
+Writes: commands, {part}/motion, {part}/reach, controller/forces.
 Answers: {part}/rpc/{take,release,goal,force,reach}.
 Calls: {part}/rpc/drive/{take,arm} of robot_sim.
 """

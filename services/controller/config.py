@@ -9,6 +9,7 @@ from msgspec import Meta
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
+from services.controller.terms import load_terms
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
@@ -22,12 +23,16 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Share of the motors' top speed that is used."""
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Milliseconds after which robot_sim holds a part that it hears nothing for."""
+    terms: list[str] = []
+    """Further forces of the law, each an importable `module:name` of a Term or its function; the model must be told the same."""
     posture: dict[str, list[float]] = {}
     """Where a part that nobody owns shall be, rad, by part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: the robot must be able to take the posture."""
+        """As ServiceConfig: the robot must be able to take the posture, and the terms must be there."""
         super().check_robot(robot)
+        if self.terms:
+            load_terms(self.terms)
         for part, posture in self.posture.items():
             limits = robot.limits[robot.part(part).slice]
             if len(posture) != len(limits):

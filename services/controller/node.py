@@ -14,10 +14,13 @@ from bus_schema.messages import EStop, Mode, Targets
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
-from mobee.control import Forces
+from mobee.control import Command, Forces
 from mobee.control.checked import LARGEST_FORCE
+from mobee.control.forces import needs_contacts, told_terms
+from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
+from services.common.delivery import LATEST
 from services.common.fingerprint import robot_hash
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.rpc import CallFailed
@@ -30,6 +33,7 @@ from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 from services.controller.reaches import ReachesUnderWay
 from services.controller.telling import Telling
+from services.controller.terms import ToldContacts, load_terms
 from services.controller.warm import warm
 
 BAD_INPUT = 2  # exit code: the same again would not help
@@ -43,7 +47,10 @@ class ControllerNode:
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
         gains = Gains.named(config.gains)
-        self._law = Controller(Model(robot), gains, config.modality, speed_scale=config.speed_scale)
+        self._model = Model(robot)  # knows no world
+        self._law = Controller(self._model, gains, config.modality, speed_scale=config.speed_scale, terms=load_terms(config.terms))
+        self._needs_contacts = bool(self._law.terms) or needs_contacts()
+        self._own_forces = service.bus.publisher(keys.CONTROLLER_FORCES, ForcesMessage, LATEST)
         self._actions = {part: Action(gains.settle) for part in robot.parts}
         self._drives = Drives(service, robot)
         self._forces: ForcesMessage | None = None
@@ -86,13 +93,25 @@ class ControllerNode:
             self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
-        acting = Forces(np.array(forces.limits), np.array(forces.constraints), np.array(forces.collision))
-        if max(np.abs(force).max(initial=0.0) for force in (acting.limits, acting.constraints, acting.collision)) > LARGEST_FORCE / 3:
-            self._service.bus.reject("value", f"forces of tick {forces.re_k}: larger than any law makes them")
+        terms = {name: np.array(row) for name, row in forces.terms.items()}
+        why = self._refusal(forces, terms)
+        if why:
+            self._service.bus.reject("value", f"forces of tick {forces.re_k}: {why}")
             return
-        self._forces, self._acting = forces, acting
+        self._forces, self._acting = forces, Forces(**terms)
         if self._tick is not None and forces.re_k >= self._tick.k:
             self._step()
+
+    def _refusal(self, forces: ForcesMessage, terms: Mapping[str, Array]) -> str:
+        """What is wrong with forces, empty if nothing is."""
+        if terms.keys() != set(told_terms()):
+            return f"they are {', '.join(terms) or 'none'}; the law has {', '.join(told_terms())}"
+        if max(np.abs(force).max(initial=0.0) for force in terms.values()) > LARGEST_FORCE / len(terms):
+            return "larger than any law makes them"
+        if self._needs_contacts and forces.contacts is None:
+            return "without the contacts, on which this controller's terms may depend: set shared.terms"
+        links = max((max(c.first_link, c.second_link) for c in forces.contacts or ()), default=-1)
+        return f"a contact of link {links}, there are {len(self._robot.links)}" if links >= len(self._robot.links) else ""
 
     def _go_without_model(self) -> None:
         """Lockstep: a tick waits for its forces as long as there is somebody to send them."""
@@ -160,20 +179,35 @@ class ControllerNode:
         """Step the law over the ticks that have passed, and command what is armed."""
         for _ in range(ticks):
             before = self._law.state.copy()
-            command = self._law.step(self._q, tick.dt / 1e9, self._acting)
+            command = self._step_law(tick)
         modality: Mode = self._config.modality
-        velocity, acceleration = self._law.velocity, self._law.acceleration
+        velocity, acceleration = self._law.velocity / self._units, self._law.acceleration / self._units
         touched = self._forces.touched if self._forces is not None else {}
         orders = {}
         for part, action in self._actions.items():
             if action.status != "held":
                 where = self._where[part]
                 orders[part] = Order(self._drives.epochs[part], modality)
-                speeds, changes = velocity[where] / self._units[where], acceleration[where] / self._units[where]
-                action.look(tick.k, tick.t * 1e-9, speeds, changes, partial(self._law.still_nears, part))
+                action.look(tick.k, tick.t * 1e-9, velocity[where], acceleration[where], partial(self._law.still_nears, part))
                 self._reaches.look(part, tick, touched.get(part, []))
         self._last = tick, orders, before
         return orders, getattr(command, modality)
+
+    def _step_law(self, tick: Tick) -> Command:
+        """One step under the forces of the model, with the forces from outside at its contacts."""
+        if not self._needs_contacts:
+            return self._law.step(self._q, tick.dt / 1e9, self._acting)
+        pose = self._model.evaluate(self._q)
+        pose.feel(ToldContacts(pose, self._forces.contacts or () if self._forces is not None else ()))
+        try:
+            command = self._law.step(self._q, tick.dt / 1e9, self._acting, pose)
+        except InvalidValue as error:  # a term that gives no force now would give none after a restart
+            self._service.bus.event("error", "term", str(error))
+            raise SystemExit(BAD_INPUT) from None
+        if self._own_forces.heard:
+            own = {name: row.tolist() for name, row in self._law.last_forces.items() if name not in self._acting}
+            self._own_forces.put(re_k=tick.k, terms=own, part_age={}, touched={})
+        return command
 
     def _amend(self, part: str) -> None:
         """Free mode: what was asked between two ticks is not to wait for the next; the last step is made anew and commanded."""
@@ -181,7 +215,7 @@ class ControllerNode:
             return
         tick, orders, before = self._last
         self._law.state[:] = before
-        command = self._law.step(self._q, tick.dt / 1e9, self._acting)
+        command = self._step_law(tick)
         self._commanding.command(tick.k, orders, getattr(command, self._config.modality))
 
     def _starve(self, tick: Tick) -> dict[str, Order]:

@@ -32,7 +32,7 @@ def warm(law: Controller, robot: Robot) -> None:
                     law.reach_toward(part, name, ReachTarget(here.position(name)))
                 except InvalidValue:  # only motors of weight 0 move it: a request for such a reach is refused
                     continue
-                law.step(robot.home, min(TICK, 0.5 * law.max_dt), Forces(nothing, nothing, nothing))
+                law.step(robot.home, min(TICK, 0.5 * law.max_dt), Forces(**dict.fromkeys(law.force_names, nothing)))
                 law.still_nears(part)
                 law.end_reach(part)
     law.reset(robot.home)

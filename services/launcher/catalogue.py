@@ -54,7 +54,6 @@ _ENTRIES = {
         vital=False,
         steps=False,
         looks=True,
-        needs={"cv2": "vision"},
     ),
     "monitor": Entry(
         "services.monitor",

@@ -67,11 +67,14 @@ def _is_free(port: int) -> bool:
 
 
 def check_gains(scenario: Scenario) -> None:
-    """Raise ConfigError when services of one law would use different sets of gains: nothing would tell later."""
-    named = {part.who: part.config.gains for part in scenario.parts if hasattr(part.config, "gains")}
-    if len(set(named.values())) > 1:
-        said = ", ".join(f"{who} {gains}" for who, gains in named.items())
-        raise ConfigError(f"{scenario.where('shared.gains')}: gains differ: {said}. They share one law: set it once, as shared.gains.")
+    """Raise ConfigError when services of one law would use different sets of gains, or of terms: nothing would tell later."""
+    for what in ("gains", "terms"):
+        named = {part.who: str(getattr(part.config, what)) for part in scenario.parts if hasattr(part.config, what)}
+        if len(set(named.values())) > 1:
+            said = ", ".join(f"{who} {given}" for who, given in named.items())
+            raise ConfigError(
+                f"{scenario.where(f'shared.{what}')}: {what} differ: {said}. They share one law: set it once, as shared.{what}."
+            )
 
 
 def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:

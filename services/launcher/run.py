@@ -15,6 +15,7 @@ from types import FrameType
 
 from bus_schema import keys
 from bus_schema.rpc import Done
+from mobee._core import CoreUnavailable, library
 from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
@@ -32,7 +33,6 @@ from services.launcher.checks import (
     check_services,
 )
 from services.launcher.child import Program
-from services.launcher.engine import EngineMissing, compile_engine
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
@@ -67,6 +67,7 @@ def launch(options: Options) -> int:
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
+        library()  # here in one line what every service would say
         check_gains(scenario)
         check_lockstep(scenario)
         robots = check_robots(scenario)
@@ -74,17 +75,16 @@ def launch(options: Options) -> int:
         check_rate(scenario, robots)
         check_extras(scenario)
         check_ports(scenario)
-        compile_engine()
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
         if scenario.is_locked:
             spare_threads()
         session = open_router(endpoint, max(part.config.patience for part in scenario.parts) if scenario.is_locked else LEASE)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
-        return _refuse("interrupted before anything was started; what is compiled of the engine so far is kept", INTERRUPTED)
+        return _refuse("interrupted before anything was started", INTERRUPTED)
     with session:
         try:
             directory = make_run_directory(options.runs, scenario, endpoint)

@@ -15,7 +15,7 @@ from services.common.worlds import is_path
 from services.launcher.scenario import Scenario
 from services.launcher.toml import to_toml
 
-_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "python-fcl", "pybullet", "icub-models", "rerun-sdk", "opencv-python-headless")
+_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "icub-models", "rerun-sdk")
 
 
 def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:

@@ -16,3 +16,5 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """How far down the body a contact is felt."""
     contact_forces: bool = True
     """False: contacts are reported but exert no force, as a control experiment."""
+    terms: list[str] = []
+    """Those of the controller: it is told the contacts, on which they may depend."""

@@ -12,9 +12,10 @@ from bus_schema.chain import Tick
 from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model
-from mobee.collision.contact import Contact
+from mobee.collision.contact import KINDS, Contact
 from mobee.collision.touch import touched
 from mobee.control import constraint_forces
+from mobee.control.forces import needs_contacts, told_terms
 from mobee.engine.hands import MOST
 from mobee.errors import MobeeError
 from mobee.kinematics.quaternion import from_matrix
@@ -40,6 +41,7 @@ class ModelNode:
                 self._model.world.remove(name)
         self._track = self._model.track()
         self._gains = Gains.named(config.gains)
+        self._tells_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
         self._desk = WorldDesk(service, self._model)
         bus = service.bus
@@ -50,6 +52,10 @@ class ModelNode:
         self._targets = bus.publisher(keys.MODEL_TARGETS, Targets, bus.control)
         self._reaches: dict[str, Reach] = {}  # of the parts that reach now
         self._last_k = -1
+        self._known: tuple[bytes, tuple[str, ...]] = b"", ()  # contacts of the tick before; what follows is said of them
+        self._touching: dict[str, list[str]] = {}  # world objects by part
+        self._touches_table = False
+        self._kinds: set[str] = set()
         self._time = Percentiles()
         self._mark()
         service.mark, service.describe = self._mark, self._describe
@@ -91,21 +97,20 @@ class ModelNode:
         self._q = np.array(tick.q)
         pose = self._desk.pose = self._track.evaluate(self._q)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
-        touching = {part: list(names) for part, names in touched(pose).items() if names}
+        self._note_contacts(pose)
         if self._reaches:
             self._targets.put(re_k=tick.k, positions=self._desk.positions({reach.object for reach in self._reaches.values()}))
         self._forces.put(
             re_k=tick.k,
-            limits=forces.limits.tolist(),
-            constraints=forces.constraints.tolist(),
-            collision=forces.collision.tolist(),
+            terms={name: forces[name].tolist() for name in told_terms()},
             part_age={part: tick.t - status.t for part, status in tick.parts.items()},
-            touched=touching,
+            touched=self._touching,
+            contacts=[_item(contact) for contact in pose.contacts] if self._tells_contacts else None,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
         self._participant.done(tick.k, told=tick.k > 0 and bool(self._service.alive.get("controller")))
         self._publish_pose(tick.k, pose)
-        self._count(tick.k, pose, touching)
+        self._count(tick.k)
 
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
         """What is dear to make is made only if somebody listens."""
@@ -118,14 +123,24 @@ class ModelNode:
         if self._contacts.heard:
             self._contacts.put(re_k=k, contacts=[_item(contact) for contact in pose.contacts])
 
-    def _count(self, k: int, pose: ModelPose, touching: dict[str, list[str]]) -> None:
+    def _note_contacts(self, pose: ModelPose) -> None:
+        """What touches what; most ticks it is the same as in the tick before."""
+        table = pose.table
+        contacts = table.numbers.tobytes(), table.objects
+        if contacts != self._known:
+            self._known = contacts
+            self._touching = {part: list(names) for part, names in touched(pose).items() if names}
+            self._touches_table = any(TABLE in names for names in self._touching.values())
+            self._kinds = {KINDS[kind] for kind in table.kind.tolist()}
+
+    def _count(self, k: int) -> None:
         self._ticks += 1
         if 0 <= self._last_k < k:
             self._skipped += k - self._last_k - 1
         self._last_k = k
-        self._table_ticks += any(TABLE in names for names in touching.values())
-        self._field_ticks += any(c.kind == "field" for c in pose.contacts)
-        self._solid_ticks += any(c.kind == "solid" for c in pose.contacts)
+        self._table_ticks += self._touches_table
+        self._field_ticks += "field" in self._kinds
+        self._solid_ticks += "solid" in self._kinds
 
     def _mark(self) -> None:
         self._ticks = self._skipped = self._table_ticks = self._field_ticks = self._solid_ticks = 0
@@ -155,4 +170,5 @@ class ModelNode:
 
 
 def _item(c: Contact) -> ContactItem:
-    return ContactItem(first=c.first, second=c.second, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
+    shapes = {"first": c.first, "second": c.second, "first_link": c.first_link, "second_link": c.second_link}
+    return ContactItem(**shapes, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())

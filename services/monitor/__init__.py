@@ -1,6 +1,6 @@
 """What a person sees: a page served on loopback and a recording, made of what passes on the bus.
 
-Reads: clock, {part}/state, {part}/motion, model/forces, model/contacts, world/*, vision/image/{left,right},
+Reads: clock, {part}/state, {part}/motion, model/forces, controller/forces, model/contacts, world/*, vision/image/{left,right},
 agents/*/{transition,learned}, event/*, alive/*/*; asks model/rpc/world/list.
 Writes: event/monitor; nothing that another service acts on.
 """

@@ -78,7 +78,7 @@ class Figure:
                 rr.Arrows3D(
                     origins=[contact.point for contact in contacts],
                     vectors=[min(PUSH * contact.depth, LONGEST) * contact.normal for contact in contacts],
-                    colors=[palette.FORCES["collision"]] * len(contacts),
+                    colors=[palette.CONTACT] * len(contacts),
                     radii=0.002,
                 ),
             )

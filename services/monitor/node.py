@@ -39,7 +39,7 @@ class MonitorNode:
         bus = service.bus
         self._body = Body(bus, robot)
         self._motions = {part: bus.latest(keys.motion(part), Motion, part) for part in colors_of(robot.parts)}
-        self._forces = bus.latest(keys.MODEL_FORCES, Forces)
+        self._forces = [bus.latest(key, Forces) for key in (keys.MODEL_FORCES, keys.CONTROLLER_FORCES)]
         self._contacts = bus.latest(keys.MODEL_CONTACTS, Contacts)
         self._images = {eye: bus.latest(keys.image(eye), Image) for eye in keys.EYES}
         self._touching: list[ContactItem] = []
@@ -82,9 +82,10 @@ class MonitorNode:
             motion = stream.take()
             if motion is not None:
                 self._plots.log_motion(part, motion)
-        forces = self._forces.take()
-        if forces is not None:
-            self._plots.log_forces(forces)
+        for said in self._forces:
+            forces = said.take()
+            if forces is not None:
+                self._plots.log_forces(forces)
         self._looks += 1
         self._time.add(1e3 * (time.perf_counter() - begin))
 

@@ -9,8 +9,9 @@ Rgba = tuple[int, int, int, int]
 
 JOINTS: tuple[Color, ...] = ((76, 154, 255), (255, 171, 64), (102, 205, 130), (214, 122, 232))
 PARTS: dict[str, Color] = {"torso": (255, 202, 97), "left_arm": (86, 180, 233), "right_arm": (232, 120, 170)}
-FORCES: dict[str, Color] = {"limits": (120, 170, 255), "constraints": (190, 140, 255), "collision": (255, 92, 82)}
+FORCES: tuple[Color, ...] = ((120, 170, 255), (190, 140, 255), (255, 92, 82), (255, 202, 97), (102, 205, 130), (170, 170, 180))
 FIELD = (90, 200, 220, 28)
+CONTACT = (255, 92, 82)
 TOUCHED = (255, 50, 40, 130)
 TABLE = (150, 138, 120, 255)
 BALL = (225, 40, 40, 255)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 import rerun as rr
 
 from bus_schema.messages import Forces, Motion, Transition
+from mobee.control.forces import told_terms
 from mobee.robot.robot import Robot
 from services.monitor import palette
 
@@ -27,7 +30,8 @@ class Plots:
             goals = [palette.faded(color, 0.6) for color in colors]
             widths = [1.6] * len(motors) + [0.8] * len(motors)
             self._style(f"joints/{part}", [*colors, *goals], widths, names + ["goal"] * len(motors))
-        self._style("forces", list(palette.FORCES.values()), [1.4] * len(palette.FORCES), list(palette.FORCES))
+        self._strengths = dict.fromkeys(told_terms(), 0.0)  # of the forces, by name
+        self._style_forces()
         for quantity in LEARNED:
             for part, color in parts.items():
                 self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
@@ -37,13 +41,21 @@ class Plots:
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
-        """Norms over the whole robot."""
-        self._stream.log("plots/forces", rr.Scalars([float(np.linalg.norm(getattr(forces, kind))) for kind in palette.FORCES]))
+        """Norms over the whole robot, with those of the other sender's forces that are there already."""
+        known = len(self._strengths)
+        self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}
+        if len(self._strengths) > known:
+            self._style_forces()
+        self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
         """What an agent has just learned."""
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):
             self._stream.log(f"plots/{quantity}/{part}", rr.Scalars(value))
+
+    def _style_forces(self) -> None:
+        colors = [color for color, _ in zip(cycle(palette.FORCES), self._strengths, strict=False)]
+        self._style("forces", colors, [1.4] * len(colors), list(self._strengths))
 
     def _style(self, path: str, colors: list[palette.Color], widths: list[float], names: list[str]) -> None:
         style = rr.SeriesLines(colors=colors, widths=widths, names=names)

@@ -23,7 +23,7 @@ from services.robot_sim.sensors import Sensors
 from services.robot_sim.streams import Phases
 from services.robot_sim.watch import Watch
 
-SPREAD = 0.002  # s, a tick shorter than this has its parts read one after the other without waiting between them
+SPREAD = 0.0025  # s, a tick shorter than this has its parts read one after the other without waiting between them
 CLOCK_RATE = 100.0  # messages a second of real time on `clock` at most, in free mode: who needs every tick has `tick`
 IDLE = 1.0  # s, lockstep: between looks when there is nothing to do
 

@@ -20,16 +20,16 @@ class Stops:
     distance_max: float = 0.0  # rad
     _commanded: dict[str, tuple[int, Array]] = field(default_factory=dict)  # ns and q at the last tick under command, of parts that moved
 
-    def obeys(self, part: str, now: int, q: Array, velocity: Array) -> None:
-        """The part follows a command now [ns], at q (n,) rad."""
-        if np.abs(velocity).max() > MOVING:
-            self._commanded[part] = (now, q.copy())
+    def obeys(self, part: str, now: int, q: Array, moves: bool) -> None:
+        """The part follows a command now [ns], at q (n,) rad, which nobody changes; `moves`: some motor is faster than MOVING."""
+        if moves:
+            self._commanded[part] = (now, q)
         else:
             self._commanded.pop(part, None)
 
-    def look(self, part: str, now: int, q: Array, velocity: Array) -> tuple[float, float] | None:
+    def look(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
         """(time [s], distance [rad]) since the last command, once, when the part has come to rest just now."""
-        if part not in self._commanded or np.abs(velocity).max() > MOVING:
+        if moves or part not in self._commanded:
             return None
         start, q_start = self._commanded.pop(part)
         time, distance = (now - start) / 1e9, float(np.abs(q - q_start).max())

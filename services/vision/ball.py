@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from mobee.robot.robot import Array
 
 Picture = NDArray[np.uint8]
 
-HUE_SPREAD, MIN_SATURATION, MIN_VALUE = 8, 130, 50  # OpenCV's units: hue 0..180, the rest 0..255
+MAX_HUE, MIN_SATURATION, MIN_VALUE = 16.0, 0.51, 50  # degrees from red; of 1; of 255
 MIN_AREA = 40.0  # px
 INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: still on it; certainly not of the ball
 MIN_ARC = 0.6  # of the outline must be seen
@@ -54,12 +54,30 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
 
 
 def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
-    """Border pixels (m, 2) as column, row, and area [px] of each connected red region."""
-    hsv = cv2.cvtColor(picture, cv2.COLOR_RGB2HSV)
-    low = cv2.inRange(hsv, (0, MIN_SATURATION, MIN_VALUE), (HUE_SPREAD, 255, 255))
-    high = cv2.inRange(hsv, (180 - HUE_SPREAD, MIN_SATURATION, MIN_VALUE), (180, 255, 255))
-    contours, _ = cv2.findContours(cv2.bitwise_or(low, high), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return [(contour[:, 0, :].astype(np.float64), cv2.contourArea(contour)) for contour in contours]
+    """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough, without its holes."""
+    regions, _ = ndimage.label(_red_pixels(picture), np.ones((3, 3)))
+    blobs = []
+    for number, where in enumerate(ndimage.find_objects(regions), start=1):
+        if regions[where].size < MIN_AREA:
+            continue
+        region = ndimage.binary_fill_holes(regions[where] == number)
+        if region.sum() < MIN_AREA:
+            continue
+        border = np.argwhere(region & ~ndimage.binary_erosion(region))
+        # Of the polygon through the centres of the border's pixels, by Pick's theorem.
+        area = float(region.sum() - 0.5 * len(border) - 1.0)
+        blobs.append(((border + (where[0].start, where[1].start))[:, ::-1].astype(np.float64), area))
+    return blobs
+
+
+def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
+    """Which pixels (height, width) are red, by hue, saturation and value."""
+    red, green, blue = np.ascontiguousarray(picture.transpose(2, 0, 1))
+    is_red = (red >= MIN_VALUE) & (red > green) & (red > blue)  # on bytes: most pixels fail here
+    value, green, blue = (channel[is_red].astype(np.float64) for channel in (red, green, blue))
+    spread = value - np.minimum(green, blue)
+    is_red[is_red] = (spread >= MIN_SATURATION * value) & (60.0 * np.abs(green - blue) <= MAX_HUE * spread)
+    return is_red
 
 
 def _rays(points: Array, intrinsics: Array) -> Array:

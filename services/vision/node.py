@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import cv2
 import numpy as np
 
 from bus_schema import keys
@@ -26,7 +25,6 @@ class VisionNode:
     """Waits for both pictures and both cameras of one tick; reads nothing else of the robot."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
-        cv2.setNumThreads(1)
         self._service, self._config, self._robot = service, config, robot
         self._images: dict[str, Image] = {}
         self._cameras: dict[str, Camera] = {}

@@ -130,8 +130,9 @@ def test_a_wrong_number_of_motors_is_refused() -> None:
     assert check(command(), part=3) == command()
     assert reason_of(Command, encode(command()), part=4) == "length"
     assert reason_of(Command, encode(command(ref=[])), part=3) == "length"
-    forces = Forces(**HEADER, re_k=7, limits=[0.0] * 5, constraints=[0.0] * 5, collision=[0.0] * 4, part_age={}, touched={})
-    assert reason_of(Forces, encode(forces), robot=5) == "length"
+    rows = {"limits": [0.0] * 5, "viscous": [0.0] * 5}
+    assert check(_forces(terms=rows), robot=5) == _forces(terms=rows)
+    assert reason_of(Forces, encode(_forces(terms={**rows, "collision": [0.0] * 4})), robot=5) == "length"
 
 
 def test_an_optional_vector_is_checked_when_it_is_there() -> None:
@@ -151,7 +152,9 @@ def test_no_number_that_is_not_finite_passes_wherever_it_stands(bad: float) -> N
     assert reason_of(Command, encode(command(ref=[float("inf"), float("-inf"), 0.0]))) == "value"
     truth = messages.Truth(**HEADER, q=[], depth=bad, pair="", gap=0.0, objects=[])
     assert reason_of(messages.Truth, encode(truth)) == "value"
-    item = messages.ContactItem(first="a", second="b", kind="solid", depth=0.0, point=[0.0, bad, 0.0], normal=[0.0, 0.0, 1.0])
+    item = messages.ContactItem(
+        first="a", second="b", kind="solid", depth=0.0, point=[0.0, bad, 0.0], normal=[0.0, 0.0, 1.0], first_link=0, second_link=-1
+    )
     assert reason_of(Contacts, encode(Contacts(**HEADER, re_k=7, contacts=[item]))) == "value"
     event = messages.Event(**HEADER, level="info", code="c", text="t", values={"x": bad})
     assert reason_of(messages.Event, encode(event)) == "value"
@@ -173,14 +176,14 @@ def test_differences_of_two_times_that_passed_can_be_sent() -> None:
 
 
 def _forces(**fields: Any) -> Forces:
-    empty: dict[str, Any] = {"re_k": 7, "limits": [], "constraints": [], "collision": [], "part_age": {}, "touched": {}}
+    empty: dict[str, Any] = {"re_k": 7, "terms": {}, "part_age": {}, "touched": {}}
     return Forces(**HEADER, **{**empty, **fields})
 
 
 def test_random_and_corrupted_bytes_are_refused_or_right_and_nothing_else(rng: np.random.Generator) -> None:
     """20000 payloads: nothing but Refused is ever raised, and what passes is finite and of the right length."""
     ones = [1.0, -1.5, 1.9]  # one changed byte makes NaN or infinity of each
-    right = (command(ref=ones), _forces(limits=ones), Clock(**HEADER, dt=10, mode="free", rate=1.0))
+    right = (command(ref=ones), _forces(terms={"limits": ones}), Clock(**HEADER, dt=10, mode="free", rate=1.0))
     samples = [(type(one), encode(one)) for one in right]
     passed, reasons = 0, set()
     for trial in range(20_000):

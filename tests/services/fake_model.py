@@ -7,7 +7,7 @@ import zenoh
 
 from bus_schema import Refused, decode, keys
 from bus_schema.chain import Tick
-from bus_schema.messages import Forces
+from bus_schema.messages import ContactItem, Forces
 from services.common.delivery import LATEST
 from tests.services.fake_sim import FakeSim
 from tests.services.harness import Rig
@@ -25,6 +25,7 @@ class FakeModel:
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
         self.touched: dict[str, list[str]] = {}
+        self.contacts: list[ContactItem] | None = []  # which only a controller with terms of its own looks at
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
         rig.listen(keys.TICK, self._answer)
@@ -45,4 +46,5 @@ class FakeModel:
     def put(self, re_k: int) -> None:
         zeros = [0.0] * len(self.collision)
         collision, age = self.collision.tolist(), self.part_age
-        self._forces.put(re_k=re_k, limits=zeros, constraints=zeros, collision=collision, part_age=age, touched=self.touched)
+        terms = {"limits": zeros, "constraints": zeros, "collision": collision}
+        self._forces.put(re_k=re_k, terms=terms, part_age=age, touched=self.touched, contacts=self.contacts)

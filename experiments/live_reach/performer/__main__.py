@@ -13,7 +13,6 @@ from experiments.live_reach.performer.mover import Mover
 from experiments.live_reach.performer.node import perform
 from experiments.live_reach.settings import RATE
 from mobee import load_robot
-from mobee.learning.value_iteration import load_planning
 from services.common.config import load_config
 from services.common.entry import explained
 from services.common.service import Service
@@ -24,7 +23,6 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "experiments.live_reach.performer")
     with explained("experiments.live_reach.performer"):
         robot = load_robot(config.robot)
-        load_planning()  # before the bus hears of it: what is compiled in the first plan would be waited for
         folder = Path(config.run_dir)
         job = read_job(folder, Job)
         with Service("performer", config, robot) as service, ExitStack() as stack:

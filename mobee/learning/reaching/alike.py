@@ -84,15 +84,15 @@ class AlikeFailures:
         if seen < self._used:
             sums, asked = sums.copy(), self._middles.copy()
             asked[:, :3] += target / WAY
-            _compiled().gaussian_sums(asked, self._events, seen, self._used, sums)
+            _core().gaussian_sums(asked, self._events[seen : self._used], sums)
         forget(self._sums, KEPT)
         self._sums[key] = self._used, sums
         return sums
 
 
 @cache
-def _compiled() -> ModuleType:
-    """The compiled sums, imported when they are first needed."""
-    from mobee.engine.load import load_only
+def _core() -> ModuleType:
+    """Loaded when it is first needed."""
+    from mobee._core import histories
 
-    return load_only("mobee.learning.reaching.sums")
+    return histories

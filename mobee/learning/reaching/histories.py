@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 
+from mobee.errors import InvalidValue
 from mobee.learning.reaching.room import room_for
 from mobee.robot.robot import Array
 
@@ -15,7 +16,7 @@ class Histories:
     """Histories of so many actions: targets and values.
 
     Repeats on one target are kept as their sum and number, so that there is one entry for an action and a target, and a
-    weighted sum over all of them is one compiled pass of microseconds.
+    weighted sum over all of them is one pass of microseconds.
 
     Args:
         actions: how many.
@@ -33,6 +34,8 @@ class Histories:
 
     def add(self, action: int, target: Array, value: float) -> None:
         """Append a value to the history of an action; target (3,) m."""
+        if not 0 <= action < self._actions:
+            raise InvalidValue(f"action {action!r}: valid are 0 to {self._actions - 1}.")
         key = action, self._index(target)
         entry = self._entries.get(key)
         if entry is None:
@@ -46,12 +49,13 @@ class Histories:
 
         Weights are 1 / (1 + |x - x_i|).  A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
         """
-        totals, weights = np.full(self._actions, prior), np.ones(self._actions)
-        where = np.ascontiguousarray(target, dtype=np.float64)
-        sizes = len(self._known), len(self._entries)
-        _sums().weighted_sums(self._targets, sizes[0], where, self._scale, self._near, self._keys, self._sums, sizes[1], totals, weights)
-        totals /= weights
-        return totals
+        totals, weights = sums = np.ones((2, self._actions))
+        totals[:] = prior
+        where = np.ascontiguousarray(target, dtype=np.float64).reshape(3)
+        sizes, weighing = (len(self._known), len(self._entries)), (self._scale, self._near)
+        _core().weighted_sums(self._targets, self._keys, self._sums, sizes, weighing, where, sums)
+        found: Array = totals / weights
+        return found
 
     def copy(self) -> Histories:
         """One that goes its own way from here."""
@@ -71,8 +75,8 @@ class Histories:
 
 
 @cache
-def _sums() -> ModuleType:
-    """The compiled sums, imported when they are first needed."""
-    from mobee.engine.load import load_only
+def _core() -> ModuleType:
+    """Loaded when it is first needed."""
+    from mobee._core import histories
 
-    return load_only("mobee.learning.reaching.sums")
+    return histories

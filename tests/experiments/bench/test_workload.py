@@ -7,6 +7,7 @@ import pytest
 
 from experiments.bench import workload
 from mobee.collision.tested_pairs import tested_pairs as rules
+from mobee.engine.hands import NOBODY
 
 
 def test_it_has_the_size_that_it_says() -> None:
@@ -37,7 +38,7 @@ def test_each_world_is_the_beginning_of_the_next() -> None:
 
 def test_base_and_boxes_are_not_tested_as_none_of_them_moves() -> None:
     robot = workload.robot()
-    first, second, _ = rules(robot, workload.world(10).snapshot, -1)
+    first, second, _ = rules(robot, workload.world(10).snapshot, NOBODY)
     base = [index for index, shape in enumerate(robot.shapes) if shape.link == 0]
     assert len(base) == 3
     assert not (np.isin(first, base) & (second >= len(robot.shapes))).any()

@@ -6,7 +6,7 @@ import pytest
 import mobee
 from mobee.collision import tested_pairs as rules
 from mobee.collision.world import World
-from mobee.engine.hands import Hand, hands
+from mobee.engine.hands import Hand
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 
 BASE, UPPER, LOWER, OBJECT = 0, 1, 2, 3
@@ -35,7 +35,7 @@ def robot() -> Robot:
 
 
 def pairs_of(robot: Robot, world: World, reaching: Hand | None = None) -> set[tuple[int, int, str]]:
-    columns = rules.tested_pairs(robot, world.snapshot, hands(*() if reaching is None else (reaching,)))
+    columns = rules.tested_pairs(robot, world.snapshot, () if reaching is None else (reaching,))
     return {(int(a), int(b), ("solid", "field")[kind]) for a, b, kind in zip(*columns, strict=True)}
 
 

@@ -9,7 +9,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 import mobee
 from mobee.collision.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET
-from mobee.engine.layout import ROW, volume_row
+from mobee.engine.volumes import VOLUME, volume_row
 from mobee.kinematics.quaternion import to_matrix
 from tests.mobee.planar import planar_arm
 
@@ -120,14 +120,14 @@ class Edits(RuleBasedStateMachine):
         snapshot = self.world.snapshot
         things = list(snapshot.objects.values())
         assert snapshot.names == tuple(snapshot.objects) == tuple(thing.name for thing in things)
-        assert snapshot.rows.shape == (len(things), ROW)
+        assert (snapshot.rows.shape, snapshot.rows.dtype) == ((len(things),), VOLUME)
         assert snapshot.rows.flags.c_contiguous
         assert snapshot.roles.dtype == np.int64
         assert snapshot.roles.tolist() == [CODES[thing.role, thing.link is not None] for thing in things]
         assert set(snapshot.attached) == {thing.name for thing in things if thing.link is not None}
         assert len(snapshot.attached) == len(set(snapshot.attached))
         for row, thing in zip(snapshot.rows, things, strict=True):
-            assert np.array_equal(row, volume_row(thing))
+            assert row.tobytes() == volume_row(thing).tobytes()
 
     @invariant()
     def the_next_evaluation_sees_every_edit(self):

@@ -35,7 +35,7 @@ def test_no_edit_of_many_threads_is_lost():
         thread.join(PATIENCE)
     assert sorted(world.objects) == sorted(f"{number}:{i}" for number in range(threads) for i in range(each) if i % 3)
     assert world.version == threads * (2 * each + each // 3)
-    places = dict(zip(world.snapshot.names, world.snapshot.rows[:, 1:4].tolist(), strict=True))
+    places = dict(zip(world.snapshot.names, world.snapshot.rows["position"].tolist(), strict=True))
     assert places == {name: [*map(float, name.split(":")), 1.0] for name in world.objects}
 
 

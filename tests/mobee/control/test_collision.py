@@ -7,7 +7,7 @@ import pytest
 
 from mobee.control.gains import Gains
 from mobee.model import Model, Pose
-from tests.mobee.control.oracle import compiled_forces
+from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
 from tests.mobee.planar import planar_arm
 
@@ -15,7 +15,7 @@ LEVERS = np.array([0.9, 0.6, 0.3])  # m, from the joints of the stretched arm to
 
 
 def collision_force(projection: np.ndarray, gains: Gains) -> np.ndarray:
-    return compiled_forces(two_part_arm(), gains, STRETCHED, projection).collision
+    return forces_at(two_part_arm(), gains, STRETCHED, projection).collision
 
 
 def test_the_projection_is_lever_times_penetration() -> None:

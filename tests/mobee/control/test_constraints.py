@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mobee.control import Gains
 from mobee.robot.robot import Clause
-from tests.mobee.control.oracle import compiled_forces
+from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import two_part_arm
 
 WIDTH, MAXIMUM = 0.2, 30.0
@@ -20,7 +20,7 @@ angles = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3).map(np.array)
 
 def force(clauses: list[Clause], q: np.ndarray) -> np.ndarray:
     gains = replace(Gains.default(), constraint_width=WIDTH, max_constraint=MAXIMUM)
-    return compiled_forces(replace(two_part_arm(), clauses=tuple(clauses)), gains, q).constraints
+    return forces_at(replace(two_part_arm(), clauses=tuple(clauses)), gains, q).constraints
 
 
 def on_plane(depth: float) -> np.ndarray:
@@ -64,7 +64,7 @@ def test_a_robot_without_constraints_feels_none() -> None:
 
 def published(degrees: list[float], clauses: list[Clause]) -> np.ndarray:
     robot = replace(two_part_arm(), clauses=tuple(clauses))
-    return np.rad2deg(compiled_forces(robot, Gains.published_2014(), np.deg2rad(degrees)).constraints)
+    return np.rad2deg(forces_at(robot, Gains.published_2014(), np.deg2rad(degrees)).constraints)
 
 
 def test_the_published_law_counts_in_units_of_the_row() -> None:

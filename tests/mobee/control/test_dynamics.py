@@ -5,12 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.dynamics import acceleration, bounded, led
+from mobee._core import ADDRESS, REAL, address, function
+from mobee._core.law import MOTOR_GAINS
 from mobee.control.gains import Gains
+
+acceleration = function("law_acceleration", ADDRESS, REAL, REAL, REAL, REAL, result=REAL)
+bounded = function("law_bounded", REAL, REAL, REAL, REAL, result=REAL)
+led = function("law_led", ADDRESS, REAL, REAL, REAL, REAL, result=REAL)
 
 
 def accelerated(error: float, velocity: float, force: float, gains: Gains) -> float:
-    return acceleration(0.0, velocity, error, force, gains.stiffness, gains.max_spring, gains.damping)
+    motor = np.zeros(1, dtype=MOTOR_GAINS)
+    motor["max_spring"], motor["spring_knee"], motor["damping"] = gains.max_spring, gains.max_spring / gains.stiffness, gains.damping
+    return acceleration(address(motor), 0.0, velocity, error, force)
 
 
 def test_the_published_spring_by_hand() -> None:
@@ -39,4 +46,6 @@ def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> N
     ids=["goes on", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
 )
 def test_the_position_reference(reference: float, q: float, velocity: float, then: float) -> None:
-    assert led(reference, q, velocity, 0.01, 0.3, -1.0, 1.0) == pytest.approx(then)
+    motor = np.zeros(1, dtype=MOTOR_GAINS)
+    motor["leash"], motor["low"], motor["high"] = 0.3, -1.0, 1.0
+    assert led(address(motor), reference, q, velocity, 0.01) == pytest.approx(then)

@@ -15,7 +15,7 @@ from mobee.control.stability import largest_step
 from mobee.model import Model
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Array, Robot
-from tests.mobee.control.oracle import compiled_forces
+from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import touching, two_part_arm
 
 ICUB = load_robot("icub")
@@ -40,7 +40,7 @@ def satisfied(robot: Robot, q: Array, width: float) -> bool:
 def test_no_force_outside_the_zones(seed: int) -> None:
     gains = Gains.default()
     q = random_pose(seed)
-    forces = compiled_forces(ICUB, gains, q)
+    forces = forces_at(ICUB, gains, q)
     inside = (q >= ICUB.limits[:, 0] + gains.limit_width) & (q <= ICUB.limits[:, 1] - gains.limit_width)
     assert not forces.limits[inside].any()
     assert not forces.constraints.any() or not satisfied(ICUB, q, gains.constraint_width)
@@ -51,7 +51,7 @@ def test_no_force_outside_the_zones(seed: int) -> None:
 def test_limit_forces_point_inward_and_reach_their_maximum_at_the_limit(seed: int) -> None:
     gains = Gains.default()
     q = random_pose(seed, beyond=0.5)
-    force = compiled_forces(ICUB, gains, q).limits
+    force = forces_at(ICUB, gains, q).limits
     middle = ICUB.limits.mean(axis=1)
     assert np.all(force * (middle - q) >= 0)
     assert np.all(np.abs(force)[(q < ICUB.limits[:, 0]) | (q > ICUB.limits[:, 1])] >= gains.max_limit)
@@ -61,7 +61,7 @@ def test_limit_forces_point_inward_and_reach_their_maximum_at_the_limit(seed: in
 def test_limits_and_clauses_push_continuously_with_the_steepness_that_the_bound_of_the_step_counts(seed: int, toward: int) -> None:
     gains = Gains.default()
     q, step = random_pose(seed, 0.5), 1e-6 * np.random.default_rng(toward).normal(size=len(ICUB.motors))
-    before, after = compiled_forces(ICUB, gains, q), compiled_forces(ICUB, gains, q + step)
+    before, after = forces_at(ICUB, gains, q), forces_at(ICUB, gains, q + step)
     limit, rows = gains.max_limit / gains.limit_width, stack_clauses(ICUB.clauses, len(q))
     clause = gains.max_constraint / gains.constraint_width
     assert np.linalg.norm(after.limits - before.limits) <= 2.001 * limit * np.linalg.norm(step)
@@ -73,7 +73,7 @@ def test_a_clause_pushes_toward_where_it_is_satisfied(seed: int) -> None:
     gains = Gains.default()
     clause = ICUB.clauses[seed % len(ICUB.clauses)]
     q = random_pose(seed, 0.5)
-    force = compiled_forces(replace(ICUB, clauses=(clause,)), gains, q).constraints
+    force = forces_at(replace(ICUB, clauses=(clause,)), gains, q).constraints
     nearest = clause.a[int(np.argmax((clause.a @ q + clause.b) / np.linalg.norm(clause.a, axis=1)))]
     assert nearest @ force >= 0.0
     assert nearest @ force > 0.0 or satisfied(replace(ICUB, clauses=(clause,)), q, gains.constraint_width)

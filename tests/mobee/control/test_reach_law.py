@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control import Controller, Gains, Settle
-from mobee.control import reach_layout as at
-from mobee.control.load import reach_law
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.reach import ReachTarget
+from mobee.reference import reach
+from mobee.reference.forces import State
 from mobee.robot.load import load_robot
 from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Array, Part, Robot
@@ -36,38 +35,8 @@ def poses(robot: Robot, seed: int, count: int = 3) -> Array:
 def felt(controller: Controller, q: Array) -> Array:
     """What the reaches add to the acceleration at q, their attractor, (n,) rad/s^2."""
     total = np.zeros(len(q))
-    reach_law().add_reaches(controller.law.integers, controller.law.floats, q.copy(), q.copy(), 0.01, total, *controller.reaches)
+    controller.reaches.add_forces(q, q, 0.01, total)
     return total
-
-
-def reference(model: Model, part: str, marker: str, target: ReachTarget, q: Array) -> Array:
-    """The published law in NumPy: J^T f of the part's motors, bounded by its norm (degrees as in the 2014 program)."""
-    pose, where = model.evaluate(q), model.robot.part(part).slice
-    jacobian = model.jacobian(q, marker)[:, where] * (Gains.published_2014().weight(model.robot.motors)[where] > 0)
-    error = target.position - pose.position(marker)
-    if target.aim == "surface":
-        error *= max(0.0, 1.0 - target.radius / np.linalg.norm(error))
-    f = 5000.0 * jacobian[:3].T @ error
-    if target.normal is not None:
-        normal = pose.normal(marker)
-        turn = 5000.0 * np.linalg.norm(error) * (1.0 - normal @ target.normal) / 2.0 * np.cross(normal, target.normal)
-        f += jacobian[3:].T @ turn
-    found = np.zeros(len(q))
-    found[where] = np.deg2rad(1000.0 / (1000.0 / 50.0 + np.linalg.norm(f)) * f)
-    return found
-
-
-@given(seed=SEEDS, aim=st.sampled_from(["centre", "surface"]), turned=st.booleans())
-def test_the_published_force_is_the_transposed_jacobian_times_the_way_to_the_target(seed: int, aim: Any, turned: bool) -> None:
-    rng = np.random.default_rng(seed)
-    part, marker = (("right_arm", "right_palm"), ("left_arm", "left_elbow"), ("torso", "left_palm"))[rng.integers(3)]
-    normal = rng.normal(size=3) if turned else None
-    target = ReachTarget(rng.uniform(-0.4, 0.4, 3), float(rng.uniform(0.01, 0.2)), aim, normal)
-    model = Model(ICUB)
-    controller = Controller(model, PUBLISHED)
-    controller.reach_toward(part, marker, target)
-    for q in poses(ICUB, seed):
-        assert felt(controller, q) == pytest.approx(reference(model, part, marker, target, q), abs=1e-8)
 
 
 @given(seed=SEEDS)
@@ -89,11 +58,13 @@ def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> No
             some = rng.random(len(q)) < 0.4
             q[some] = poses(robot, int(rng.integers(2**32)), 1)[0][some]
             controller.step(q, 1e-3)
-            real, motors = controller.reaches[3][0], controller.reaches[5][0]
+            found = controller.reaches["body"]
+            columns = np.zeros((6, len(q)))
+            columns[:, found.motors["motor"]] = found.motors["column"].T
             pose = model.evaluate(q)
-            assert real[at.AT : at.AT + 3] == pytest.approx(pose.position(marker), abs=1e-12)
-            assert real[at.FACING : at.FACING + 3] == pytest.approx(pose.normal(marker), abs=1e-12)
-            assert motors[at.COLUMN : at.COLUMN + 6] == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
+            assert list(found.struct.at) == pytest.approx(pose.position(marker), abs=1e-12)
+            assert list(found.struct.facing) == pytest.approx(pose.normal(marker), abs=1e-12)
+            assert columns == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
 
 
 @BOTH
@@ -112,9 +83,12 @@ def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> N
         fresh = Controller(model, gains)
         fresh.reach_toward("right_arm", "right_palm", target)
         fresh.step(q, 0.01)
-        for row in (slice(at.AT, at.MISSING + 1),):
-            assert np.array_equal(old.reaches[3][0][row], fresh.reaches[3][0][row])
-        assert np.array_equal(old.reaches[5][0][: at.EASE], fresh.reaches[5][0][: at.EASE])
+        one, other = old.reaches["right_arm"], fresh.reaches["right_arm"]
+        for name in ("at", "facing", "error"):
+            assert list(getattr(one.struct, name)) == list(getattr(other.struct, name))
+        assert one.struct.missing == other.struct.missing
+        for name in ("column", "slope"):
+            assert np.array_equal(one.motors[name], other.motors[name])
 
 
 @BOTH
@@ -186,7 +160,8 @@ def test_the_published_reach_rests_where_pull_and_spring_are_equal() -> None:
     error = np.array([0.6, 0.8]) - outcome.q
     spring = long.max_spring * error / (long.max_spring / long.stiffness + np.abs(error))
     assert outcome.settled and 0.01 < outcome.missing < 0.1
-    assert reference(plant.model, "arm", "tip", target, q)[1:] == pytest.approx(-spring, abs=1e-3)
+    pull = reach.begin(plant.robot, long, "arm", "tip", target)
+    assert reach.reach_force(pull, State(plant.robot, long, q, 0.0 * q, q), 0.01, 0.0 * q)[1:] == pytest.approx(-spring, abs=1e-3)
 
 
 def one_part(robot: Robot) -> Model:

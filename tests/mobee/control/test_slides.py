@@ -10,14 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control.gains import Gains
-from mobee.control.load import law
-from mobee.control.pack import Law, pack
+from mobee.control.law import Law
 from mobee.control.stability import largest_step
 from mobee.model import Model
 from mobee.robot.motor_units import SLIDE_RANGE
 from mobee.robot.robot import Array, Clause, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
-from mobee.simulation.layout import PLAY
 from tests.mobee.control.two_parts import two_part_arm
 
 BOTH = pytest.mark.parametrize("gains", [Gains.default(), Gains.published_2014()], ids=lambda g: g.law)
@@ -40,8 +38,8 @@ def with_units(units: Array) -> Robot:
 TURNING, SLIDING = with_units(np.ones(3)), with_units(UNITS)
 
 
-def total(packed: Law, q: Array, torque: Array) -> Array:
-    found: Array = np.sum(law().forces_at(packed.integers, packed.floats, q, torque), axis=0)
+def total(law: Law, q: Array, torque: Array) -> Array:
+    found: Array = np.sum(law.forces(q, torque), axis=0)
     return found
 
 
@@ -50,11 +48,11 @@ def total(packed: Law, q: Array, torque: Array) -> Array:
 def test_all_forces_are_those_of_turning_motors_in_the_unit_of_the_slide(gains: Gains, seed: int) -> None:
     rng = np.random.default_rng(seed)
     q, torque, client = rng.uniform(-1.9, 1.9, 3), rng.normal(size=3) * 0.01, rng.normal(size=3) * 10.0
-    turning, sliding = pack(TURNING, gains), pack(SLIDING, gains)
+    turning, sliding = Law(TURNING, gains), Law(SLIDING, gains)
     assert total(sliding, UNITS * q, torque / UNITS) == pytest.approx(UNITS * total(turning, q, torque), rel=1e-9, abs=1e-12)
     added = [np.zeros(3), np.zeros(3)]
-    law().add_client(turning.integers, turning.floats, client, added[0])
-    law().add_client(sliding.integers, sliding.floats, UNITS * client, added[1])
+    turning.add_client(client, added[0])
+    sliding.add_client(UNITS * client, added[1])
     assert added[1] == pytest.approx(UNITS * added[0], rel=1e-9)
 
 
@@ -65,10 +63,10 @@ def test_a_step_is_that_of_turning_motors(gains: Gains, seed: int) -> None:
     q, goal, force = rng.uniform(-1.7, 1.7, (3, 3))
     commands = []
     for robot, units in ((TURNING, np.ones(3)), (SLIDING, UNITS)):
-        packed = pack(robot, gains)
-        state = law().at_rest(packed.integers, packed.floats, units * q)
+        law = Law(robot, gains)
+        state = law.at_rest(units * q)
         for _ in range(3):
-            found = law().step(packed.integers, packed.floats, units * q, 0.01, units * goal, units * force, state)
+            found = law.step(units * q, 0.01, units * goal, units * force, state)
         commands.append(found[:2] / units)
     assert commands[1] == pytest.approx(commands[0], rel=1e-9)
 
@@ -99,10 +97,10 @@ def test_a_slide_settles_within_a_millimetre_from_5_to_95_percent_of_its_range(s
 
 def test_play_and_noise_of_a_slide_follow_its_range_unless_given_for_each_motor() -> None:
     common = OfflinePlant(Model(SLIDING), motors=MotorParameters(backlash=0.01)).motors
-    assert common.fixed[PLAY, :] == pytest.approx([0.005, 0.005 * 0.25 * 0.03, 0.005 * 0.25 * 0.4])
+    assert common.numbers["play"] == pytest.approx([0.005, 0.005 * 0.25 * 0.03, 0.005 * 0.25 * 0.4])
     assert common.noise(0.02) == pytest.approx(np.deg2rad(0.1) * np.array([1.0, 0.25 * 0.03, 0.25 * 0.4]))
     own = OfflinePlant(Model(SLIDING), motors=MotorParameters(backlash=[0.01, 0.001, 0.002])).motors
-    assert own.fixed[PLAY, :] == pytest.approx([0.005, 0.0005, 0.001])
+    assert own.numbers["play"] == pytest.approx([0.005, 0.0005, 0.001])
 
 
 @pytest.mark.parametrize("home", [-1.2, -1.15, 1.0])

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control.gains import Gains
-from mobee.control.load import law
-from mobee.control.pack import pack
+from mobee.control.law import Law
 from mobee.control.stability import largest_step, require_stable
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
@@ -76,15 +75,15 @@ def tight(*rows: tuple[float, float, float]) -> Robot:
 )
 def test_the_bound_divides_stable_from_unstable_steps_of_the_law_itself(gains: Gains) -> None:
     robot = tight((1.71, -1.71, 0.0), (0.0, -1.0, 2.0))
-    packed, rng = pack(robot, gains), np.random.default_rng(5)
-    steady = sum(law().forces_at(packed.integers, packed.floats, np.zeros(3), np.zeros(3)))
+    law, rng = Law(robot, gains), np.random.default_rng(5)
+    steady = sum(law.forces(np.zeros(3), np.zeros(3)))
 
     def left(dt: float) -> float:
         q = 1e-7 * rng.normal(size=3)
-        state = law().at_rest(packed.integers, packed.floats, q)
+        state = law.at_rest(q)
         for _ in range(1000):
-            force = sum(law().forces_at(packed.integers, packed.floats, q, np.zeros(3))) - steady
-            q = q + dt * law().step(packed.integers, packed.floats, q, dt, np.zeros(3), force, state)[1]
+            force = sum(law.forces(q, np.zeros(3))) - steady
+            q = q + dt * law.step(q, dt, np.zeros(3), force, state)[1]
             if np.abs(q).max() > 1e-4:  # beyond is another slope
                 break
         return float(np.abs(q).max())

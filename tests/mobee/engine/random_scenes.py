@@ -12,26 +12,7 @@ import mobee
 from mobee._core.narrow import Volumes, overlaps
 from mobee.collision.tested_pairs import tested_pairs
 from mobee.collision.world_object import Role, WorldObject
-from mobee.engine.layout import (
-    BOUND,
-    BOX,
-    CAPSULE,
-    CENTER,
-    CORE,
-    CYLINDER,
-    HALF,
-    INVERSE,
-    KIND,
-    LENGTH,
-    RADIUS,
-    ROTATION,
-    ROW_BOUND,
-    ROW_HALF,
-    ROW_KIND,
-    ROW_POSITION,
-    ROW_ROTATION,
-    SLOT,
-)
+from mobee.engine.hands import NOBODY, Hands
 from mobee.kinematics import link_transforms
 from mobee.robot.robot import Array, Ints, Joint, Motor, Part, Robot, Shape
 
@@ -132,7 +113,7 @@ def _geometry(rng: Rng, factor: float) -> Any:
     return (mobee.sphere(x), mobee.capsule(x, y), mobee.cylinder(x, y), mobee.box(x, y, z))[rng.integers(4)]
 
 
-def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: int = 0) -> tuple[NDArray[np.int64], Array]:
+def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NOBODY) -> tuple[NDArray[np.int64], Array]:
     """Numbers (c, 3), kind, first and second, and reals (c, 7) of one pose, in the order of a contact table."""
     transforms, snapshot = link_transforms(robot, q), world.snapshot
     where = [transforms[shape.link] for shape in robot.shapes]
@@ -157,22 +138,6 @@ def solids(volumes: list[Shape | WorldObject], transforms: list[Array]) -> Volum
         if isinstance(volume, Shape) and volume.vertices is not None:
             made.hull(at, volume.vertices)
     return made
-
-
-def placed(row: Array, transform: Array) -> Array:
-    """The slot of a volume (ROW,) in the frame of a link at (4, 4)."""
-    slot = np.zeros(SLOT)
-    turn = transform[:3, :3] @ row[ROW_ROTATION : ROW_ROTATION + 9].reshape(3, 3)
-    slot[CENTER : CENTER + 3] = transform[:3, :3] @ row[ROW_POSITION : ROW_POSITION + 3] + transform[:3, 3]
-    slot[ROTATION : ROTATION + 9] = turn.reshape(9)
-    slot[HALF : HALF + 3] = row[ROW_HALF : ROW_HALF + 3]
-    if row[ROW_KIND] in (CAPSULE, CYLINDER):
-        slot[CORE : CORE + 3] = turn[:, 2] * row[ROW_HALF + 1]
-        slot[LENGTH] = row[ROW_HALF + 1] ** 2
-        slot[INVERSE] = 1.0 / slot[LENGTH] if slot[LENGTH] > 0.0 else 0.0
-    slot[RADIUS] = row[ROW_HALF] if row[ROW_KIND] < BOX else 0.0
-    slot[BOUND], slot[KIND] = row[ROW_BOUND], row[ROW_KIND]
-    return slot
 
 
 def posed(rng: Rng, robot: Robot, *shape: int) -> Array:

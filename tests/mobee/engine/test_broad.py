@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.engine import scene
-from mobee.engine.broad import _span
-from mobee.engine.compiled import entry
+from mobee._core.engine import span
+from mobee.engine import engine as engines
 from mobee.engine.engine import Engine
+from mobee.engine.hands import NOBODY
 from tests.mobee.engine.random_scenes import loaded, posed, random_world
 
 Places = Callable[[np.random.Generator, int], np.ndarray]
@@ -33,8 +33,8 @@ def test_a_grid_hides_nothing(robot: str, places: str, rng: np.random.Generator,
         world.add(f"o{index}", mobee.sphere(float(rng.uniform(0.01, 0.1))), position=where)
     q, found = posed(rng, loaded(robot), 20), []
     for first in (1, 10**9):
-        monkeypatch.setattr(scene, "GRID_FROM", first)
-        found.append(Engine(loaded(robot)).contacts(q, world.snapshot, -1))
+        monkeypatch.setattr(engines, "GRID_FROM", first)
+        found.append(Engine(loaded(robot)).contacts(q, world.snapshot, NOBODY))
     (gridded, torque), (plain, plain_torque) = found
     assert len(plain) > 0 or places == "all far away"
     assert np.array_equal(gridded.numbers, plain.numbers)
@@ -47,17 +47,12 @@ def test_objects_touch_whatever_their_number(rng: np.random.Generator) -> None:
     robot = loaded("icub")
     world, q = random_world(rng, robot, 98, 0.5), posed(rng, robot, 5)
     engine = Engine(robot)
-    before, _ = engine.contacts(q, world.snapshot, -1)
+    before, _ = engine.contacts(q, world.snapshot, NOBODY)
     for index in range(4):
         world.add(f"far{index}", mobee.sphere(0.1), position=(10.0 + index, 0.0, 0.0))
-        after, _ = engine.contacts(q, world.snapshot, -1)
+        after, _ = engine.contacts(q, world.snapshot, NOBODY)
         assert np.array_equal(after.numbers, before.numbers)
         assert np.array_equal(after.reals, before.reals)
-
-
-@entry("UniTuple(uint64, 2)(float64, float64, float64, uint64)")
-def span(offset: float, along: float, per_metre: float, cells: np.uint64) -> tuple[np.uint64, np.uint64]:
-    return _span(offset, along, per_metre, cells)
 
 
 @pytest.mark.parametrize("offset", [0.0, -1e300, 1e300, float("inf"), -float("inf"), float("nan")])

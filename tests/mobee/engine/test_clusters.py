@@ -5,19 +5,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.engine.clusters import clusters
-from mobee.engine.layout import ROW_BOUND
-from mobee.engine.pack import _rows
+from mobee.engine.robot_tables import _rows
 from mobee.robot.robot import Robot
 from tests.mobee.engine.random_scenes import loaded, random_robot
 
 
 def groups_of(robot: Robot, carried: int = 0) -> list[list[int]]:
-    rows, _ = _rows(robot.shapes)
-    extra = np.zeros((carried, rows.shape[1]))
-    extra[:, ROW_BOUND] = 0.1
+    rows, _, _ = _rows(robot.shapes)
+    extra = np.zeros(carried, dtype=rows.dtype)
+    extra["bound"] = 0.1
     link = np.array([shape.link for shape in robot.shapes] + [0] * carried, dtype=np.intp)
-    role = np.array([int(shape.role == "field") for shape in robot.shapes] + [0] * carried, dtype=np.intp)
-    return clusters(robot, np.concatenate([rows, extra]), link, role, len(rows))
+    field = np.array([shape.role == "field" for shape in robot.shapes] + [False] * carried, dtype=np.bool_)
+    return clusters(robot, np.concatenate([rows, extra]), link, field, len(rows))
 
 
 @given(st.integers(0, 2**32), st.integers(0, 8), st.integers(0, 20), st.integers(0, 3))

@@ -18,7 +18,7 @@ import pytest
 from experiments.bench import workload
 from mobee import Model
 from mobee.collision.world_object import WorldObject
-from mobee.engine.layout import ROW_BOUND, volume_row
+from mobee.engine.volumes import bound
 from mobee.model import Pose
 from mobee.robot.robot import Array, Shape
 
@@ -73,9 +73,9 @@ def walked(pose: Pose, volumes: tuple[Shape | WorldObject, ...]) -> Steps:
         seen.append(np.linalg.inv(frame) @ fixed[at + k, link[first]])
     change = seen[1] - seen[0]
     center = np.array([volume.position for volume in volumes])[first]
-    bound = np.array([volume_row(volume)[ROW_BOUND] for volume in volumes])[first]
+    radius_of_all = np.array([bound(volume) for volume in volumes])[first]
     shift = np.einsum("sij,sj->si", change[:, :3, :3], center) + change[:, :3, 3]
-    moved = np.linalg.norm(shift, axis=1) + np.linalg.norm(change[:, :3, :3], axis=(1, 2)) * bound
+    moved = np.linalg.norm(shift, axis=1) + np.linalg.norm(change[:, :3, :3], axis=(1, 2)) * radius_of_all
     radius = np.array([np.nan if volume.kind == "box" else volume.size[0] for volume in volumes])
     jumps = np.diff(pose.projection, axis=1).reshape(-1, pose.projection.shape[-1])
     return Steps(depth, force, moved, radius[first] + radius[second], jumps)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import mobee
 from mobee.engine import engine_of
-from mobee.engine.hands import MOST, Hand, hands
+from mobee.engine.hands import MOST, NOBODY, Hand, Hands
 from mobee.errors import UnknownName
 from mobee.robot.robot import Array, Motor, Robot
 from tests.mobee.engine.random_scenes import loaded, plain_contacts, posed, random_robot, random_world
@@ -15,7 +15,7 @@ from tests.mobee.engine.random_scenes import loaded, plain_contacts, posed, rand
 ROUNDING = 1e-9  # m: what overlaps by less may count or not
 
 
-def who_reaches(rng: np.random.Generator, robot: Robot) -> int:
+def who_reaches(rng: np.random.Generator, robot: Robot) -> Hands:
     """Nobody to two hands, each with the fields of some link before it."""
     found = []
     for _ in range(rng.integers(MOST + 1)):
@@ -23,10 +23,10 @@ def who_reaches(rng: np.random.Generator, robot: Robot) -> int:
         while fields > 0 and rng.random() < 0.5:
             fields = robot.joints[fields - 1].parent
         found.append(Hand(link, fields))
-    return hands(*found)
+    return tuple(found)
 
 
-def assert_same(robot: Robot, q: Array, world: mobee.World, reaching: int = 0) -> int:
+def assert_same(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NOBODY) -> int:
     """The contacts of the engine are those of all tested pairs, one by one; returns how many."""
     table, _ = engine_of(robot).contacts(q[None], world.snapshot, reaching)
     numbers, reals = plain_contacts(robot, q, world, reaching)
@@ -62,7 +62,7 @@ def test_shipped_robots_touch_what_they_should(name: str, objects: int, rng: np.
 
 def test_contacts_stand_in_order(rng: np.random.Generator) -> None:
     robot = loaded("icub")
-    table, _ = engine_of(robot).contacts(posed(rng, robot, 20), random_world(rng, robot, 150, 0.6).snapshot, -1)
+    table, _ = engine_of(robot).contacts(posed(rng, robot, 20), random_world(rng, robot, 150, 0.6).snapshot, NOBODY)
     rows = table.numbers[:, :4].tolist()
     assert len(rows) > 500
     assert rows == sorted(rows)
@@ -91,7 +91,7 @@ def test_many_contacts_fit(rng: np.random.Generator) -> None:
     numbers, _ = plain_contacts(robot, robot.home, world)
     assert len(numbers) >= 50 * 4
     q = np.tile(robot.home, (100, 1))
-    table, torque = engine_of(robot).contacts(q, world.snapshot, -1)
+    table, torque = engine_of(robot).contacts(q, world.snapshot, NOBODY)
     assert np.array_equal(table.numbers[:, 0], np.repeat(np.arange(100), len(numbers)))
     assert np.array_equal(table.numbers[:, 1:4], np.tile(numbers, (100, 1)))
     assert np.array_equal(torque, np.tile(torque[0], (100, 1)))
@@ -163,7 +163,7 @@ def test_evaluations_leave_one_room_behind_not_one_each(rng: np.random.Generator
     engine = engine_of(robot)
     small, large = random_world(rng, robot, 2).snapshot, random_world(rng, robot, 300).snapshot
     for snapshot in (small, large) * 20:
-        engine.contacts(robot.home[None].copy(), snapshot, -1)
+        engine.contacts(robot.home[None].copy(), snapshot, NOBODY)
     assert len(engine._rooms) == 1
 
 
@@ -172,4 +172,4 @@ def test_what_is_attached_to_no_link_of_the_robot_is_refused() -> None:
     world.add("ball", mobee.sphere(0.1))
     world.attach("ball", "tail", ((0.0, 0.0, 0.0), np.eye(3)))
     with pytest.raises(UnknownName, match="tail"):
-        engine_of(loaded("katana")).contacts(loaded("katana").home[None], world.snapshot, -1)
+        engine_of(loaded("katana")).contacts(loaded("katana").home[None], world.snapshot, NOBODY)

@@ -6,38 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
-from mobee.kinematics import joint_axes
-from mobee.robot.robot import Array, Robot
+from mobee.reference.contact_forces import projected
 from tests.mobee.engine.random_scenes import loaded, posed, random_robot, random_world
-
-
-def part_of(robot: Robot, link: int) -> str | None:
-    """The part that a link belongs to: of the first motor that drives its joint, else of the link that carries it."""
-    matrix, _ = robot.coupling
-    while link > 0:
-        driven = np.flatnonzero(matrix[link - 1])
-        if driven.size:
-            return robot.motor_table[driven[0]].part
-        link = robot.joints[link - 1].parent
-    return None
-
-
-def projected(robot: Robot, pose: mobee.Pose, cut: bool) -> Array:
-    """Sum over the field contacts of J^T (depth * normal), joint by joint down to the base, or to where the part ends."""
-    axes, points = joint_axes(robot, pose.transforms)
-    torque = np.zeros(len(robot.joints))
-    for contact in pose.contacts:
-        if contact.kind != "field":
-            continue
-        for link, force in ((contact.first_link, contact.depth * contact.normal), (contact.second_link, -contact.depth * contact.normal)):
-            part = part_of(robot, max(link, 0))
-            while link > 0 and not (cut and part_of(robot, link) != part):
-                j = link - 1
-                slides = robot.joints[j].kind == "prismatic"
-                torque[j] += force @ (axes[j] if slides else np.cross(axes[j], contact.point - points[j]))
-                link = robot.joints[j].parent
-    matrix, _ = robot.coupling
-    return torque @ matrix
 
 
 @given(st.integers(0, 2**32), st.integers(1, 8), st.integers(2, 12))
@@ -47,8 +17,8 @@ def test_projections_are_the_contacts_through_the_jacobians(seed: int, joints: i
     model = mobee.Model(robot, random_world(rng, robot, 20))
     for q in posed(rng, robot, 2):
         pose = model.evaluate(q)
-        assert pose.projection == pytest.approx(projected(robot, pose, cut=False), abs=1e-12)
-        assert pose.projection_of_part == pytest.approx(projected(robot, pose, cut=True), abs=1e-12)
+        assert pose.projection == pytest.approx(projected(robot, q, pose.contacts), abs=1e-12)
+        assert pose.projection_of_part == pytest.approx(projected(robot, q, pose.contacts, "part"), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["icub", "icub_2014"])
@@ -58,8 +28,8 @@ def test_parts_of_a_humanoid_feel_their_own_contacts_only_when_cut(name: str, rn
     differ = 0
     for q in posed(rng, robot, 5):
         pose = model.evaluate(q)
-        assert pose.projection == pytest.approx(projected(robot, pose, cut=False), abs=1e-12)
-        assert pose.projection_of_part == pytest.approx(projected(robot, pose, cut=True), abs=1e-12)
+        assert pose.projection == pytest.approx(projected(robot, q, pose.contacts), abs=1e-12)
+        assert pose.projection_of_part == pytest.approx(projected(robot, q, pose.contacts, "part"), abs=1e-12)
         differ += not np.allclose(pose.projection, pose.projection_of_part)
     assert differ > 0
 

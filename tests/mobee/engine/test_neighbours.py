@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.engine.neighbours import LIST, LISTED, PLACED, SERVED, STATE
 from mobee.engine.track import Track
-from mobee.robot.robot import Array
 from tests.mobee.engine.random_scenes import loaded, posed
+
+POSE, LIST = 1, 2  # what is remembered
 
 
 @pytest.fixture
@@ -17,9 +17,10 @@ def model() -> mobee.Model:
     return mobee.Model(loaded("icub"), mobee.load_world("table"))
 
 
-def state(track: Track) -> Array:
+def state(track: Track) -> tuple[int, int, int]:
+    """What is remembered, how many pairs are listed, how many poses the list has served."""
     assert track._neighbours is not None
-    return track._neighbours._ints
+    return track._neighbours._core.state()
 
 
 def creep(model: mobee.Model, track: Track, steps: int, step: float) -> None:
@@ -30,22 +31,22 @@ def creep(model: mobee.Model, track: Track, steps: int, step: float) -> None:
 def test_one_list_serves_many_small_steps(model: mobee.Model) -> None:
     track = model.track()
     creep(model, track, 50, 1e-5)
-    assert state(track)[STATE] == LIST
-    assert state(track)[SERVED] == 48  # the first pose stands alone, the second makes the list
+    assert state(track)[0] == LIST
+    assert state(track)[2] == 48  # the first pose stands alone, the second makes the list
 
 
 def test_a_list_is_made_anew_when_its_skin_is_used_up(model: mobee.Model) -> None:
     track = model.track()
     creep(model, track, 200, 1e-3)
-    assert state(track)[STATE] == LIST
-    assert 0 <= state(track)[SERVED] < 30
+    assert state(track)[0] == LIST
+    assert 0 <= state(track)[2] < 30
 
 
 def test_no_list_is_made_while_the_steps_are_large(model: mobee.Model, rng: np.random.Generator) -> None:
     track = model.track()
     for q in posed(rng, model.robot, 20):
         track.evaluate(q)
-        assert state(track)[STATE] == PLACED
+        assert state(track)[0] == POSE
 
 
 def test_a_jump_costs_no_list_and_rest_brings_one_back(model: mobee.Model, rng: np.random.Generator) -> None:
@@ -55,8 +56,8 @@ def test_a_jump_costs_no_list_and_rest_brings_one_back(model: mobee.Model, rng: 
     found = []
     for q in (elsewhere, model.robot.home, elsewhere, elsewhere, elsewhere):
         track.evaluate(q)
-        found.append(int(state(track)[STATE]))
-    assert found == [PLACED, PLACED, PLACED, LIST, LIST]
+        found.append(int(state(track)[0]))
+    assert found == [POSE, POSE, POSE, LIST, LIST]
 
 
 def test_a_list_of_use_is_made_again_at_once_when_the_world_has_changed(model: mobee.Model) -> None:
@@ -64,7 +65,7 @@ def test_a_list_of_use_is_made_again_at_once_when_the_world_has_changed(model: m
     creep(model, track, 10, 1e-5)
     model.world.add("far away", mobee.sphere(0.05), position=(0.0, 0.0, 5.0))
     track.evaluate(model.robot.home)
-    assert (state(track)[STATE], state(track)[SERVED]) == (LIST, 0)
+    assert (state(track)[0], state(track)[2]) == (LIST, 0)
 
 
 def test_a_world_in_motion_gets_no_lists_until_it_rests(model: mobee.Model) -> None:
@@ -73,10 +74,10 @@ def test_a_world_in_motion_gets_no_lists_until_it_rests(model: mobee.Model) -> N
         if k % 3 == 0:
             model.world.move("ball", position=(0.0, 0.0, 5.0 + k))
         track.evaluate(model.robot.home + k * 1e-5)
-        made += state(track)[STATE] == LIST and state(track)[SERVED] == 0
+        made += state(track)[0] == LIST and state(track)[2] == 0
     assert made == 1
     creep(model, track, 6, 1e-5)
-    assert state(track)[STATE] == LIST
+    assert state(track)[0] == LIST
 
 
 def test_a_larger_skin_lists_more_pairs(model: mobee.Model) -> None:
@@ -84,5 +85,5 @@ def test_a_larger_skin_lists_more_pairs(model: mobee.Model) -> None:
     for skin in (0.001, 0.02, 0.2):
         track = model.track(skin)
         creep(model, track, 3, 1e-6)
-        listed.append(int(state(track)[LISTED]))
+        listed.append(int(state(track)[1]))
     assert listed == sorted(set(listed))

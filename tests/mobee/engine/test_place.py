@@ -3,32 +3,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.engine.engine import Engine
-from mobee.engine.layout import INVERSE, SLOT
-from mobee.engine.pack import _rows
+from mobee._core import engine as core
+from mobee.engine.robot_tables import Carried, robot_tables
+from mobee.engine.volumes import volume_row
 from mobee.kinematics import link_transforms
 from mobee.robot.robot import Robot
-from tests.mobee.engine.random_scenes import loaded, placed, posed, random_robot, random_world
+from tests.mobee.engine.random_scenes import loaded, posed, random_robot, random_world, solids
 
 
 @pytest.mark.parametrize("robot", [loaded("icub"), loaded("icub_2014"), loaded("katana"), random_robot(np.random.default_rng(3), 6, 40)])
-@pytest.mark.parametrize("poses", [1, 4])
-def test_slots_are_the_volumes_placed_one_by_one(robot: Robot, poses: int, rng: np.random.Generator) -> None:
-    """Of every volume but the sphere, whose rotation nobody reads, all of the slot; of a batch, what its last pose leaves."""
-    engine, snapshot, q = Engine(robot), random_world(rng, robot, 12).snapshot, posed(rng, robot, poses)
-    engine.contacts(q, snapshot, -1)
-    here, slots = engine._rooms[-1].scene, engine._rooms[-1].slots
-    assert here is not None
-    transforms = link_transforms(robot, q[-1])
-    rows, _ = _rows(robot.shapes)
-    for slot, index in enumerate(here.packed.order):
-        if index >= len(robot.shapes):
-            name = snapshot.names[here.carried[index - len(robot.shapes)]]
-            row, link = snapshot.rows[snapshot.names.index(name)], robot.links.index(snapshot.objects[name].link or "")
-        else:
-            row, link = rows[index], robot.shapes[index].link
-        expected = placed(row, transforms[link])[: INVERSE + 1]
-        found = slots[slot * SLOT : slot * SLOT + len(expected)].copy()
-        if row[0] == 0:
-            found[3:12] = expected[3:12]
-        assert found == pytest.approx(expected, abs=1e-13), index
+def test_the_core_places_every_shape_and_what_is_carried_where_its_link_is(robot: Robot, rng: np.random.Generator) -> None:
+    things = [thing for thing in random_world(rng, robot, 12).objects.values() if thing.link is not None]
+    tables = robot_tables(robot, [Carried(robot.links.index(thing.link or ""), volume_row(thing)) for thing in things])
+    q = posed(rng, robot)
+    found = core.place(core.robot(*tables.for_core()), q, len(tables.volume))
+    transforms = link_transforms(robot, q)
+    volumes = [*robot.shapes, *things]
+    links = [shape.link for shape in robot.shapes] + [robot.links.index(thing.link or "") for thing in things]
+    expected = solids(volumes, [transforms[link] for link in links]).table[tables.name]
+    assert np.array_equal(found["kind"], expected["kind"])
+    assert np.array_equal(found["count"], expected["count"])
+    for what in ("center", "rotation", "half", "core", "radius", "bound", "squared"):
+        assert found[what] == pytest.approx(expected[what], abs=1e-13), what
+    assert found["inverse"] == pytest.approx(expected["inverse"], rel=1e-13)

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import mobee
+from mobee.engine.hands import NOBODY
 from tests.mobee.engine.random_scenes import loaded, posed, random_world
 
 THREADS = 8
@@ -49,7 +50,7 @@ def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.
     assert len({pose._snapshot.version for pose in threaded}) > 10
     alone = mobee.Model(robot)
     for pose in threaded:
-        table, torque = alone._engine.contacts(pose._flat, pose._snapshot, -1)
+        table, torque = alone._engine.contacts(pose._flat, pose._snapshot, NOBODY)
         assert np.array_equal(pose.table.numbers, table.numbers)
         assert np.array_equal(pose.table.reals, table.reals)
         assert np.array_equal(pose.projection, torque.reshape(pose.q.shape))

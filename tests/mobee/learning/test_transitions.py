@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +10,10 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.divergence import kl_divergence
+from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
+from mobee.learning.value_iteration import value_iteration
+from mobee.reference.learning import imagined, observe
 from tests.mobee.learning.toys import arm, torso
 
 PRINTED = 5e-5
@@ -15,31 +21,10 @@ S, ACTION, GOAL = 0, 0, 1  # the first action of state 0 aims at state 1
 OTHERS = (5, 6, 7)
 
 
-def kail_update(counts, chosen):
-    """One observation by Algorithm 6 to the letter: the new counts and the information gain."""
-    before = np.append(counts, 1.0) if chosen == len(counts) else counts
-    after = before.copy()
-    after[chosen] += 1.0
-    return after, kl_divergence(after, before)
-
-
 def rewards(observations: list[int], initial: str = "50-50") -> list[float]:
     model = TransitionModel(arm(neighbours="equidistant"), initial)
     assert model.space.goal(S, ACTION) == GOAL
     return [model.reward[S, ACTION]] + [model.observe(S, ACTION, s) for s in observations]
-
-
-@pytest.mark.parametrize(
-    ("bins", "counts", "printed"),
-    [((0, 1), ([2], [2, 2]), (0, 0.0589)), ((0, 1, 1), ([2], [2, 2], [2, 3]), (0, 0.0589, 0.0201))],
-    ids=["table 6.1", "table 7.1"],
-)
-def test_initialisation_is_two_or_three_imagined_observations(bins, counts, printed):
-    known = np.empty(0)
-    for chosen, expected, reward in zip(bins, counts, printed, strict=True):
-        known, gained = kail_update(known, chosen)
-        assert known.tolist() == expected
-        assert gained == pytest.approx(reward, abs=PRINTED)
 
 
 def test_a_predictable_action_that_succeeds_bores_as_in_table_6_2():
@@ -59,13 +44,11 @@ def test_an_unpredictable_action_by_algorithm_6():
 
 def test_table_6_4_as_printed_is_the_reverse_divergence_from_its_third_row_on():
     # Erratum: KL(T || P) instead of eq. 6.5's KL(P || T).
-    counts, reverse = np.array([2.0, 2.0]), []
-    for chosen in (2, 3, 4, 1, 2, 3):
-        after, _ = kail_update(counts, chosen)
-        before = after.copy()
-        before[chosen] -= 1
-        reverse.append(kl_divergence(before, after))
-        counts = after
+    bins, reverse = imagined(S, GOAL)[0], []
+    for outcome in TABLE_6_4:
+        bins, _ = observe(bins, outcome)
+        before = bins | {outcome: bins[outcome] - 1.0}
+        reverse.append(kl_divergence(list(before.values()), list(bins.values())))
     assert reverse[1:] == pytest.approx([0.0345, 0.0283, 0.0142, 0.0133, 0.0125], abs=PRINTED)
     assert reverse[0] != pytest.approx(0.0487, abs=PRINTED)
 
@@ -159,21 +142,6 @@ def test_a_forgetting_out_of_range_is_refused(forgetting):
         TransitionModel(arm(), forgetting=forgetting)
 
 
-observations = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 1), st.sampled_from([0, 1, 3, 9, 40])), max_size=40)
-
-
-@given(observations, st.sampled_from([1.0, 0.9, 0.5]))
-def test_plain_kl_pays_what_the_dense_distributions_over_all_states_say(observed, forgetting):
-    model = TransitionModel(arm(neighbours="equidistant"), divergence="kl", forgetting=forgetting)
-    dense = np.ones((6, 2, 81))
-    for s, a, outcome in observed:
-        old = 1.0 + forgetting * (dense[s, a] - 1.0)
-        dense[s, a] = old
-        dense[s, a, outcome] += 1.0
-        assert model.observe(s, a, outcome) == pytest.approx(kl_divergence(dense[s, a], old), abs=1e-12)
-        assert model.totals[s, a] == pytest.approx(dense[s, a].sum())
-
-
 def test_plain_kl_depends_on_the_number_of_states_and_tells_no_success_from_failure():
     few, many = TransitionModel(torso(), divergence="kl"), TransitionModel(arm(), divergence="kl")
     assert few.reward[0, 0] == few.gain(0, 0, 0) == few.gain(0, 0, few.space.goal(0, 0)) == few.gain(0, 0, 26)
@@ -190,25 +158,6 @@ def test_the_probabilities_do_not_depend_on_the_divergence():
     assert np.array_equal(models[0].probabilities, models[1].probabilities)
 
 
-@given(observations, st.sampled_from([0.9, 0.5]))
-def test_forgetting_shrinks_the_real_counts_and_keeps_the_imagined_ones(observed, forgetting):
-    model = TransitionModel(arm(neighbours="equidistant"), forgetting=forgetting)
-    real: dict[tuple[int, int], dict[int, float]] = {}
-    for s, a, outcome in observed:
-        counts = real.setdefault((s, a), {})
-        floor = {s: 2.0, model.space.goal(s, a): 2.0}
-        before = {k: forgetting * v for k, v in counts.items()} | {outcome: forgetting * counts.get(outcome, 0.0)}
-        bins = floor | before
-        old = {k: floor.get(k, 1.0) + before.get(k, 0.0) for k in bins}
-        new = old | {outcome: old[outcome] + 1.0}
-        real[s, a] = before | {outcome: before[outcome] + 1.0}
-        assert model.observe(s, a, outcome) == pytest.approx(kl_divergence(list(new.values()), list(old.values())), abs=1e-12)
-        states, counted = model.bins(s, a)
-        assert dict(zip(states.tolist(), counted.tolist(), strict=True)) == pytest.approx(new)
-        assert model.probabilities[s, a].sum() == pytest.approx(1.0)
-    assert model.tries.sum() == len(observed)
-
-
 def test_a_model_that_forgets_is_interested_again_and_unlearns_what_changed():
     forgetful, faithful = TransitionModel(arm(), forgetting=0.8), TransitionModel(arm())
     for model in (forgetful, faithful):
@@ -217,3 +166,40 @@ def test_a_model_that_forgets_is_interested_again_and_unlearns_what_changed():
             model.observe(0, 0, outcome)
     assert forgetful.reward[0, 0] > faithful.reward[0, 0]
     assert forgetful.probabilities[0, 0, 0] > 0.6 > 0.2 > faithful.probabilities[0, 0, 0]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda model: pickle.loads(pickle.dumps(model))])
+def test_a_copy_goes_its_own_way(copied):
+    model = TransitionModel(arm(neighbours="equidistant"))
+    model.debiased()
+    for outcome in OTHERS:
+        model.observe(S, ACTION, outcome)
+    before, plan = model.counts.copy(), value_iteration(model, model.reward)[1]
+    other = copied(model)
+    for outcome in (20, 21, 22, GOAL):
+        assert other.observe(S, ACTION, outcome) > 0.0
+    assert np.array_equal(model.counts, before) and other.tries.sum() == 7
+    assert np.array_equal(value_iteration(model, model.reward)[1], plan)
+    assert not np.array_equal(value_iteration(other.debiased(), other.reward)[1], plan)
+    for outcome in (20, 21, 22, GOAL):
+        model.observe(S, ACTION, outcome)
+    for one, two in ((model, other), (model.debiased(), other.debiased())):
+        assert np.array_equal(one.probabilities, two.probabilities) and np.array_equal(one.outcomes, two.outcomes)
+
+
+def test_numbers_of_numpy_name_states_and_actions_too():
+    model = TransitionModel(arm(neighbours="equidistant"))
+    found = model.observe(np.int64(S), np.intp(ACTION), np.int32(7))
+    assert found == pytest.approx(0.0487, abs=PRINTED) and model.tries[S, ACTION] == 1
+
+
+def test_the_order_of_goals_in_memory_does_not_matter():
+    space = arm(neighbours="equidistant")
+    other = Space(space.robot, space.joints, space.samples, np.asfortranarray(space.goals))
+    models = [TransitionModel(one) for one in (space, other)]
+    for model in models:
+        model.debiased()
+        for outcome in (*OTHERS, GOAL):
+            model.observe(S, ACTION, outcome)
+    plans = [value_iteration(known, model.reward)[1] for model in models for known in (model, model.debiased())]
+    assert np.array_equal(plans[0], plans[2]) and np.array_equal(plans[1], plans[3])

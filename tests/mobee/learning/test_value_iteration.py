@@ -7,6 +7,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import METHODS, value_iteration
+from mobee.reference.learning import action_values
 from tests.mobee.learning.tables import Table, chain, random_problem
 from tests.mobee.learning.toys import arm
 
@@ -22,9 +23,8 @@ def experienced(neighbours, seed, transitions=400):
 
 def residual(model, reward, discount, values):
     """The largest change of a value by one more sweep, states without actions left out."""
-    exists = model.probabilities.any(axis=-1) & (reward != -np.inf)
-    found = np.where(exists, reward + discount * (model.probabilities * values[model.outcomes]).sum(axis=-1), -np.inf)
-    acting = exists.any(axis=1)
+    found = action_values(model.outcomes, model.probabilities, reward, discount, values)
+    acting = np.isfinite(found).any(axis=1)
     return np.abs(found[acting].max(axis=1) - values[acting]).max(initial=0.0)
 
 
@@ -64,20 +64,6 @@ def test_values_of_an_experienced_model_are_those_of_policy_iteration(neighbours
     assert np.array_equal(q == -np.inf, reward == -np.inf)
 
 
-def test_sweeps_are_those_of_algorithm_7():
-    model = experienced(16, seed=4)
-    exists = model.reward != -np.inf
-    v, before = np.zeros(81), np.where(exists, 0.0, -np.inf)
-    while True:
-        q = np.where(exists, model.reward + 0.9 * (model.probabilities * v[model.outcomes]).sum(axis=-1), -np.inf)
-        change, before, v = np.abs(q[exists] - before[exists]).max(), q, q.max(axis=1)
-        if change < 1e-3:
-            break
-    found_v, found_q = value_iteration(model, model.reward)
-    assert found_v == pytest.approx(v, abs=1e-14)
-    assert found_q[exists] == pytest.approx(q[exists], abs=1e-14)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_relative_tolerance_makes_the_plan_independent_of_the_unit_of_the_reward(method):
     model = experienced("equidistant", seed=5)
@@ -96,14 +82,26 @@ def test_without_any_reward_a_relative_tolerance_is_an_absolute_one():
 def test_it_reads_the_tables_of_a_model_where_they_are(monkeypatch):
     model = experienced(16, seed=6)
     seen = []
-    from mobee.learning import sweeps
+    from mobee._core import value_iteration as core
 
-    solve = sweeps.solve
-    monkeypatch.setattr(sweeps, "solve", lambda *arrays: seen.append(arrays[:3]) or solve(*arrays))
-    value_iteration(model, model.reward)
-    assert all(
-        np.shares_memory(given, own) for given, own in zip(seen[0], (model.probabilities, model.outcomes, model.reward), strict=True)
-    )
+    known, solve = core.TransitionTable, core.solve
+    monkeypatch.setattr(core, "TransitionTable", lambda *arrays: seen.extend(arrays) or known(*arrays))
+    monkeypatch.setattr(core, "solve", lambda *arrays: seen.append(arrays[1]) or solve(*arrays))
+    value_iteration(Table(model.outcomes, model.probabilities), model.reward)
+    own = model.probabilities, model.outcomes, model.reward
+    assert len(seen) == 3 and all(np.shares_memory(*both) for both in zip(seen, own, strict=True))
+
+
+def test_a_model_that_tells_where_its_tables_are_is_planned_with_as_one_that_does_not():
+    model = TransitionModel(arm(neighbours="equidistant"))
+    rng = np.random.default_rng(7)
+    for number in range(300):
+        s = int(rng.integers(81))
+        model.observe(s, int(rng.integers(len(model.space.actions(s)))), int(rng.integers(81)))
+        for known in (model, model.debiased()) if number % 50 == 0 else ():
+            own = value_iteration(known, model.reward, 0.99, 1e-6, method="modified")
+            again = value_iteration(Table(known.outcomes, known.probabilities), model.reward, 0.99, 1e-6, method="modified")
+            assert all(np.array_equal(*both) for both in zip(own, again, strict=True))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -140,6 +138,14 @@ def test_it_ends_with_values_too_large_for_the_tolerance():
     model = experienced(16, seed=3)
     v, _ = value_iteration(model, 1e9 * model.reward, tolerance=1e-12)
     assert v == pytest.approx(1e9 * value_iteration(model, model.reward, tolerance=1e-12)[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [78, 310, 568])
+def test_it_ends_where_rounding_goes_round_in_a_cycle(seed):
+    model, reward, discount = random_problem(seed)
+    v, _ = value_iteration(model, reward, discount, tolerance=1e-12, method="modified")
+    exact, _ = policy_iteration(model, reward, discount)
+    assert np.abs(v - exact).max() < 1e-9 * np.abs(exact).max()
 
 
 def test_minus_infinity_takes_an_action_out_and_a_state_without_actions_keeps_its_start():

@@ -9,7 +9,6 @@ from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue
 from mobee.simulation.motors import MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
-from tests.mobee.simulation.motor_oracle import Oracle
 
 STEP = 0.005
 ALL = slice(None)
@@ -157,30 +156,6 @@ def test_what_is_on_its_way_when_the_mode_changes_is_not_read_in_the_wrong_unit(
     assert m.velocities == pytest.approx(np.full(3, speed))
     run(m, 0.005)
     assert m.velocities == pytest.approx(np.zeros(3), abs=1e-12)
-
-
-EACH = {"lag": (0.0, 0.05, 0.1), "delay": (0.0, 0.02, 0.035), "backlash": (0.0, 0.004, 0.02), "friction": (0.0, 0.1, 0.3)}
-
-
-@pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("parameters", [MotorParameters(), IDEAL, MotorParameters(**EACH)], ids=["published", "ideal", "each"])
-def test_whatever_is_commanded_the_motors_do_what_the_oracle_does(parameters: MotorParameters, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    m, oracle = motors(parameters), Oracle(two_part_arm(), parameters, np.zeros(3), STEP)
-    for _ in range(40):
-        where = slice(*sorted(rng.integers(0, 4, 2)))
-        mode = rng.choice(["position", "velocity", "torque", "hold"])
-        reference = None if mode == "hold" else rng.normal(size=where.stop - where.start) * rng.choice([0.1, 3.0, 30.0])
-        m.command(where, mode, reference)
-        oracle.command(where, mode, reference)
-        m.load = oracle.load = rng.normal(size=3)
-        for _ in range(rng.integers(1, 30)):
-            m.drive(STEP)
-            m.integrate()
-            oracle.step()
-        assert np.array_equal(m.q, oracle.q)
-        assert np.array_equal(m.motor_velocities, oracle.motor_v)
-        assert np.array_equal(m.velocities, oracle.velocity)
 
 
 def test_friction_takes_its_velocity_and_holds_what_is_told_less() -> None:

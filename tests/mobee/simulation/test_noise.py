@@ -3,33 +3,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mobee.reference.motors import normal
 from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors
-from mobee.simulation.load import compiled
 
-MASK = 2**64 - 1
-MOTORS = np.arange(41)
+ROBOT = load_robot("icub")
+MOTORS = np.arange(len(ROBOT.motors))
 
 
 def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
-    return np.array([compiled().noise.encoder_noise(np.uint64(seed), k, motors) for k in ticks])
-
-
-def splitmix(x: int) -> int:
-    """As published by Vigna, in whole numbers of any length."""
-    x = (x + 0x9E3779B97F4A7C15) & MASK
-    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & MASK
-    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & MASK
-    return x ^ (x >> 31)
+    """What is added to the encoders where the standard deviation is 1."""
+    alive = np.isin(MOTORS, motors)
+    drawn = Motors(ROBOT, MotorParameters(encoder_noise=1.0), seed, np.zeros(len(MOTORS)), alive)
+    return np.array([drawn.encoders(k, 0.02)[motors] for k in ticks])
 
 
 @pytest.mark.parametrize(("seed", "k", "motor"), [(0, 0, 0), (7, 1, 1), (2**64 - 1, 10**9, 40)])
 def test_a_normal_is_box_muller_of_splitmix(seed: int, k: int, motor: int) -> None:
-    one = splitmix(splitmix(splitmix(seed) ^ k) ^ splitmix(motor // 2))
-    radius = np.sqrt(-2.0 * np.log(((one >> 11) + 1) * 2.0**-53))
-    angle = 2.0 * np.pi * ((splitmix(one) >> 11) * 2.0**-53)
-    expected = radius * (np.sin(angle) if motor % 2 else np.cos(angle))
-    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(expected, rel=1e-12)
+    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(normal(seed, k, motor), rel=1e-12)
 
 
 def test_it_is_a_pure_function_of_seed_tick_and_motor() -> None:
@@ -60,7 +51,7 @@ def test_ticks_motors_and_seeds_are_uncorrelated(lag: int) -> None:
 
 
 def test_a_part_is_read_with_the_noise_that_the_whole_robot_is_read_with() -> None:
-    robot = load_robot("icub")
+    robot = ROBOT
     motors = Motors(robot, MotorParameters(), seed=9, q=robot.home)
     where = robot.parts["right_arm"].slice
     assert np.array_equal(motors.encoders(4, 0.01)[where], motors.encoders(4, 0.01, where))

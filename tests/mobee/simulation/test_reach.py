@@ -128,10 +128,10 @@ def test_a_lost_state_interrupts_a_reach() -> None:
     plant.present(NEAR)
     plant.begin_reach("arm", "tip")
     plant.run(5)
-    plant.motors.state[0] = np.nan
+    plant.motors.state["q"] = np.nan
     with pytest.raises(ActionInterrupted, match="not finite"):
         plant.advance()
-    assert plant.model.reaching is None and not plant.controller.reaches[0].size
+    assert plant.model.reaching is None and not plant.controller.reaches
 
 
 @BOTH

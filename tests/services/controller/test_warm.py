@@ -19,7 +19,7 @@ def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
     q = ROBOT.home + 0.01
     for _ in range(3):
         assert np.array_equal(warmed.step(q, 0.01).velocity, new.step(q, 0.01).velocity)
-    assert not len(warmed.reaches[0])
+    assert not warmed.reaches
 
 
 def test_what_the_gains_never_move_keeps_no_controller_from_starting() -> None:

@@ -16,8 +16,8 @@ def test_without_contact_forces_contacts_are_told_and_not_felt(tmp_path_factory:
     with rig(tmp_path_factory.mktemp("numb"), load_robot("icub")) as made:
         numb = staged(made, "--no-contact-forces")
         answer = numb.at(on_the_table())
-        assert np.abs(answer.collision).max() == 0.0
-        assert np.abs(answer.limits).max() + np.abs(answer.constraints).max() > 0.0
+        assert np.abs(answer.terms["collision"]).max() == 0.0
+        assert np.abs(answer.terms["limits"]).max() + np.abs(answer.terms["constraints"]).max() > 0.0
         assert answer.touched["left_arm"] == ["table"]
         assert numb.contacts[-1].contacts
         assert numb.numbers()["table_ticks"] == 1
@@ -29,7 +29,14 @@ def test_the_published_propagation_spares_the_torso(tmp_path_factory: pytest.Tem
     with rig(tmp_path_factory.mktemp("part"), robot) as made:
         answer = staged(made, "--propagate", "part", "--gains", "default").at(q)
         expected = constraint_forces(library().evaluate(q), Gains.default(), "part")
-        np.testing.assert_allclose(answer.collision, expected.collision, atol=1e-12)
+        np.testing.assert_allclose(answer.terms["collision"], expected.collision, atol=1e-12)
+
+
+def test_the_contacts_are_told_along_with_the_forces_where_terms_need_them(tmp_path_factory: pytest.TempPathFactory) -> None:
+    with rig(tmp_path_factory.mktemp("terms"), load_robot("icub")) as made:
+        telling = staged(made, "--terms", "elsewhere:viscous")
+        answer = telling.at(on_the_table())
+        assert answer.contacts and answer.contacts == telling.contacts[-1].contacts
 
 
 def test_a_world_that_is_not_there_is_told_in_one_line(stage: Stage) -> None:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.errors import InvalidValue
 from mobee.learning.reaching.histories import Histories
 
 ORIGIN = np.zeros(3)
@@ -73,3 +74,9 @@ def test_a_copy_goes_its_own_way():
     histories.add(1, at(0.5), 0.25)
     assert histories.average(ORIGIN, 0.0) == pytest.approx([0.25, 0.25 / 51 / (52 / 51)])
     assert other.average(ORIGIN, 0.0)[0] == pytest.approx(0.2)
+
+
+def test_actions_that_there_are_not_are_refused():
+    for action in (-1, 2):
+        with pytest.raises(InvalidValue, match="valid are 0 to 1"):
+            Histories(2, 0.01).add(action, ORIGIN, 1.0)

@@ -1,0 +1,107 @@
+#include "contacts.hpp"
+
+#include <algorithm>
+
+namespace mobee {
+
+namespace contacts {
+
+// The robot's shapes, then the objects of the snapshot.
+std::int64_t name_of(const Scene& scene, const Shape& shape) {
+    const std::int64_t own = scene.robot->own_shapes;
+    return shape.name < own ? shape.name : own + scene.carried[shape.name - own];
+}
+
+bool before(const Contact& a, const Contact& b) {
+    if (a.kind != b.kind) return a.kind < b.kind;
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+}
+
+void push(Wrench& wrench, Vec3 force, Vec3 point) {
+    wrench.force = wrench.force + force;
+    wrench.moment = wrench.moment + cross(point, force);
+}
+
+bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
+
+// In the order of the contacts: the sum does not depend on how they were found.
+bool push_links(const Array<Contact>& contacts, Array<Wrench>& wrench) {
+    bool any = false;
+    for (const Contact& contact : contacts) {
+        if (contact.kind != field_contact) continue;
+        any = true;
+        const Vec3 force = contact.depth * contact.touch.normal;
+        push(wrench[contact.first_link], force, contact.touch.point);
+        if (contact.second_link >= 0) push(wrench[contact.second_link], -force, contact.touch.point);
+    }
+    return any;
+}
+
+}  // namespace contacts
+
+double overlap_of(const Scene& scene, Placed& placed, Pair pair, Touch& touch) {
+    const Robot& robot = *scene.robot;
+    const auto shapes = static_cast<std::int32_t>(robot.shapes());
+    const Volume& one = placed_volume(robot, placed, pair.first);
+    const Volume& two = pair.second < shapes ? placed_volume(robot, placed, pair.second) : scene.volume[pair.second - shapes];
+    return overlap(one, two, touch);
+}
+
+bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double depth, const Touch& touch, Contact& contact) {
+    const Robot& robot = *scene.robot;
+    const Shape& one = robot.shape[pair.first];
+    contact = {one.field ? field_contact : solid_contact, contacts::name_of(scene, one), 0, one.link, -1, depth, touch};
+    if (pair.second >= robot.shapes()) {
+        const std::int64_t object = pair.second - robot.shapes();
+        contact.second = robot.own_shapes + scene.name[object];
+        return !(scene.target[object] && spares(robot, one, hands));
+    }
+    const Shape& two = robot.shape[pair.second];
+    if (two.field) contact.kind = field_contact;  // a carried object meets fields too
+    contact.second = contacts::name_of(scene, two);
+    contact.second_link = two.link;
+    if (contact.second < contact.first) {
+        std::swap(contact.first, contact.second);
+        std::swap(contact.first_link, contact.second_link);
+        contact.touch.normal = -touch.normal;
+    }
+    return true;
+}
+
+void find_contacts(const Scene& scene, const Hands& hands, Placed& placed, const Array<Pair>& pairs, Array<Contact>& found) {
+    found.clear();
+    Touch touch;
+    Contact contact;
+    for (const Pair pair : pairs) {
+        const double depth = overlap_of(scene, placed, pair, touch);
+        if (depth > 0.0 && name_contact(scene, hands, pair, depth, touch, contact)) found.push(contact);
+    }
+}
+
+void sort_contacts(Array<Contact>& found) { std::sort(found.begin(), found.end(), contacts::before); }
+
+void project(const Robot& robot, const Frame* frames, const Array<Contact>& found, bool cut, Array<Wrench>& wrench, double* torque) {
+    if (!contacts::push_links(found, wrench)) return;
+    // Gathered link by link from the tips to the base.
+    for (std::int64_t link = robot.joints; link > 0; --link) {
+        const Vec3 force = wrench[link].force, moment = wrench[link].moment;
+        if (contacts::is_zero(force) && contacts::is_zero(moment)) continue;
+        wrench[link] = Wrench{};
+        const Joint& joint = robot.joint[link - 1];
+        // A joint leaves its own axis where it is, so the link it moves carries the axis too.
+        const Frame& frame = frames[link];
+        const Vec3 axis = turn(frame, joint.axis);
+        const double along = joint.slides ? dot(axis, force) : dot(axis, moment - cross(move(frame, joint.point), force));
+        for (std::int64_t drive = 0; drive < robot.drives; ++drive) {
+            const std::int64_t k = drive * robot.joints + link - 1;
+            torque[robot.motor[k]] += robot.scale[k] * along;
+        }
+        if (cut && joint.border) continue;
+        Wrench& carrier = wrench[joint.parent];
+        carrier.force = carrier.force + force;
+        carrier.moment = carrier.moment + moment;
+    }
+    wrench[0] = Wrench{};
+}
+
+}  // namespace mobee

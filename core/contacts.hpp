@@ -1,0 +1,34 @@
+// Finding the contacts of one pose among the pairs that may touch, and what they do to the motors.
+#pragma once
+
+#include <cstdint>
+
+#include "contact.hpp"
+#include "pairs.hpp"
+#include "scene.hpp"
+
+namespace mobee {
+
+// Forces on a link: their sum, and the sum of their moments about the origin.
+struct Wrench {
+    Vec3 force, moment;
+};
+
+// How deep a pair overlaps, see `overlap`.
+double overlap_of(const Scene& scene, Placed& placed, Pair pair, Touch& touch);
+
+// Fill a contact; false if it is with a target, and spared by what reaches.
+bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double depth, const Touch& touch, Contact& contact);
+
+// Put a contact in `found` for every pair that overlaps.
+void find_contacts(const Scene& scene, const Hands& hands, Placed& placed, const Array<Pair>& pairs, Array<Contact>& found);
+
+// By kind, first and second.
+void sort_contacts(Array<Contact>& contacts);
+
+// Add what contacts of fields do to the motors, the sum of J^T (depth * normal) (thesis eq. 5.11), to `torque` (motors,).
+//
+// `cut`: a part's motors feel only what happens to its own links, as in the original program.  `wrench` (links,): all 0 before and after.
+void project(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, bool cut, Array<Wrench>& wrench, double* torque);
+
+}  // namespace mobee

@@ -1,0 +1,130 @@
+// The contacts of many poses at once.  One pose is a batch of one, and threads share a batch in blocks: all give the same bits.
+#include <pthread.h>
+
+#include "contacts.hpp"
+#include "interface.hpp"
+#include "rows.hpp"
+
+namespace mobee {
+
+// What one thread works in; kept for the next evaluation.
+struct Worker {
+    Placed placed;
+    Pairs pairs;
+    Array<Contact> found;
+    Array<Wrench> wrench;
+    Rows rows;
+};
+
+// What one evaluation works in.
+struct Room {
+    Array<Worker*> workers;
+
+    ~Room() {
+        for (Worker* worker : workers) discard(worker);
+    }
+};
+
+// What Python asks, see mobee/_core/engine.py.
+struct Request {
+    const Scene* scene;
+    const double* q;          // (poses, motors)
+    double* torque;           // (poses, motors), overwritten
+    ContactNumbers* numbers;  // (few,): the rows are written here if there are no more
+    ContactReals* reals;      // (few,)
+    std::int64_t poses, few, cut, threads;
+    Hands hands;
+};
+
+namespace evaluation {
+
+void fit(Worker& worker, const Robot& robot) {
+    worker.placed.fit(robot);
+    worker.wrench.resize(robot.links);
+}
+
+// The poses from `begin` to before `end`.
+void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& worker) {
+    const Scene& scene = *request.scene;
+    const Robot& robot = *scene.robot;
+    fit(worker, robot);
+    Placed& placed = worker.placed;
+    for (std::int64_t b = begin; b < end; ++b) {
+        double* torque = request.torque + b * robot.motors;
+        std::memset(torque, 0, robot.motors * sizeof(double));
+        joint_angles(robot, request.q + b * robot.motors, placed.links.angles.data());
+        place(robot, placed);
+        bound_clusters(robot, placed);
+        find_pairs(scene, placed, 0.0, worker.pairs);
+        sieve(scene, placed, worker.pairs.list);
+        find_contacts(scene, request.hands, placed, worker.pairs.list, worker.found);
+        if (worker.found.size() == 0) continue;
+        sort_contacts(worker.found);
+        project(robot, placed.links.frame.data(), worker.found, request.cut != 0, worker.wrench, torque);
+        worker.rows.append(b, worker.found);
+    }
+}
+
+struct Block {
+    const Request* request;
+    std::int64_t begin, end;
+    Worker* worker;
+    pthread_t thread;
+    bool apart;  // in a thread of its own
+};
+
+void* run_block(void* given) {
+    const Block& block = *static_cast<Block*>(given);
+    run(*block.request, block.begin, block.end, *block.worker);
+    return nullptr;
+}
+
+void run_all(Room& room, const Request& request, std::int64_t threads) {
+    Array<Block> blocks(threads);
+    for (std::int64_t k = 0; k < threads; ++k) {
+        Block& block = blocks[k];
+        block = {&request, request.poses * k / threads, request.poses * (k + 1) / threads, room.workers[k], {}, false};
+        if (k > 0) block.apart = pthread_create(&block.thread, nullptr, run_block, &block) == 0;
+    }
+    for (Block& block : blocks) {  // the first, and those for which the system has no thread
+        if (!block.apart) run_block(&block);
+    }
+    for (Block& block : blocks) {
+        if (block.apart) pthread_join(block.thread, nullptr);
+    }
+}
+
+}  // namespace evaluation
+
+MOBEE_CALL Room* mobee_room_new() { return make<Room>(); }
+
+MOBEE_CALL void mobee_room_free(Room* room) { discard(room); }
+
+// Write the rows of the last evaluation, in the order of the poses.
+MOBEE_CALL void mobee_room_rows(Room* room, ContactNumbers* numbers, ContactReals* reals) {
+    std::size_t used = 0;
+    for (Worker* worker : room->workers) {
+        const std::size_t rows = worker->rows.numbers.size();
+        worker->rows.hand_over(numbers, reals, used);
+        used += rows;
+    }
+}
+
+// Find the contacts of all poses; returns how many there are.  If they are more than few, `mobee_room_rows` hands them over.
+MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
+    const std::int64_t most_threads = request->poses > 1 ? request->poses : 1;
+    const std::int64_t threads = request->threads < most_threads ? request->threads : most_threads;
+    while (static_cast<std::int64_t>(room->workers.size()) < threads) room->workers.push(make<Worker>());
+    for (Worker* worker : room->workers) worker->rows.clear();
+    if (threads == 1) {
+        evaluation::run(*request, 0, request->poses, *room->workers[0]);
+    } else {
+        evaluation::run_all(*room, *request, threads);
+    }
+    std::size_t rows = 0;
+    for (const Worker* worker : room->workers) rows += worker->rows.numbers.size();
+    if (static_cast<std::int64_t>(rows) <= request->few) mobee_room_rows(room, request->numbers, request->reals);
+    return static_cast<std::int64_t>(rows);
+}
+
+}  // namespace mobee

@@ -1,0 +1,58 @@
+"""The core as part of a wheel: what hatchling calls before it packs one, or makes the project importable in place.
+
+No part of the library: pip reads it by the name in pyproject.toml.
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+sys.path.insert(0, str(Path(__file__).parent))
+import build as core  # noqa: E402  (the file beside this one)
+
+
+class CoreHook(BuildHookInterface[Any]):
+    """Builds the core into mobee/_core: for a wheel all levels of machines of this kind, in place the one that runs here."""
+
+    def dependencies(self) -> list[str]:
+        """What the build needs beyond hatchling: a compiler, where the system has none."""
+        try:
+            stale = _stale(core.knowledge().machine_levels())
+            return [core.zig_requirement()] if stale and core.compiler_for(stale).zig else []
+        except core.CompilerMissing:
+            return [core.zig_requirement()]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Build, and tell hatchling what to pack and for which machines; ends with the compiler's words if it fails."""
+        levels = core.knowledge().machine_levels() if version == "standard" else core.level_here()
+        try:
+            if stale := _stale(levels):
+                for library in core.build(stale, core.compiler_for(stale), core.knowledge().FOLDER, strict=False):
+                    self.app.display_info(f"built {library.name}")
+        except core.BuildFailed as failure:
+            sys.exit(str(failure))
+        if version == "standard":
+            libraries = [core.knowledge().library_file(level) for level in levels]
+            build_data["pure_python"] = False
+            build_data["tag"] = f"py3-none-{wheel_platform(libraries)}"
+            build_data["force_include"].update({str(path): f"mobee/_core/{path.name}" for path in libraries})
+
+
+def _stale(levels: Sequence[str]) -> list[str]:
+    return [level for level in levels if not core.is_current(level, core.knowledge().FOLDER, strict=False)]
+
+
+def wheel_platform(libraries: list[Path]) -> str:
+    """The last part of a wheel's tag: the machines on which libraries load, by the symbols that they ask of the C library."""
+    if sys.platform == "darwin":
+        return f"macosx_{core.macos_version().replace('.', '_')}_{platform.machine()}"
+    needed = [core.oldest_glibc(library) for library in libraries]
+    if None in needed:
+        return f"{sys.platform}_{platform.machine()}"
+    return "manylinux_{}_{}_{}".format(*max(needed), platform.machine())  # type: ignore[type-var]

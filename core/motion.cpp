@@ -1,0 +1,165 @@
+#include "motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "interface.hpp"
+
+namespace mobee {
+
+namespace motion {
+
+constexpr std::int64_t most_groups = 4;  // of a link
+
+// Give the shapes of a link to groups, by where they are along the longest side of the box that holds their centres.
+void group_link(const Robot& robot, std::int64_t link, Motion& to) {
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    std::int64_t number = 0;
+    for (const Shape& shape : robot.shape) {
+        if (shape.link != link) continue;
+        ++number;
+        for (int k = 0; k < 3; ++k) {
+            low[k] = least(low[k], shape.volume.center[k]);
+            high[k] = most(high[k], shape.volume.center[k]);
+        }
+    }
+    int longest = 0;
+    for (int k = 1; k < 3; ++k)
+        if (high[k] - low[k] > high[longest] - low[longest]) longest = k;
+    const std::int64_t groups = std::min(number, most_groups), first = static_cast<std::int64_t>(to.group.size());
+    to.group.resize(to.group.size() + groups);
+    for (std::int64_t g = 0; g < groups; ++g) to.group[first + g].link = link;
+    const double length = high[longest] - low[longest];
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        const Shape& shape = robot.shape[i];
+        if (shape.link != link) continue;
+        const double share = length > 0.0 ? (shape.volume.center[longest] - low[longest]) / length : 0.0;
+        to.group_of[i] = first + std::min(static_cast<std::int64_t>(share * static_cast<double>(groups)), groups - 1);
+    }
+}
+
+}  // namespace motion
+
+void Motion::fit(const Robot& robot) {
+    const std::int64_t shapes = robot.shapes();
+    moved.resize(robot.links);
+    moved_in.resize(robot.links);
+    for (Array<std::int64_t>* of_shapes : {&placed_in, &group_of}) of_shapes->resize(shapes);
+    for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
+    for (Array<double>* of_links : {&turned, &bend, &sway, &chain}) of_links->resize(robot.links);
+    for (Array<double>* of_shapes : {&x, &y, &z, &arm, &way}) of_shapes->resize(shapes);
+    frame.resize(robot.links);
+    if (serial == robot.serial) return;
+    serial = robot.serial;
+    make_groups(robot);
+}
+
+void Motion::make_groups(const Robot& robot) {
+    group.clear();
+    for (std::int64_t link = 0; link < robot.links; ++link) motion::group_link(robot, link, *this);
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        Group& one = group[group_of[i]];
+        one.middle = one.middle + robot.shape[i].volume.center;
+        ++one.number;
+    }
+    for (Group& one : group) one.middle = 1.0 / most(static_cast<double>(one.number), 1.0) * one.middle;
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        const Volume& volume = robot.shape[i].volume;
+        Group& one = group[group_of[i]];
+        arm[i] = volume.bound - (volume.kind <= Kind::capsule ? volume.radius : 0.0);
+        one.spread = most(one.spread, length(volume.center - one.middle) + arm[i]);
+    }
+}
+
+void find_moved(const Robot& robot, const double* angles, bool fresh, Motion& motion) {
+    ++motion.pose;
+    motion.moved[0] = fresh;
+    for (std::int64_t j = 0; j < robot.joints; ++j) {
+        motion.moved[j + 1] = motion.moved[robot.joint[j].parent] || angles[j] != motion.last[j];
+        motion.last[j] = angles[j];
+    }
+    for (std::int64_t link = 0; link < robot.links; ++link)
+        if (motion.moved[link]) motion.moved_in[link] = motion.pose;
+}
+
+void remember(const Placed& placed, Motion& motion) {
+    const auto copy = [](const auto& from, auto& to) { std::copy(from.begin(), from.begin() + to.size(), to.begin()); };
+    copy(placed.links.angles, motion.angles);
+    copy(placed.links.frame, motion.frame);
+    copy(placed.x, motion.x);
+    copy(placed.y, motion.y);
+    copy(placed.z, motion.z);
+    std::fill(motion.way.begin(), motion.way.end(), 0.0);
+    for (Group& one : motion.group) {
+        one.then = move(motion.frame[one.link], one.middle);
+        one.far = 0.0;
+    }
+}
+
+double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
+    for (std::int64_t link = 0; link < robot.links; ++link) {
+        if (!motion.moved[link]) continue;
+        const Frame &now = links.frame[link], &before = motion.frame[link];
+        const Four x = now.x - before.x, y = now.y - before.y, z = now.z - before.z;
+        const Four squares = x * x + y * y + z * z;
+        motion.turned[link] = std::sqrt(0.5 * (squares[0] + squares[1] + squares[2]));  // 2 sin(angle / 2)
+    }
+    double farthest = 0.0;
+    for (Group& one : motion.group) {
+        if (motion.moved[one.link])
+            one.far = length(move(links.frame[one.link], one.middle) - one.then) + motion.turned[one.link] * one.spread;
+        farthest = most(farthest, one.far);
+    }
+    return farthest;
+}
+
+double way_of(const Robot& robot, std::int64_t i, Placed& placed, Motion& motion) {
+    const std::int64_t link = robot.shape[i].link;
+    if (motion.placed_in[i] >= motion.moved_in[link]) return motion.way[i];
+    place_shape(robot, i, placed);
+    motion.placed_in[i] = motion.pose;
+    const Vec3 way{placed.x[i] - motion.x[i], placed.y[i] - motion.y[i], placed.z[i] - motion.z[i]};
+    motion.way[i] = length(way) + motion.turned[link] * motion.arm[i];
+    return motion.way[i];
+}
+
+double measure_shapes(const Robot& robot, Placed& placed, Motion& motion) {
+    double farthest = 0.0;
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) farthest = most(farthest, way_of(robot, i, placed, motion));
+    return farthest;
+}
+
+void place_shapes(const Robot& robot, Placed& placed, Motion& motion) {
+    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+        if (motion.placed_in[i] >= motion.moved_in[robot.shape[i].link]) continue;
+        place_shape(robot, i, placed);
+        motion.placed_in[i] = motion.pose;
+    }
+}
+
+void bend_links(const Robot& robot, const double* angles, Motion& motion) {
+    for (std::int64_t j = 0; j < robot.joints; ++j) {
+        const Joint& joint = robot.joint[j];
+        const std::int64_t link = j + 1, parent = joint.parent;
+        const double change = std::fabs(angles[j] - motion.angles[j]);
+        const double span = robot.span[j] + (joint.slides ? std::fabs(angles[j]) : 0.0);
+        motion.bend[link] = motion.bend[parent] + (joint.slides ? 0.0 : change);
+        motion.sway[link] = motion.sway[parent] + motion.bend[parent] * span + (joint.slides ? change : 0.0);
+        motion.chain[link] = motion.chain[parent] + span;
+    }
+}
+
+// For tests: how far each shape (shapes,) may have moved from the angles `then` to `now`, as seen from each link that carries both it and
+// another: (shapes, links), by the number of the other link.
+MOBEE_CALL void mobee_swung(const Robot* robot, const double* then, const double* now, double* out) {
+    Motion motion;
+    motion.fit(*robot);
+    std::copy(then, then + robot->joints, motion.angles.begin());
+    bend_links(*robot, now, motion);
+    for (const Shape& shape : robot->shape) {
+        for (std::int64_t other = 0; other < robot->links; ++other)
+            *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+    }
+}
+
+}  // namespace mobee

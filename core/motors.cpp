@@ -1,0 +1,240 @@
+#include "motors.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "interface.hpp"
+#include "law.hpp"
+
+namespace mobee {
+
+namespace motors {
+
+constexpr double servo_gain = 8.0;  // 1/s, position mode and a hold that has come to rest
+
+// The nearest to x of low .. high; NaN stays.
+double within(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+// The number nearer to 0 by that much, at most 0.
+double shrunk(double x, double by) { return x > by ? x - by : x < -by ? x + by : x * 0.0; }
+
+// The velocity towards a position.
+double servo(const MotorNumbers& numbers, const MotorState& state, double position) {
+    return within(servo_gain * (position - state.motor_q), -numbers.max_velocity, numbers.max_velocity);
+}
+
+// What enters the delay line: a torque in torque mode, else a velocity.
+double wanted(const MotorNumbers& numbers, const MotorState& state) {
+    if (state.mode == position_mode) return servo(numbers, state, state.reference);
+    const double most = state.mode == torque_mode ? numbers.max_torque : numbers.max_velocity;
+    return within(state.reference, -most, most);
+}
+
+// The velocity after a substep under a torque.
+double turned(const MotorNumbers& numbers, const MotorState& state, double torque, double dt) {
+    const double before = state.motor_velocity, most = numbers.max_acceleration;
+    const double push = within((torque - state.load - motor_friction * before) / motor_inertia, -most, most);
+    double slowed = before + push * dt;
+    if (numbers.friction > 0.0) slowed = shrunk(slowed, motor_friction * numbers.friction / motor_inertia * dt);
+    return within(slowed, -numbers.max_velocity, numbers.max_velocity);
+}
+
+// The velocity after a substep in which one was asked for: first order, less what Coulomb friction takes.
+double responded(const MotorNumbers& numbers, const MotorState& state, double velocity) {
+    const double after = state.motor_velocity + numbers.share * (velocity - state.motor_velocity);
+    return numbers.friction > 0.0 ? shrunk(after, numbers.share * numbers.friction) : after;
+}
+
+// The velocity of a motor that brakes to rest and then stays where that was.
+double held(const MotorNumbers& numbers, MotorState& state, double dt) {
+    const double before = state.motor_velocity, change = numbers.max_acceleration * dt;
+    if (!state.resting && std::fabs(before) <= change) {
+        state.resting = 1;
+        state.rest = state.motor_q;
+    }
+    if (state.resting) return servo(numbers, state, state.rest);
+    return before - within(before, -change, change);
+}
+
+// Advance the motor side by a substep; `now`: the row of the delay line that is written.  Its effort is told by `note_effort`.
+inline void turn(const Motors& motors, std::int64_t i, MotorState& state, std::int64_t now, double dt) {
+    const MotorNumbers& numbers = motors.numbers[i];
+    motors.on_its_way(now, i) = wanted(numbers, state);
+    const std::int64_t then = now - numbers.delay;
+    const double asked = motors.on_its_way(then >= 0 ? then : then + motors.rows, i);
+    const bool torque = state.mode == torque_mode;
+    state.left = torque ? asked : 0.0;
+    state.motor_velocity = state.mode == hold_mode ? held(numbers, state, dt)
+                           : torque                ? turned(numbers, state, asked, dt)
+                                                   : responded(numbers, state, asked);
+    state.motor_q += state.motor_velocity * dt;
+    const double play = torque ? 0.0 : numbers.play;  // who commands torques takes the gear to be rigid
+    state.dragged = within(state.q, state.motor_q - play, state.motor_q + play);
+}
+
+// What the motor exerted in a substep; `before`: its velocity until then.
+inline void note_effort(MotorState& state, double before, double dt) {
+    state.effort = motor_inertia * (state.motor_velocity - before) / dt + motor_friction * state.motor_velocity;
+}
+
+// Take the joint side at the end of a substep; the motor side follows into the play, so that nothing winds up.
+inline void adopt(const MotorNumbers& numbers, MotorState& state, double q, double dt) {
+    state.velocity = (q - state.q) / dt;
+    state.q = q;
+    if (state.mode == torque_mode) {
+        state.motor_q = q;
+        state.motor_velocity = state.velocity;
+    } else {
+        state.motor_q = within(state.motor_q, q - numbers.play, q + numbers.play);
+    }
+}
+
+// Joint sides that nothing blocks.
+inline void stop_hard(const MotorNumbers& numbers, MotorState& state, double dt) {
+    state.dragged = within(state.dragged, numbers.low, numbers.high);
+    adopt(numbers, state, state.dragged, dt);
+}
+
+// Counters are mixed as by splitmix64 (Steele, Lea, Flood 2014): every bit of x changes each of the result with probability 1/2.
+std::uint64_t mixed(std::uint64_t x) {
+    x += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return x ^ (x >> 31);
+}
+
+// What all motors share at a tick.
+std::uint64_t tick_key(std::uint64_t seed, std::int64_t tick) { return mixed(mixed(seed) ^ static_cast<std::uint64_t>(tick)); }
+
+struct Normals {
+    double even = 0.0, odd = 0.0;
+};
+
+// The standard normals of motors 2 pair and 2 pair + 1 (Box and Muller).
+Normals normal_pair(std::uint64_t key, std::int64_t pair) {
+    constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
+    const std::uint64_t one = mixed(key ^ mixed(static_cast<std::uint64_t>(pair))), two = mixed(one);
+    const double radius = std::sqrt(-2.0 * std::log((static_cast<double>(one >> 11) + 1.0) * unit));
+    const double angle = turn * (static_cast<double>(two >> 11) * unit);
+    return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+// References that never ask motors for more than their velocity and acceleration, and never for what cannot be braked.
+struct Braking {
+    std::int64_t count = 0;
+    const double* lower = nullptr;
+    const double* upper = nullptr;
+    const double* fastest = nullptr;
+    const double* change = nullptr;  // of the velocity in a tick
+    double* velocity = nullptr;      // what is asked for now
+    double dt = 0.0;
+
+    // The largest velocity that whole ticks of full braking end within the distance.
+    double within(std::int64_t i, double distance) const {
+        return std::min(fastest[i], change[i] * (std::sqrt(0.25 + 2.0 * distance / (change[i] * dt)) - 0.5));
+    }
+    double down(std::int64_t i, double q) const { return within(i, std::max(q - lower[i], 0.0)); }
+    double up(std::int64_t i, double q) const { return within(i, std::max(upper[i] - q, 0.0)); }
+
+    // A tick nearer to the wanted velocity, and exactly there if it may be.
+    void approach(std::int64_t i, double wanted) const {
+        velocity[i] = std::min(std::max(wanted, velocity[i] - change[i]), velocity[i] + change[i]);
+    }
+};
+
+}  // namespace motors
+
+void enter(const Motors& motors, std::int64_t motor, std::int64_t mode) {
+    MotorState& state = motors.state[motor];
+    if (state.mode == mode) return;
+    state.mode = mode;
+    state.resting = 0;
+    for (std::int64_t row = 0; row < motors.rows; ++row)
+        motors.on_its_way(row, motor) = mode == torque_mode ? state.load : state.motor_velocity;
+    if (mode == torque_mode) state.motor_q = state.q;  // from then on its gear is rigid
+}
+
+void drive(Motors& motors, double dt) {
+    motors.newest = motors.next(motors.newest);
+    for (const std::int64_t i : motors.living) {
+        const double before = motors.state[i].motor_velocity;
+        motors::turn(motors, i, motors.state[i], motors.newest, dt);
+        motors::note_effort(motors.state[i], before, dt);
+    }
+}
+
+void integrate(const Motors& motors, double dt) {
+    for (const std::int64_t i : motors.living) motors::stop_hard(motors.numbers[i], motors.state[i], dt);
+}
+
+void move(Motors& motors, std::int64_t substeps, double dt) {
+    for (const std::int64_t i : motors.living) {
+        MotorState state = motors.state[i];
+        std::int64_t now = motors.newest;
+        for (std::int64_t k = 0; k < substeps; ++k) {
+            now = motors.next(now);
+            const double before = state.motor_velocity;
+            motors::turn(motors, i, state, now, dt);
+            if (k + 1 == substeps) motors::note_effort(state, before, dt);
+            motors::stop_hard(motors.numbers[i], state, dt);
+        }
+        motors.state[i] = state;
+    }
+    motors.newest = (motors.newest + substeps) % motors.rows;
+}
+
+void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
+    const std::uint64_t key = motors::tick_key(seed, tick);
+    std::int64_t last = -1;
+    motors::Normals drawn;
+    for (const std::int64_t i : motors.living) {
+        if (i / 2 != last) {
+            last = i / 2;
+            drawn = motors::normal_pair(key, last);
+        }
+        q[i] = motors.state[i].q + noise[i] * (i % 2 ? drawn.odd : drawn.even);
+    }
+}
+
+}  // namespace mobee
+
+MOBEE_CALL void mobee_motors_enter(const mobee::Motors* motors, std::int64_t first, std::int64_t end, std::int64_t mode) {
+    for (std::int64_t i = first; i < end; ++i) mobee::enter(*motors, i, mode);
+}
+
+MOBEE_CALL void mobee_motors_drive(mobee::Motors* motors, double dt) { mobee::drive(*motors, dt); }
+
+MOBEE_CALL void mobee_motors_integrate(const mobee::Motors* motors, double dt) { mobee::integrate(*motors, dt); }
+
+MOBEE_CALL void mobee_motors_adopt(const mobee::Motors* motors, const double* q, double dt) {
+    for (const std::int64_t i : motors->living) mobee::motors::adopt(motors->numbers[i], motors->state[i], q[i], dt);
+}
+
+MOBEE_CALL void mobee_motors_read(const mobee::Motors* motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
+    mobee::read_encoders(*motors, seed, tick, noise, q);
+}
+
+// Approach the wanted velocities; before a position limit no more than can still be braked.
+MOBEE_CALL void mobee_braking_to_velocity(const mobee::motors::Braking* braking, const double* wanted, const double* q) {
+    for (std::int64_t i = 0; i < braking->count; ++i)
+        braking->approach(i, std::min(std::max(wanted[i], -braking->down(i, q[i])), braking->up(i, q[i])));
+}
+
+// Advance the positions `at` that are asked for, on the way to the wanted ones, to arrive there at rest.
+MOBEE_CALL void mobee_braking_to_position(const mobee::motors::Braking* braking, const double* wanted, double* at) {
+    for (std::int64_t i = 0; i < braking->count; ++i) {
+        const double rest = std::min(std::max(wanted[i], braking->lower[i]), braking->upper[i]) - at[i];
+        const double speed = std::min(braking->within(i, std::fabs(rest)), std::fabs(rest) / braking->dt);
+        braking->approach(i, std::copysign(speed, rest));
+        at[i] += braking->velocity[i] * braking->dt;
+    }
+}
+
+// Whether some motor that moves so is a tick of braking too fast to stop before its position limit.
+MOBEE_CALL bool mobee_braking_runs_out(const mobee::motors::Braking* braking, const double* q, const double* moving) {
+    for (std::int64_t i = 0; i < braking->count; ++i) {
+        const double change = braking->change[i];
+        if (moving[i] > braking->up(i, q[i]) + change || moving[i] < -braking->down(i, q[i]) - change) return true;
+    }
+    return false;
+}

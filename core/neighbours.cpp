@@ -1,0 +1,227 @@
+// A list is of use until two volumes together may have moved by the skin since it was made; until then a pair is looked at only when
+// what its two volumes have moved adds up to what was between them, and of two shapes of one hand also only when the joints between
+// them have turned enough.  What has not moved at all is neither placed nor tested again.  Where poses are far apart a list does not
+// pay: every pose is then evaluated as any other, until the steps become short.
+#include "neighbours.hpp"
+
+#include <cmath>
+
+#include "contacts.hpp"
+#include "interface.hpp"
+#include "motion.hpp"
+#include "rows.hpp"
+
+namespace mobee {
+
+enum class Remembered : std::int64_t { nothing, pose, list, pose_to_renew };  // the last: in a world that has changed under a useful list
+
+// A pair nearer than the skin when the list was made.
+struct Neighbour {
+    Pair pair;
+    double gap = 0.0;         // m between the two then
+    std::int64_t kept = -1;   // which contact of then is theirs, -1: none
+};
+
+struct Neighbours {
+    const Scene* scene = nullptr;
+    Hands hands;
+    double skin = 0.0;  // m
+    bool cut = false;   // see `project`
+
+    Remembered state = Remembered::nothing;
+    std::int64_t served = 0;  // poses that the list has served
+    std::int64_t pause = 0;   // poses that no list is made for
+
+    Placed placed;
+    Motion motion;
+    Pairs pairs;
+    Array<Neighbour> list;
+    Array<Contact> kept;  // when the list was made
+    Array<Contact> found;
+    Array<Pair> close;    // pairs of the list that are looked at
+    Array<Wrench> wrench;
+    Rows rows;
+};
+
+namespace following {
+
+constexpr double margin = 1e-9;  // m: above the rounding of distances and of what was moved
+constexpr double short_step = 4.0;   // steps of the present length that a new list must last to be worth making
+constexpr std::int64_t worth = 4;    // poses that a list must have served before an edit of the world to be made again at once, else so many go without
+
+// Whether the list holds in a pose in which a shape may be `farthest` away [m] from the pose remembered.
+bool holds(const Neighbours& near, double farthest) { return near.state == Remembered::list && 2.0 * farthest < near.skin - margin; }
+
+// Whether to make a list where none holds.
+bool pays(Neighbours& near, double farthest) {
+    if (near.state == Remembered::list) return near.served > 1;
+    if (near.pause > 0) {
+        --near.pause;
+        return false;
+    }
+    return near.state == Remembered::pose_to_renew || (near.state == Remembered::pose && short_step * 2.0 * farthest < near.skin);
+}
+
+// How far the two of a listed pair may have moved together.
+double way_of_pair(Neighbours& near, Pair pair) {
+    const Robot& robot = *near.scene->robot;
+    const double way = way_of(robot, pair.first, near.placed, near.motion);
+    return pair.second < robot.shapes() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
+}
+
+// The same from their groups alone: no less, and it places nothing.
+double way_of_groups(const Neighbours& near, Pair pair) {
+    const Motion& motion = near.motion;
+    const double way = motion.group[motion.group_of[pair.first]].far;
+    return pair.second < near.scene->robot->shapes() ? way + motion.group[motion.group_of[pair.second]].far : way;
+}
+
+// How far two shapes of the robot may have come nearer, as seen from the link that carries both.
+double approach(const Neighbours& near, Pair pair) {
+    const Robot& robot = *near.scene->robot;
+    const Shape &a = robot.shape[pair.first], &b = robot.shape[pair.second];
+    const std::int64_t base = robot.common[a.link * robot.links + b.link];
+    return swung(near.motion, a.link, base, a.lever) + swung(near.motion, b.link, base, b.lever);
+}
+
+// Collect the listed pairs that may have met, and the contacts of those of which neither has moved.
+void gather(Neighbours& near) {
+    near.close.clear();
+    near.found.clear();
+    bool bent = false;
+    for (const Neighbour& one : near.list) {
+        if (way_of_groups(near, one.pair) < one.gap) continue;
+        const double between = way_of_pair(near, one.pair);
+        if (between < one.gap) continue;
+        if (between == 0.0) {
+            if (one.kept >= 0) near.found.push(near.kept[one.kept]);
+            continue;
+        }
+        if (one.gap > 0.0 && one.pair.second < near.scene->robot->shapes()) {
+            if (!bent) bend_links(*near.scene->robot, near.placed.links.angles.data(), near.motion);
+            bent = true;
+            if (approach(near, one.pair) < one.gap) continue;
+        }
+        near.close.push(one.pair);
+    }
+}
+
+void use_list(Neighbours& near) {
+    gather(near);
+    Touch touch;
+    Contact contact;
+    for (const Pair pair : near.close) {
+        const double depth = overlap_of(*near.scene, near.placed, pair, touch);
+        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) near.found.push(contact);
+    }
+}
+
+void make_list(Neighbours& near) {
+    near.list.clear();
+    near.found.clear();
+    Touch touch;
+    Contact contact;
+    for (const Pair pair : near.pairs.list) {
+        const double depth = overlap_of(*near.scene, near.placed, pair, touch);
+        if (-depth >= near.skin) continue;
+        Neighbour one{pair, -depth - margin, -1};
+        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
+            one.kept = static_cast<std::int64_t>(near.found.size());
+            near.found.push(contact);
+        }
+        near.list.push(one);
+    }
+    near.kept.clear();
+    for (const Contact& one : near.found) near.kept.push(one);
+}
+
+// Look at all pairs.
+void start_anew(Neighbours& near, bool build) {
+    const Scene& scene = *near.scene;
+    bound_clusters(*scene.robot, near.placed);
+    find_pairs(scene, near.placed, build ? near.skin : 0.0, near.pairs);
+    remember(near.placed, near.motion);
+    if (build) {
+        make_list(near);
+    } else {
+        sieve(scene, near.placed, near.pairs.list);
+        find_contacts(scene, near.hands, near.placed, near.pairs.list, near.found);
+    }
+    near.state = build ? Remembered::list : Remembered::pose;
+    near.served = 0;
+}
+
+}  // namespace following
+
+std::int64_t find(Neighbours& near, const double* q) {
+    const Robot& robot = *near.scene->robot;
+    const bool fresh = near.state == Remembered::nothing || near.state == Remembered::pose_to_renew;
+    joint_angles(robot, q, near.placed.links.angles.data());
+    find_moved(robot, near.placed.links.angles.data(), fresh, near.motion);
+    place_links(robot, near.motion.moved.data(), near.placed.links);
+    double farthest = fresh ? 0.0 : measure_groups(robot, near.placed.links, near.motion);
+    if (!fresh && !following::holds(near, farthest)) farthest = measure_shapes(robot, near.placed, near.motion);
+    if (following::holds(near, farthest)) {
+        ++near.served;
+        following::use_list(near);
+    } else {
+        if (fresh) place_shapes(robot, near.placed, near.motion);
+        following::start_anew(near, following::pays(near, farthest));
+    }
+    return static_cast<std::int64_t>(near.found.size());
+}
+
+void feel(Neighbours& near, double* torque) {
+    sort_contacts(near.found);
+    project(*near.scene->robot, near.placed.links.frame.data(), near.found, near.cut, near.wrench, torque);
+}
+
+const Contact& contact(const Neighbours& near, std::int64_t index) { return near.found[index]; }
+
+MOBEE_CALL Neighbours* mobee_neighbours_new(double skin, std::int64_t cut) {
+    Neighbours* near = make<Neighbours>();
+    near->skin = skin;
+    near->cut = cut != 0;
+    return near;
+}
+
+MOBEE_CALL void mobee_neighbours_free(Neighbours* near) { discard(near); }
+
+// From now on among another world, or with others who reach.
+MOBEE_CALL void mobee_neighbours_enter(Neighbours* near, const Scene* scene, const Hands* hands) {
+    const bool was_of_use = near->state == Remembered::list && near->served >= following::worth;
+    const bool first = near->scene == nullptr;
+    near->scene = scene;
+    near->hands = *hands;
+    near->state = was_of_use ? Remembered::pose_to_renew : Remembered::nothing;
+    near->pause = was_of_use || first ? 0 : following::worth;  // a world in motion outdates its lists
+    near->placed.fit(*scene->robot);
+    near->motion.fit(*scene->robot);
+    near->wrench.resize(scene->robot->links);
+}
+
+// Find the contacts in the poses q (poses, motors), one after the other, and what they do, (poses, motors); returns how many there are.
+MOBEE_CALL std::int64_t mobee_follow(Neighbours* near, const double* q, std::int64_t poses, double* torque) {
+    const std::int64_t motors = near->scene->robot->motors;
+    near->rows.clear();
+    std::memset(torque, 0, poses * motors * sizeof(double));
+    for (std::int64_t b = 0; b < poses; ++b) {
+        if (find(*near, q + b * motors) == 0) continue;
+        feel(*near, torque + b * motors);
+        near->rows.append(b, near->found);
+    }
+    return static_cast<std::int64_t>(near->rows.numbers.size());
+}
+
+MOBEE_CALL void mobee_neighbours_rows(Neighbours* near, ContactNumbers* numbers, ContactReals* reals) {
+    near->rows.hand_over(numbers, reals, 0);
+}
+
+// For tests: the state, how many pairs are listed, how many poses the list has served.
+MOBEE_CALL void mobee_neighbours_state(const Neighbours* near, std::int64_t* state) {
+    state[0] = static_cast<std::int64_t>(near->state);
+    state[1] = static_cast<std::int64_t>(near->list.size());
+    state[2] = near->served;
+}
+
+}  // namespace mobee

@@ -1,0 +1,55 @@
+"""Run a command with the core that stops at the first wrong address or undefined operation.
+
+    python core/sanitize.py COMMAND [ARGUMENT ...]
+
+It builds that core if need be and puts the sanitizers' libraries into the command's process, which Python itself was built without.
+What Python and its packages never free is not counted as a leak.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from build import BuildFailed, Compiler, build, compiler_for, is_current, knowledge
+
+RUNTIMES = ("libasan.so", "libubsan.so")
+SETTINGS = {
+    "ASAN_OPTIONS": "detect_leaks=0:strict_string_checks=1",
+    "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1",
+    "PYTHONMALLOC": "malloc",  # each object has an address of its own, so that what is read beyond one is seen
+}
+
+
+def main() -> None:
+    """Become the command."""
+    command = sys.argv[1:]
+    if not command:
+        sys.exit(f"usage: {__doc__.splitlines()[2].strip()}")  # type: ignore[union-attr]
+    try:
+        level, folder = knowledge().SANITIZED, knowledge().FOLDER
+        compiler = compiler_for([level])
+        if not is_current(level, folder, strict=False):
+            list(build([level], compiler, folder, strict=False))
+        loaded = " ".join(_runtime(compiler, name) for name in RUNTIMES)
+    except BuildFailed as failure:
+        sys.exit(str(failure))
+    environment = {**os.environ, **SETTINGS, "LD_PRELOAD": loaded, "MOBEE_CORE": level}
+    try:
+        os.execvpe(command[0], command, environment)
+    except OSError as error:
+        sys.exit(f"core: {command[0]} could not be started: {error.strerror}")
+
+
+def _runtime(compiler: Compiler, name: str) -> str:
+    """Where the compiler keeps one of its libraries; it answers with the bare name when there is none."""
+    asked = [*compiler.command, f"-print-file-name={name}"]
+    found = subprocess.run(asked, capture_output=True, check=True, text=True).stdout.strip()
+    if found == name:
+        raise BuildFailed(f"core: g++ has no {name}: install it (Debian: apt install libasan8 libubsan1, of g++'s version)")
+    return found
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,199 @@
+"""Two checkouts in one run: how much processor time the same work costs in each.
+
+A round of a case is a fresh process of each checkout; both prepare the case and do its work once, which does not count, and then by turns
+(old, new, new, old, ...) as often as asked.  Processor time is counted, so that what else the machine does matters little.  The ratio of
+a round is that of the sums, the verdict rests on the median of the rounds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from experiments.bench import requirement
+from experiments.bench.requirement import all_passed, judged
+from experiments.progress import Progress
+from mobee.errors import MobeeError
+
+HERE = Path(__file__).resolve().parents[2]
+_CASES = Path(__file__).with_name("against_cases.py")
+TURNS = 6  # of each checkout in a round
+FEWER_TURNS = {"lockstep": 1, "trm evolution": 2}  # whose work takes long
+_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "NUMBA", "MKL")}
+
+# Of the old time over the new at least.
+LEAST = {
+    "one arm": 2.0,
+    "reaching": 2.0,
+    "three agents": 2.5,
+    "chapter 8": 1.6,
+    "lockstep": 1.3,
+    "vi cold": 1.0,
+    "vi warm": 1.0,
+    "ik least squares": 1.0,
+    "ik evolution": 1.0,
+    "trm least squares": 1.0,
+    "trm evolution": 1.0,
+    "edges": 1.0,
+}
+Pair = dict[str, dict[str, Any]]  # of "old" and "new": seconds of the work, and what was done
+EQUAL = 0.97  # what counts as no slower: two runs of one checkout differ by a little
+
+
+class AgainstFailed(MobeeError):
+    """A checkout that is not there, or a case that does not run in it; the message is its last word."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checkout:
+    """A folder with the sources, and the Python that runs them."""
+
+    folder: Path
+    python: str = sys.executable
+
+    def start(self, case: str) -> Worker:
+        """A process that has the case prepared; raises AgainstFailed."""
+        return Worker(self, case)
+
+
+class Worker:
+    """A process of one checkout that does the work of a case.  A context: it ends with it."""
+
+    def __init__(self, checkout: Checkout, case: str) -> None:
+        self._checkout, self._case = checkout, case
+        environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": str(checkout.folder)}
+        argv = [checkout.python, "-P", str(_CASES), case]
+        self._news = tempfile.TemporaryFile("w+")
+        self._process = subprocess.Popen(
+            argv, cwd=checkout.folder, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._news, text=True
+        )
+
+    def __enter__(self) -> Worker:
+        library = Path(self._heard()["library"])
+        if not library.is_relative_to(self._checkout.folder):
+            raise AgainstFailed(f"{self._case}: the library was taken from {library}, not from {self._checkout.folder}")
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait()
+        self._process.stdout.close()
+        self._news.close()
+
+    def work(self) -> dict[str, Any]:
+        """Do the work once: what the process says of it; raises AgainstFailed."""
+        assert self._process.stdin is not None
+        print("again", file=self._process.stdin, flush=True)
+        return self._heard()
+
+    def _heard(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        if not said:
+            self._process.wait()
+            self._news.seek(0)
+            last = (self._news.read().strip().splitlines() or ["it said nothing"])[-1]
+            raise AgainstFailed(f"{self._case} in {self._checkout.folder}: {last}")
+        heard: dict[str, Any] = json.loads(said)
+        return heard
+
+
+@contextlib.contextmanager
+def checkout(what: str, python: str = sys.executable) -> Iterator[Checkout]:
+    """A folder, or a commit of this repository as a folder that is there meanwhile; raises AgainstFailed."""
+    if Path(what).is_dir():
+        yield Checkout(Path(what).resolve(), python)
+        return
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve() / "old"
+        _git("worktree", "add", "--detach", str(folder), what)
+        try:
+            yield Checkout(folder, python)
+        finally:
+            _git("worktree", "remove", "--force", str(folder))
+
+
+def _git(*words: str) -> None:
+    try:
+        subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=True)
+    except FileNotFoundError:
+        raise AgainstFailed("git is not installed: give a folder instead of a commit") from None
+    except subprocess.CalledProcessError as error:
+        raise AgainstFailed(f"git {words[0]}: {error.stderr.strip().splitlines()[-1]}") from None
+
+
+def measure(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
+    """Everything that `mobee bench against --json` prints; raises AgainstFailed."""
+    pairs: dict[str, list[Pair]] = {case: [] for case in cases}
+    with Progress() as progress:
+        for done in range(len(cases) * rounds):
+            number, index = divmod(done, len(cases))
+            case = cases[index]
+            progress.show(done / (len(cases) * rounds), f"{case}, round {number + 1} of {rounds}")
+            pairs[case].append(_round(old, new, case, turns=FEWER_TURNS.get(case, TURNS)))
+    found = {case: compared(of_case) for case, of_case in pairs.items()}
+    return {"rounds": rounds, "cases": found, **verdict(found)}
+
+
+def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
+    seconds = {"old": 0.0, "new": 0.0}
+    with old.start(case) as one, new.start(case) as other:
+        workers = {"old": one, "new": other}
+        work = {}
+        for turn in range(turns):
+            for name in ("old", "new") if turn % 2 == 0 else ("new", "old"):
+                said = workers[name].work()
+                seconds[name] += said["seconds"]
+                work[name] = said["work"]
+    return {name: {"seconds": seconds[name] / turns, "work": work[name]} for name in workers}
+
+
+def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
+    """The rounds of one case: medians of times and ratios, and the spread of these."""
+    old, new = (np.array([one[which]["seconds"] for one in rounds]) for which in ("old", "new"))
+    ratios = old / new
+    lower, middle, upper = np.percentile(ratios, [25, 50, 75])
+    work = {which: rounds[-1][which]["work"] for which in ("old", "new")}
+    return {
+        "old_s": float(np.median(old)),
+        "new_s": float(np.median(new)),
+        "ratio": float(middle),
+        "quartiles": [float(lower), float(upper)],
+        "range": [float(ratios.min()), float(ratios.max())],
+        "same_work": work["old"] == work["new"],
+        "work": work,
+    }
+
+
+def verdict(found: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Whether every case is as much faster as required; a little less than 1 counts as no slower."""
+    required = [judged(case, one["ratio"], at_least=LEAST[case] if LEAST[case] > 1.0 else EQUAL) for case, one in found.items()]
+    return {"requirements": required, "passed": all_passed(required)}
+
+
+def report(result: Mapping[str, Any]) -> str:
+    """The measurements as text."""
+    lines = [f"Processor time of the same work, medians of {result['rounds']} rounds; ratio: old over new"]
+    lines.append(f"{'':<20}{'old, s':>9}{'new, s':>9}{'ratio':>8}{'quartiles':>15}{'range':>15}")
+    for case, one in result["cases"].items():
+        quartiles, spread = (f"{low:.2f} - {high:.2f}" for low, high in (one["quartiles"], one["range"]))
+        lines.append(f"{case:<20}{one['old_s']:>9.3f}{one['new_s']:>9.3f}{one['ratio']:>8.2f}{quartiles:>15}{spread:>15}")
+        if not one["same_work"]:
+            lines += [f"    {which}: {_told(work)}" for which, work in one["work"].items()]
+    return "\n".join([*lines, "required", *requirement.lines(result["requirements"])])
+
+
+def _told(work: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {count:g}" for name, count in work.items())

@@ -1,0 +1,213 @@
+"""The cases of `mobee bench against`: each is run in a fresh process, with the library and the workloads of the checkout that is measured.
+
+    PYTHONPATH=CHECKOUT python -P against_cases.py CASE
+
+So nothing is imported here that commit 10a73fe does not have.  The process prepares the case, does its work once to warm up, and again
+for every line that it reads; each time it prints as JSON the processor time, and numbers that tell whether two checkouts did the same.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+Done = tuple[float, dict[str, float]]  # processor time [s], and what was done
+Work = Callable[[], Done]
+
+STRATEGIES = ("random", "greedy", "intrinsic")
+TRIES = 100  # of 6400 of a run of chapter 8
+LOCKSTEP = (100, 3100)  # ticks of two runs: their difference is without the start
+
+
+def main() -> None:
+    """Prepare a case, and do its work as often as asked."""
+    import mobee
+
+    name = sys.argv[1]
+    if name not in SEVERAL_CORES and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    work = CASES[name]()
+    work()
+    print(json.dumps({"library": str(mobee.__file__)}), flush=True)
+    for _ in sys.stdin:
+        seconds, done = work()
+        print(json.dumps({"seconds": seconds, "work": done}), flush=True)
+
+
+def _one_arm() -> Work:
+    from experiments.bench.plant_workload import arm_plant, one_arm
+
+    def work() -> Done:
+        pace = one_arm(arm_plant(), 300)
+        return pace.seconds, {"ticks": pace.ticks, "actions": pace.ended}
+
+    return work
+
+
+def _reaching() -> Work:
+    from experiments.bench.plant_workload import arm_plant, one_arm_reaching
+
+    def work() -> Done:
+        pace = one_arm_reaching(arm_plant(), 100)
+        return pace.seconds, {"ticks": pace.ticks, "reaches": pace.ended}
+
+    return work
+
+
+def _three_agents() -> Work:
+    from experiments.bench.plant_workload import three_agents
+
+    def work() -> Done:
+        pace = three_agents(300)
+        return pace.seconds, {"ticks": pace.ticks, "transitions": pace.ended}
+
+    return work
+
+
+def _chapter_8() -> Work:
+    """Of a run of each strategy 1/64: of the time of its 3000 transitions, its 6400 tries and its evaluations."""
+    from experiments.reach import SCALE
+    from experiments.reaching.looks import learn
+    from experiments.reaching.scene import MARKER, laws, learned_beliefs, reach_plant, reach_space
+    from experiments.reaching.targets import grid, targets_at
+    from mobee.learning.reaching.reach_agent import ReachAgent
+
+    problems = targets_at(grid(), laws()["published"].aim)
+    beliefs = learned_beliefs(reach_plant(0), 0, 3000)
+
+    def run(strategy: str) -> float:
+        plant = reach_plant(0)
+        agent = ReachAgent(reach_space(), plant, beliefs, marker=MARKER, strategy=strategy, scale=SCALE, seed=0)
+        learn(agent, problems, (TRIES,), 1, {"few": problems[::2]})
+        return plant.time
+
+    def work() -> Done:
+        count = len(STRATEGIES) * 3000 * TRIES // 6400
+        learning = _seconds(lambda: learned_beliefs(reach_plant(0), 0, count))
+        times: list[float] = []
+        trying = _seconds(lambda: times.extend(map(run, STRATEGIES)))
+        return learning + trying, {"plant seconds": round(sum(times), 3)}
+
+    return work
+
+
+def _lockstep() -> Work:
+    """All services, without their start."""
+    from experiments.launched import summary_of
+
+    def run(ticks: int) -> tuple[float, dict[str, Any]]:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        summary = summary_of("lockstep", ("services.robot_sim.backend=kinematic", "services.robot_sim.rate=50"), ticks=ticks)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, summary["lockstep"]
+
+    def work() -> Done:
+        short, long = (run(ticks) for ticks in LOCKSTEP)
+        return long[0] - short[0], {"ticks": long[1]["ticks"] - short[1]["ticks"]}
+
+    return work
+
+
+def _value_iteration(warm: bool) -> Work:
+    from experiments.bench.vi_workload import at_work
+    from mobee.learning.value_iteration import value_iteration
+
+    known = at_work(1000, 100)
+    tables = known.tables
+
+    def solve(start: Any) -> Any:
+        return value_iteration(tables, tables.reward, 0.9, 1e-3, start, method="modified")[0]
+
+    def cold() -> None:
+        for _ in range(2000):
+            solve(None)
+
+    def after_changes() -> None:
+        start = solve(None)
+        for _ in range(20):
+            for change in known.changes:
+                tables.put(change)
+                start = solve(start)
+
+    return lambda: (_seconds(after_changes if warm else cold), {"states": len(tables.reward)})
+
+
+def _inverse_kinematics(method: Any, count: int) -> Work:
+    import mobee
+    from experiments.bench.ik_workload import MOTORS, scene, targets
+
+    model = scene()
+    aims = targets(model, count)
+
+    def work() -> Done:
+        found: list[Any] = []
+
+        def solve() -> None:
+            for seed, aim in enumerate(aims):
+                found.append(mobee.solve_ik(model, aim.costs(), seed=seed, motors=MOTORS, method=method, evaluations=20_000))
+
+        return _seconds(solve), {"reached": sum(one.reached for one in found), "evaluations": sum(one.evaluations for one in found)}
+
+    return work
+
+
+def _roadmap(method: Any, spacing: float) -> Work:
+    from experiments.trm.building import build
+    from experiments.trm.pregrasp import example
+
+    wanted = replace(example(), margin=0.0, spacing=spacing)
+
+    def work() -> Done:
+        found: list[Any] = []
+        seconds = _seconds(lambda: found.append(build(wanted, method, neighbours=8)))
+        return seconds, {"vertices": len(found[0].q), "evaluations": found[0].settings["evaluations"]}
+
+    return work
+
+
+def _edges() -> Work:
+    from experiments.bench.edges_workload import MARKER, palm_map
+    from mobee.roadmap.edges import checked
+
+    roadmap = palm_map(0.015)
+
+    def work() -> Done:
+        found: list[Any] = []
+        seconds = _seconds(lambda: found.append(checked(roadmap.model, roadmap.q, roadmap.edges, marker=MARKER)))
+        return seconds, {"edges": len(roadmap.edges), "poses": found[0].poses, "free": int(np.sum(found[0].free))}
+
+    return work
+
+
+def _seconds(run: Callable[[], object]) -> float:
+    start = time.process_time()
+    run()
+    return time.process_time() - start
+
+
+CASES: dict[str, Callable[[], Work]] = {
+    "one arm": _one_arm,
+    "reaching": _reaching,
+    "three agents": _three_agents,
+    "chapter 8": _chapter_8,
+    "lockstep": _lockstep,
+    "vi cold": lambda: _value_iteration(warm=False),
+    "vi warm": lambda: _value_iteration(warm=True),
+    "ik least squares": lambda: _inverse_kinematics("hybrid", 100),
+    "ik evolution": lambda: _inverse_kinematics("nes", 10),
+    "trm least squares": lambda: _roadmap("least_squares", 0.02),
+    "trm evolution": lambda: _roadmap("nes", 0.08),
+    "edges": _edges,
+}
+SEVERAL_CORES = ("lockstep", "trm least squares", "trm evolution")
+
+if __name__ == "__main__":
+    main()

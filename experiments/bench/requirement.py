@@ -1,0 +1,44 @@
+"""What a benchmark requires: a figure, its bound and the verdict.
+
+Figures that are judged are ratios, sizes or counts, or times on the standard machine (calibration.py): never bare times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+
+def judged(
+    name: str, found: float, *, at_least: float | None = None, at_most: float | None = None, aim: float | None = None
+) -> dict[str, Any]:
+    """One requirement as JSON has it; `aim`: what is hoped for, which decides nothing."""
+    passed = (at_least is None or found >= at_least) and (at_most is None or found <= at_most)
+    bounds = {"at_least": at_least, "at_most": at_most, "aim": aim}
+    return {
+        "name": name,
+        "found": float(found),
+        **{key: bound for key, bound in bounds.items() if bound is not None},
+        "passed": bool(passed),
+    }
+
+
+def all_passed(requirements: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether everything required is met."""
+    return all(one["passed"] for one in requirements)
+
+
+def lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
+    """A line each of at most 80 columns, that ends with its verdict."""
+    return [
+        f"  {one['name']:<44}{one['found']:>9.4g} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}"
+        for one in requirements
+    ]
+
+
+def _bound(one: Mapping[str, Any]) -> str:
+    return f">= {one['at_least']:.4g}" if "at_least" in one else f"<= {one['at_most']:.4g}"
+
+
+def _aim(one: Mapping[str, Any]) -> str:
+    return f"aim {one['aim']:g}" if "aim" in one else ""

@@ -1,0 +1,243 @@
+"""Robots, scenes and evaluations: the functions of core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
+
+Handles are objects of the core; each frees its own, and keeps alive what its own refers to.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core import ADDRESS, BYTES, INTEGER, REAL, address, function
+from mobee._core.narrow import VOLUME
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
+FEW = 128  # contacts that an evaluation of one pose writes where Python reads them; more are asked for
+
+
+class Handle:
+    """An object of the core."""
+
+    __slots__ = ("__weakref__", "_free", "_kept", "at")
+
+    def __init__(self, at: int, free: Callable[[int], None], kept: object = None) -> None:
+        self.at = at
+        self._free = free
+        self._kept = kept
+
+    def __del__(self) -> None:
+        self._free(self.at)
+
+
+class _RobotTables(ctypes.Structure):
+    """`RobotTables` of core/robot.cpp."""
+
+    _fields_ = (
+        *((name, INTEGER) for name in ("motors", "joints", "drives", "shapes", "own_shapes", "clusters", "corners", "edges")),
+        *((name, ADDRESS) for name in ("parent", "slides", "border", "axis", "point", "motor", "scale", "offset")),
+        *((name, ADDRESS) for name in ("volume", "link", "name", "field", "meets_world", "cluster", "tested")),
+        *((name, ADDRESS) for name in ("corner", "edge_start", "edge")),
+    )
+
+
+class _WorldTables(ctypes.Structure):
+    """`WorldTables` of core/scene.cpp."""
+
+    _fields_ = (
+        *((name, INTEGER) for name in ("objects", "carried", "side")),
+        *((name, ADDRESS) for name in ("volume", "role", "which")),
+    )
+
+
+class _Request(ctypes.Structure):
+    """`Request` of core/evaluate.cpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("scene", "q", "torque", "numbers", "reals")),
+        *((name, INTEGER) for name in ("poses", "few", "cut", "threads")),
+        ("hands", INTEGER * 4),
+    )
+
+
+_robot_new = function("robot_new", ADDRESS, result=ADDRESS)
+_robot_free = function("robot_free", ADDRESS)
+_scene_new = function("scene_new", ADDRESS, ADDRESS, result=ADDRESS)
+_scene_free = function("scene_free", ADDRESS)
+_room_new = function("room_new", result=ADDRESS)
+_room_free = function("room_free", ADDRESS)
+_room_rows = function("room_rows", ADDRESS, ADDRESS, ADDRESS)
+_evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
+_link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
+_jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
+_neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
+_neighbours_free = function("neighbours_free", ADDRESS)
+_neighbours_enter = function("neighbours_enter", ADDRESS, ADDRESS, ADDRESS)
+_neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS, ADDRESS)
+_neighbours_state = function("neighbours_state", ADDRESS, ADDRESS)
+_follow = function("follow", ADDRESS, BYTES, INTEGER, ADDRESS, result=INTEGER)
+_sines_cosines = function("sines_cosines", ADDRESS, INTEGER, ADDRESS, ADDRESS)
+_place = function("place", ADDRESS, ADDRESS, ADDRESS)
+_scene_counts = function("scene_counts", ADDRESS, ADDRESS)
+_scene_objects = function("scene_objects", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+_span = function("span", REAL, REAL, REAL, INTEGER, ADDRESS)
+_swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+
+
+def robot(counts: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> Handle:
+    """A robot from its tables, which are copied; see mobee/engine/robot_tables.py."""
+    tables = _RobotTables(**counts, **{name: address(array) for name, array in arrays.items()})
+    return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
+
+
+def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
+    """A robot among the free ones of a world's objects; `carried`: those that it carries, `side`: see mobee/engine/engine.py."""
+    tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
+    return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
+
+
+def link_poses(of: Handle, q: Array, links: int) -> Array:
+    """Every link in the poses q (B, n), (B, L, 4, 4)."""
+    out = np.empty((len(q), links, 4, 4))
+    _link_poses(of.at, q.tobytes(), len(q), address(out))
+    return out
+
+
+def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
+    """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
+    out = np.empty((len(q), 6, q.shape[1]))
+    _jacobians(of.at, q.tobytes(), len(q), link, point.tobytes(), address(out))
+    return out
+
+
+class Room:
+    """What evaluations work in, one at a time; kept for the next one, for fresh memory costs more than the arithmetic of a pose."""
+
+    def __init__(self, motors: int) -> None:
+        self._handle = Handle(_room_new(), _room_free)
+        self._at = self._handle.at
+        self._q, self._torque = np.empty((1, motors)), np.empty((1, motors))
+        self._numbers, self._reals = np.empty((FEW, NUMBERS), dtype=np.int64), np.empty((FEW, REALS))
+        self._one = _Request(
+            0, address(self._q), address(self._torque), address(self._numbers), address(self._reals), 1, FEW, 0, 1, (INTEGER * 4)()
+        )
+        self._one_at = ctypes.addressof(self._one)
+        self._scene: Handle | None = None
+        self._hands: list[int] = []
+
+    def evaluate(self, scene: Handle, q: Array, hands: list[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
+        """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""
+        if len(q) == 1:
+            return self._evaluate_one(scene, q, hands, cut)
+        torque = np.empty(q.shape)
+        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), -1, cut, threads, (INTEGER * 4)(*hands))
+        count = _evaluate(self._at, ctypes.addressof(request))
+        return *self._rows(count), torque
+
+    def _evaluate_one(self, scene: Handle, q: Array, hands: list[int], cut: bool) -> tuple[Ints, Array, Array]:
+        request = self._one
+        if self._scene is not scene:
+            request.scene = scene.at
+            self._scene = scene
+        if self._hands != hands:
+            request.hands[:] = hands
+            self._hands = hands
+        request.cut = cut
+        self._q[:] = q
+        count = _evaluate(self._at, self._one_at)
+        numbers, reals = (self._numbers[:count].copy(), self._reals[:count].copy()) if count <= FEW else self._rows(count)
+        return numbers, reals, self._torque.copy()
+
+    def _rows(self, count: int) -> tuple[Ints, Array]:
+        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
+        _room_rows(self._at, address(numbers), address(reals))
+        return numbers, reals
+
+
+class Following:
+    """What one user remembers from pose to pose of a robot in a scene; not for two threads at once.
+
+    `at` is where the core has it, for what finds contacts there: only while this lives, and after `enter`.
+    """
+
+    def __init__(self, skin: float, cut: bool) -> None:
+        self._handle = Handle(_neighbours_new(skin, cut), _neighbours_free)
+        self.at = self._handle.at
+        self._scene: Handle | None = None
+
+    def enter(self, scene: Handle, hands: list[int]) -> None:
+        """Be among another world, or let others reach."""
+        self._scene = scene  # before the core lets go of the last one: nobody else uses this
+        numbers = (INTEGER * 4)(*hands)
+        _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
+
+    def follow(self, q: Array) -> tuple[Ints, Array, Array]:
+        """As `Room.evaluate`, of poses q (B, n) one after the other."""
+        torque = np.empty(q.shape)
+        count = _follow(self.at, q.tobytes(), len(q), address(torque))
+        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
+        _neighbours_rows(self.at, address(numbers), address(reals))
+        return numbers, reals, torque
+
+    def state(self) -> tuple[int, int, int]:
+        """What is remembered (nothing, a pose, a list, a pose to renew), how many pairs are listed, how many poses the list has served."""
+        found = np.empty(3, dtype=np.int64)
+        _neighbours_state(self.at, address(found))
+        remembered, listed, served = found.tolist()
+        return remembered, listed, served
+
+
+def sines_cosines(angles: Array) -> tuple[Array, Array]:
+    """The sine and 1 - cosine of angles (n,) rad."""
+    sines, cosines = np.empty(len(angles)), np.empty(len(angles))
+    _sines_cosines(address(angles), len(angles), address(sines), address(cosines))
+    return sines, cosines
+
+
+def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
+    """How far each shape may have moved between joint angles (J,), seen from what carries it and each other link, (S, L) m."""
+    out = np.empty((shapes, len(then) + 1))
+    _swung(of.at, address(then), address(now), address(out))
+    return out
+
+
+def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
+    """All shapes (S,), `VOLUME` of mobee._core.narrow, at q (n,), in the order of the robot's tables."""
+    out = np.zeros(shapes, dtype=VOLUME)
+    _place(of.at, address(q), address(out))
+    return out
+
+
+class Grid(NamedTuple):
+    """How a scene sorts its objects: the large ones first, then cell by cell."""
+
+    large: int
+    cells: tuple[int, ...]  # along x, y and z
+    starts: Ints  # (cells + 1,)
+    objects: Ints  # (objects, 2): which of the world's objects each is, and whether it is a target
+    centers: Array  # (objects, 3) m
+
+
+def grid_of(scene: Handle) -> Grid:
+    """The grid of a scene."""
+    counts = np.empty(5, dtype=np.int64)
+    _scene_counts(scene.at, address(counts))
+    objects, large, *cells = counts.tolist()
+    starts, which, centers = np.empty(math.prod(cells) + 1, dtype=np.int64), np.empty((objects, 2), dtype=np.int64), np.empty((objects, 3))
+    _scene_objects(scene.at, address(starts), address(which), address(centers))
+    return Grid(large, tuple(cells), starts, which, centers)
+
+
+def span(offset: float, along: float, per_metre: float, cells: int) -> tuple[int, int]:
+    """The first cell of a row of a grid, and the one past the last, that an object reaches."""
+    out = np.empty(2, dtype=np.int64)
+    _span(offset, along, per_metre, cells, address(out))
+    first, end = out.tolist()
+    return first, end

@@ -1,0 +1,77 @@
+"""The builds of the core: one for each level of x86-64 processors, one in all elsewhere; their files, and which one runs here.
+
+It imports nothing but Python's own modules: core/build.py loads this file where the library's dependencies are not installed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent
+SOURCES = FOLDER.parents[1] / "core"  # in a checkout, and where a wheel is built; an installed library has none
+GENERIC = "generic"
+SANITIZED = "sanitized"
+"""The build that stops at the first wrong address or undefined operation; see core/build.py."""
+
+# What each level needs beyond the one before, as the kernel names it in /proc/cpuinfo.
+NEEDS = {
+    "x86-64-v2": ("cx16", "lahf_lm", "popcnt", "pni", "ssse3", "sse4_1", "sse4_2"),
+    "x86-64-v3": ("avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"),
+    "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
+}
+
+
+def machine_levels() -> tuple[str, ...]:
+    """The builds for machines of this kind, the narrowest first."""
+    if sys.platform == "linux" and platform.machine() == "x86_64":
+        return tuple(NEEDS)
+    return (GENERIC,)
+
+
+def missing(level: str, flags: Iterable[str]) -> list[str]:
+    """What a processor with these flags lacks for a level."""
+    if level not in NEEDS:
+        return []
+    needed = [flag for name in NEEDS if name <= level for flag in NEEDS[name]]
+    return sorted(set(needed) - set(flags))
+
+
+def possible_levels(flags: Iterable[str]) -> list[str]:
+    """The builds that a processor with these flags runs, the narrowest first."""
+    flags = frozenset(flags)
+    return [level for level in machine_levels() if not missing(level, flags)]
+
+
+def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
+    """What this processor can do; where the kernel does not tell, what every x86-64 since 2010 can."""
+    try:
+        lines = cpuinfo.read_text().splitlines()
+    except OSError:
+        lines = []
+    for line in lines:
+        name, _, value = line.partition(":")
+        if name.strip() == "flags":
+            return frozenset(value.split())
+    return frozenset(NEEDS["x86-64-v2"])
+
+
+def library_file(level: str, folder: Path = FOLDER) -> Path:
+    """The file of a build."""
+    return folder / f"core-{level}.{'dylib' if sys.platform == 'darwin' else 'so'}"
+
+
+def source_files() -> list[Path]:
+    """All that a build depends on, in the order of its names."""
+    return sorted([*SOURCES.rglob("*.hpp"), *SOURCES.rglob("*.cpp"), SOURCES / "build.py"])
+
+
+def fingerprint() -> str:
+    """The hash of the sources and of how they are built; a library holds that of the sources it was built from."""
+    digest = hashlib.sha256()
+    for source in source_files():
+        digest.update(source.relative_to(SOURCES).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]

@@ -1,0 +1,42 @@
+"""How arrays are handed to the core: as their address and length, or with a column for each member of a structure."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from mobee._core import ADDRESS, INTEGER, address
+from mobee.robot.robot import Array, Ints
+
+Table = np.ndarray[tuple[int, ...], np.dtype[np.void]]
+"""An array of structures of the core: `table["low"]` is a view of one member of all of them."""
+
+WHOLE = "i8"
+
+
+class View(ctypes.Structure):
+    """An array that somebody else owns."""
+
+    _fields_ = (("data", ADDRESS), ("size", INTEGER))
+
+
+def view(array: Array | Ints | Table) -> View:
+    """A C-contiguous array, which the caller keeps alive, as the core reads it."""
+    return View(address(array), len(array))
+
+
+def columns(*names: str) -> np.dtype[np.void]:
+    """A structure of that many numbers."""
+    return np.dtype([(name, "f8") for name in names])
+
+
+INTERVAL = np.dtype([("first", WHOLE), ("end", WHOLE)])
+
+
+def numbers(values: Array, count: int) -> bytes:
+    """That many numbers as the core reads them, for a function that changes none of them; raises ValueError for another shape."""
+    given = np.asarray(values, dtype=np.float64)
+    if given.shape != (count,):
+        raise ValueError(f"an array of shape {given.shape}: must be ({count},)")
+    return given.tobytes()

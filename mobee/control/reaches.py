@@ -1,0 +1,151 @@
+"""The reaches that are under way; core/reach.cpp and core/reach_pull.cpp have the formulas."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mobee._core import address
+from mobee._core import reach as core
+from mobee._core.tables import Table, view
+from mobee.control.law import Law
+from mobee.errors import InvalidValue
+from mobee.kinematics.tables import tables
+from mobee.robot.motor_units import motor_units
+from mobee.robot.robot import Array, Ints, Robot
+
+if TYPE_CHECKING:
+    from mobee.reach import ReachTarget
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """What a reach with one marker by one part begins with; the tables: see `mobee._core.reach`.  `part`: its first motor, see `_first`."""
+
+    part: int
+    point: Array  # (3,) m, of the marker, at zero pose
+    normal: Array  # (3,)
+    joints: Table
+    drives: Table
+    motors: Table
+
+    @property
+    def used(self) -> int:
+        """How many joints there are up to the last that a pulled motor drives."""
+        return 1 + int(np.flatnonzero(self.joints["pulled"])[-1])
+
+
+class Reaching:
+    """One reach, with what it remembers."""
+
+    def __init__(self, marker: str, chain: Chain) -> None:
+        self.marker = marker
+        self.joints, self.motors = chain.joints.copy(), chain.motors.copy()
+        self._drives, self._curve = chain.drives, np.zeros((len(chain.motors), len(chain.motors)))
+        self.struct = core.Reach(
+            part=chain.part, used=chain.used, joints=view(self.joints), drives=view(self._drives), motors=view(self.motors),
+            curve=address(self._curve), point=tuple(chain.point), normal=tuple(chain.normal),
+        )  # fmt: skip
+        self.address = ctypes.addressof(self.struct)
+
+    def aim(self, target: ReachTarget) -> None:
+        """Tell it where to."""
+        self.struct.surface, self.struct.turned = target.aim == "surface", target.normal is not None
+        self.struct.target[:], self.struct.radius = target.position.tolist(), target.radius
+        self.struct.wanted[:] = [0.0] * 3 if target.normal is None else target.normal.tolist()
+
+
+class Reaches:
+    """One for each part that reaches."""
+
+    __slots__ = ("_addresses", "_chains", "_core", "_law", "_robot", "_under_way", "address")
+
+    def __init__(self, robot: Robot, law: Law) -> None:
+        self._robot, self._law = robot, law
+        self._chains: dict[tuple[str | None, str], Chain] = {}  # by part and marker
+        self._under_way: dict[str | None, Reaching] = {}  # by part, None the whole body
+        self._core = core.calls()
+        self._list()
+
+    def __len__(self) -> int:
+        return len(self._under_way)
+
+    def __getitem__(self, part: str | None) -> Reaching:
+        return self._under_way[part]
+
+    def begin(self, part: str | None, marker: str) -> None:
+        """Let a part draw a marker, None: the whole body, to nowhere yet; its reach before is forgotten.
+
+        Raises InvalidValue if none of its motors that may be moved moves the marker; UnknownName.
+        """
+        if (part, marker) not in self._chains:
+            self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))
+        self._under_way.pop(part, None)
+        self._under_way[part] = Reaching(marker, self._chains[part, marker])
+        self._list()
+
+    def end(self, part: str | None) -> None:
+        """Forget a part's reach, if there is one."""
+        if self._under_way.pop(part, None) is not None:
+            self._list()
+
+    def marker(self, part: str | None) -> str | None:
+        """The marker that a part draws."""
+        reaching = self._under_way.get(part)
+        return None if reaching is None else reaching.marker
+
+    def add_forces(self, q: Array, attractor: Array, dt: float, total: Array) -> None:
+        """Add the forces at the measured q (n,) rad to `total` (n,) in rad/s^2, which has all others."""
+        copy = q.copy()
+        self._core.add(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
+
+    def go_on(self, part: str | None) -> bool:
+        """Whether a part reaches, and goes on although it has settled; never under the published law."""
+        return bool(self._core.goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
+
+    def _list(self) -> None:
+        """Write down where the core finds them."""
+        self._addresses = np.array([reaching.address for reaching in self._under_way.values()], dtype=np.int64)
+        self.address = address(self._addresses)
+
+    def _drawn(self, part: str | None, marker: str) -> Ints:
+        """The motors of a part, or of the whole body, that may be moved and that move a marker."""
+        robot = self._robot
+        link, where = robot.marker(marker).link, slice(0, None) if part is None else robot.part(part).slice
+        moving = np.zeros(len(robot.motors), dtype=bool)
+        moving[self._law.active] = True
+        moving &= (robot.coupling[0][tables(robot).ancestry[link]] != 0.0).any(axis=0)
+        motors: Ints = where.start + np.flatnonzero(moving[where])
+        if not len(motors):
+            raise InvalidValue(
+                f"{part or 'the robot'} cannot reach with {marker} on {robot.links[link]}: none of the motors that it may move does"
+            )
+        return motors
+
+
+def _first(robot: Robot, part: str | None) -> int:
+    """The motor that stands for a part in the core; the whole body is no part, so that no part's action waits for its reach."""
+    return -1 if part is None else robot.part(part).start
+
+
+def _chain(robot: Robot, part: str | None, marker: str, motors: Ints) -> Chain:
+    """From the base to a marker that these motors draw."""
+    placed, (matrix, offset), units = robot.marker(marker), robot.coupling, motor_units(robot)
+    links = tables(robot).ancestry[placed.link]
+    number = {int(motor): k for k, motor in enumerate(motors)}
+    joints: Table = np.zeros(len(links), dtype=core.JOINT)
+    joints["angle"] = np.nan  # no pose yet
+    joints["frame"][:1] = np.eye(3)
+    drives = list[tuple[int, int, float, float]]()
+    for row, j in zip(joints, links, strict=True):
+        joint, by = robot.joints[j], np.flatnonzero(matrix[j])
+        row["slides"], row["pulled"] = joint.kind == "prismatic", np.isin(by, motors).any()
+        row["axis"], row["pivot"], row["offset"] = joint.axis, joint.point, offset[j]
+        row["drives"] = len(drives), len(drives) + len(by)
+        drives += [(int(m), number.get(int(m), -1), matrix[j, m], matrix[j, m] * units[m] * (int(m) in number)) for m in by]
+    pulled: Table = np.zeros(len(motors), dtype=core.PULLED)
+    pulled["motor"] = motors
+    return Chain(_first(robot, part), placed.position, placed.normal, joints, np.array(drives, dtype=core.DRIVE), pulled)

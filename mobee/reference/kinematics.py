@@ -1,0 +1,107 @@
+"""Where links and markers are at a pose, how they move with each motor (thesis 2.3.1, eq. 5.1), and what they weigh.
+
+The robot is given in zero-position form: axes and points of all joints in the root frame, every joint at zero (Gupta 1986).
+`mobee.kinematics` computes the same for many poses at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.robot.robot import Array, Joint, Robot
+
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, root frame
+
+
+def joint_positions(robot: Robot, q: Array) -> Array:
+    """What the motors q (n,) make of the joints, (J,) in rad or m: each joint an affine function of those that drive it."""
+    matrix, offset = robot.coupling
+    positions: Array = matrix @ q + offset
+    return positions
+
+
+def cross_matrix(v: Array) -> Array:
+    """The matrix [v] (3, 3) with [v] w = v x w."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """Rodrigues' formula: R = I + sin(a) [u] + (1 - cos(a)) [u]^2."""
+    turn = cross_matrix(axis)
+    turned: Array = np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * turn @ turn
+    return turned
+
+
+def joint_motion(joint: Joint, position: float) -> Array:
+    """Where a joint alone brings what it carries, (4, 4): a turn about its line, x -> R (x - p) + p, or a shift along it."""
+    motion = np.eye(4)
+    if joint.kind == "revolute":
+        motion[:3, :3] = rotation(joint.axis, position)
+        motion[:3, 3] = joint.point - motion[:3, :3] @ joint.point
+    else:
+        motion[:3, 3] = position * joint.axis
+    return motion
+
+
+def link_frames(robot: Robot, q: Array) -> Array:
+    """Where every link has gone from its place at zero pose, (L, 4, 4): the product of the motions of the joints that carry it."""
+    frames = [np.eye(4)]  # link 0 is the base
+    for joint, position in zip(robot.joints, joint_positions(robot, q), strict=True):
+        frames.append(frames[joint.parent] @ joint_motion(joint, position))  # joint j moves link j + 1
+    return np.array(frames)
+
+
+def moved(frame: Array, point: Array) -> Array:
+    """Where a point (3,) of a link has gone."""
+    found: Array = frame[:3, :3] @ point + frame[:3, 3]
+    return found
+
+
+def marker_at(robot: Robot, frames: Array, name: str) -> tuple[Array, Array]:
+    """Place (3,) m and normal (3,) of a marker in the root frame."""
+    marker = robot.marker(name)
+    frame = frames[marker.link]
+    return moved(frame, marker.position), frame[:3, :3] @ marker.normal
+
+
+def joints_to(robot: Robot, link: int) -> list[int]:
+    """The joints between a link and the base, the nearest to the link first."""
+    chain = []
+    while link > 0:
+        chain.append(link - 1)
+        link = robot.joints[link - 1].parent
+    return chain
+
+
+def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
+    """How a point (3,) of a link that joint j carries moves with the joint: velocity, then angular velocity, (6,)."""
+    joint, frame = robot.joints[j], frames[j + 1]  # a joint leaves its own axis where it is, so its link carries the axis, too
+    axis = frame[:3, :3] @ joint.axis
+    if joint.kind == "prismatic":
+        return np.concatenate([axis, np.zeros(3)])
+    return np.concatenate([np.cross(axis, point - moved(frame, joint.point)), axis])
+
+
+def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
+    """Eq. 5.1: how a point (3,) of a link, root frame now, moves with each motor, (6, n); velocity, then angular velocity."""
+    per_joint = np.zeros((6, len(robot.joints)))
+    for j in joints_to(robot, link):
+        per_joint[:, j] = joint_column(robot, frames, j, point)
+    matrix, _ = robot.coupling
+    per_motor: Array = per_joint @ matrix
+    return per_motor
+
+
+def marker_jacobian(robot: Robot, q: Array, name: str) -> Array:
+    """The same of a marker, at q (n,) rad."""
+    frames = link_frames(robot, q)
+    return jacobian(robot, frames, robot.marker(name).link, marker_at(robot, frames, name)[0])
+
+
+def weight_torque(robot: Robot, q: Array) -> Array:
+    """What the motors need to carry the robot's weight, (n,) N m: -sum of J^T m g over the masses; zeros where the file names none."""
+    frames, torque = link_frames(robot, q), np.zeros(len(q))
+    for body in robot.bodies:
+        centre = moved(frames[body.link], body.centre)
+        torque -= jacobian(robot, frames, body.link, centre)[:3].T @ (body.mass * GRAVITY)
+    return torque

@@ -1,0 +1,156 @@
+"""What stands between a command and a joint: delay, lag, friction, play, hard stops; and the noise of the encoders (docs/plant.md).
+
+A motor has two sides, with play between them: the motor's own, and that of the joint, which the encoders read.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.control.modality import FRICTION as VISCOUS
+from mobee.control.modality import INERTIA
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Array, Robot
+from mobee.simulation.parameters import MotorParameters
+
+SERVO = 8.0  # 1/s: velocity for a distance, in position mode and in a hold that has come to rest
+NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given
+WORD = 2**64 - 1
+
+
+@dataclass(slots=True, eq=False)
+class MotorState:
+    """All motors of a robot; arrays (n,).  `line` holds what is on its way, a row for each substep, the newest last."""
+
+    q: Array  # rad, joint side
+    velocity: Array  # rad/s, joint side
+    motor_q: Array  # rad, motor side
+    motor_velocity: Array  # rad/s, motor side
+    mode: NDArray[np.str_]  # "position", "velocity", "torque" or "hold"
+    reference: Array  # rad, rad/s or N m, by mode
+    resting: NDArray[np.bool_]  # of a hold: whether it has come to rest,
+    rest: Array  # and where, rad
+    load: Array  # N m, the robot's weight: what pulls against a motor in torque mode
+    line: list[Array]  # rad/s, of a motor in torque mode N m
+
+
+def at_rest(robot: Robot, parameters: MotorParameters, q: Array, dt: float) -> MotorState:
+    """Every motor in hold at q (n,) rad; all substeps will last dt [s]."""
+    n, zero = len(q), np.zeros(len(q))
+    line = [zero] * (int(substeps_late(robot, parameters, dt).max(initial=0)) + 1)
+    return MotorState(q, zero, q, zero, np.full(n, "hold", dtype="<U8"), zero, np.ones(n, dtype=bool), q, zero, line)
+
+
+def substeps_late(robot: Robot, parameters: MotorParameters, dt: float) -> NDArray[np.int_]:
+    """The delay of each motor, rounded to substeps of dt [s]."""
+    return np.round(parameters.of_robot("delay", robot) / dt).astype(int)
+
+
+def command(s: MotorState, where: slice, mode: str, reference: Array | None = None) -> None:
+    """What is in force for some motors from now on; a hold has no reference.
+
+    Where the mode changes, what is on its way has another unit, and becomes what the motor does now: its velocity, or the torque that
+    carries its weight.  In torque mode the gear is taken to be rigid, so the motor side begins where the joint is.
+    """
+    if reference is not None:
+        s.reference = s.reference.copy()
+        s.reference[where] = reference
+    entering = np.zeros(len(s.q), dtype=bool)
+    entering[where] = s.mode[where] != mode
+    s.mode = np.where(entering, mode, s.mode).astype("<U8")
+    s.resting = s.resting & ~entering
+    now = s.load if mode == "torque" else s.motor_velocity
+    s.line = [np.where(entering, now, row) for row in s.line]
+    if mode == "torque":
+        s.motor_q = np.where(entering, s.q, s.motor_q)
+
+
+def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> Array:
+    """Advance the motor side by a substep of dt [s]; where it drags the joint side to, (n,) rad."""
+    fastest = np.array([motor.max_velocity for motor in robot.motor_table])
+    hardest = np.array([motor.max_acceleration for motor in robot.motor_table])
+    strongest = np.array([motor.max_torque for motor in robot.motor_table])
+    lag, backlash, friction = (parameters.of_robot(name, robot) for name in ("lag", "backlash", "friction"))
+    torque, position = s.mode == "torque", s.mode == "position"
+    told = np.where(torque, np.clip(s.reference, -strongest, strongest), np.clip(s.reference, -fastest, fastest))
+    told = np.where(position, servo(s, s.reference, fastest), told)
+    s.line = [*s.line[1:], told]
+    asked = np.array([s.line[-1 - late][i] for i, late in enumerate(substeps_late(robot, parameters, dt))])
+    velocity = np.where(torque, turned(s, asked, friction, fastest, hardest, dt), responded(s, asked, lag, friction, dt))
+    velocity = np.where(s.mode == "hold", held(s, fastest, hardest * dt), velocity)
+    s.motor_velocity = velocity
+    s.motor_q = s.motor_q + velocity * dt
+    play = np.where(torque, 0.0, backlash / 2.0)
+    return np.clip(s.q, s.motor_q - play, s.motor_q + play)
+
+
+def servo(s: MotorState, position: Array, fastest: Array) -> Array:
+    """The velocity (n,) rad/s towards a position (n,) rad."""
+    return np.clip(SERVO * (position - s.motor_q), -fastest, fastest)
+
+
+def responded(s: MotorState, asked: Array, lag: Array, friction: Array, dt: float) -> Array:
+    """The velocity after a substep in which one was asked for: lag dv/dt = u - v - friction sign(v), solved exactly."""
+    share = np.where(lag > 0.0, 1.0 - np.exp(-dt / np.where(lag > 0.0, lag, 1.0)), 1.0)
+    return nearer_to_zero(s.motor_velocity + share * (asked - s.motor_velocity), share * friction)
+
+
+def turned(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
+    """The velocity after a substep under a torque: I dv/dt = tau - load - B v - B friction sign(v), within the motor's limits."""
+    push = np.clip((asked - s.load - VISCOUS * s.motor_velocity) / INERTIA, -hardest, hardest)
+    slowed = nearer_to_zero(s.motor_velocity + push * dt, VISCOUS * friction / INERTIA * dt)
+    return np.clip(slowed, -fastest, fastest)
+
+
+def held(s: MotorState, fastest: Array, change: Array) -> Array:
+    """The velocity of a motor that brakes to rest and then stays where that was."""
+    arrived = (s.mode == "hold") & ~s.resting & (np.abs(s.motor_velocity) <= change)
+    s.rest = np.where(arrived, s.motor_q, s.rest)
+    s.resting = s.resting | arrived
+    braked = s.motor_velocity - np.clip(s.motor_velocity, -change, change)
+    return np.where(s.resting, servo(s, s.rest, fastest), braked)
+
+
+def nearer_to_zero(x: Array, by: Array) -> Array:
+    """Coulomb's friction: less by that much, at most to 0."""
+    return np.copysign(np.maximum(np.abs(x) - by, 0.0), x)
+
+
+def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
+    """Take the joint side (n,) rad at the end of a substep; the motor side follows into the play, so nothing winds up at a stop."""
+    torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
+    s.velocity, s.q = (q - s.q) / dt, q
+    s.motor_q = np.where(torque, q, np.clip(s.motor_q, q - half, q + half))
+    s.motor_velocity = np.where(torque, s.velocity, s.motor_velocity)
+
+
+def substep(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> None:
+    """One substep of dt [s] of a robot without physics: the joints go where their motors drag them, as far as the hard stops."""
+    adopt(robot, parameters, s, np.clip(drive(robot, parameters, s, dt), *robot.limits.T), dt)
+
+
+def encoders(robot: Robot, parameters: MotorParameters, s: MotorState, seed: int, k: int, dt: float) -> Array:
+    """The joints (n,) rad as read at tick k: white noise of a strength that does not depend on the tick's length dt [s]."""
+    strength = parameters.encoder_noise * math.sqrt(NOISE_PERIOD / dt) * fine_units(robot)
+    read: Array = s.q + strength * np.array([normal(seed, k, motor) for motor in range(len(s.q))])
+    return read
+
+
+def normal(seed: int, k: int, motor: int) -> float:
+    """A standard normal, a pure function of seed, tick and motor (Box and Muller), so that whoever knows them draws the same."""
+    one = mixed(mixed(mixed(seed & WORD) ^ k) ^ mixed(motor // 2))
+    radius = math.sqrt(-2.0 * math.log(((one >> 11) + 1) * 2.0**-53))
+    angle = 2.0 * math.pi * ((mixed(one) >> 11) * 2.0**-53)
+    return radius * (math.sin(angle) if motor % 2 else math.cos(angle))
+
+
+def mixed(x: int) -> int:
+    """The next number of splitmix64 after x (Steele, Lea, Flood 2014)."""
+    x = (x + 0x9E3779B97F4A7C15) & WORD
+    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & WORD
+    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & WORD
+    return x ^ (x >> 31)

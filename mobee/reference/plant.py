@@ -1,0 +1,76 @@
+"""Robot, motors, model and law in one process, tick by tick: what `mobee.OfflinePlant` does, with the law as a list of terms.
+
+A force of your own is tried here before it is compiled (see `law`): hundreds of times slower, the same numbers but for rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from mobee.control.gains import Gains
+from mobee.reference import law, motors
+from mobee.reference.forces import State
+from mobee.robot.robot import Array
+from mobee.simulation.parameters import MotorParameters
+
+if TYPE_CHECKING:
+    from mobee.model import Model
+
+ROUNDING = 1e-9  # s: times are sums of ticks
+
+
+class Plant:
+    """A plant in the velocity modality, as the original was; a command moves the motors from the tick after it on."""
+
+    def __init__(
+        self,
+        model: Model,
+        seed: int = 0,
+        gains: Gains | None = None,
+        parameters: MotorParameters | None = None,
+        dt: float = 0.01,
+        terms: Sequence[law.Term] = law.TERMS,
+    ) -> None:
+        """At rest at the robot's home; `seed` is that of the encoders' noise, `dt` s the tick, `terms` are the forces of eq. 5.7."""
+        self.model, self.robot, self.seed, self.dt, self.terms = model, model.robot, seed, dt, terms
+        self.gains = Gains.default() if gains is None else gains
+        self.parameters = MotorParameters() if parameters is None else parameters
+        self.ticks = 0
+        self.attractor = self.robot.home.copy()
+        self.force: Array | None = None  # of a client, as in `State`
+        self.pushes: dict[str, Array] = {}
+        self.motion = law.at_rest(self.robot, self.gains, self.attractor)
+        self._substeps = self.parameters.substeps(dt)
+        self.motors = motors.at_rest(self.robot, self.parameters, self.robot.home.copy(), dt / self._substeps)
+        self.q = self.robot.home.copy()  # as the encoders said last
+
+    def tick(self) -> None:
+        """Commands come into force, encoders, contacts, law; then the motors run."""
+        self.ticks += 1
+        if self.ticks > 1:
+            motors.command(self.motors, slice(None), "velocity", self.motion.velocity)
+        self.q = motors.encoders(self.robot, self.parameters, self.motors, self.seed, self.ticks, self.dt)
+        self.motion = law.step(self.robot, self.gains, self.motion, self.q, law.acceleration(self.state, self.terms), self.dt)
+        for _ in range(self._substeps):
+            motors.substep(self.robot, self.parameters, self.motors, self.dt / self._substeps)
+
+    @property
+    def state(self) -> State:
+        """What the law sees at the encoders' last q."""
+        contacts = self.model.evaluate(self.q).contacts
+        return State(self.robot, self.gains, self.q, self.motion.velocity, self.attractor, contacts, self.force, self.pushes)
+
+    def act(self, part: str, target: Array) -> bool:
+        """Go towards a target (n_part,) rad until the part has settled (thesis 6.1); False if its time is up before."""
+        self.attractor[self.robot.part(part).slice] = target
+        settle, since = self.gains.settle, 0.0
+        look = settle.first_look
+        while since < settle.timeout - ROUNDING:
+            self.tick()
+            since += self.dt
+            if since >= look - ROUNDING:
+                look += settle.interval
+                if law.is_settled(self.robot, self.gains, self.motion, part):
+                    return True
+        return False

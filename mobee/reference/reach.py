@@ -1,0 +1,262 @@
+"""The force that draws a marker to a target by the motors of one part, or of the whole body (thesis 5.1, 8.2).
+
+Published law: J^T f with f as strong as the marker is far, bounded as a client's force, against the attractor's spring.
+
+Default law: J^T control swings where commands are late, for its stiffness, J J^T and for a far target the bend of the marker's path,
+differs with the pose; and it stops in singular poses (thesis 5.1).  So the marker is drawn at one RATE in every direction, by
+(J E J^T + damping)^-1 e, where e is what is missing and E how fast the motors give way; from a singular pose the error's negative
+curvature leads out; limits, clauses and contacts are walls along which it goes on; and the spring gives way while the reach lasts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mobee.control.gains import Gains
+from mobee.reach import ReachTarget
+from mobee.reference.forces import State, limit_force, squash, squash_together
+from mobee.reference.kinematics import joint_column, joints_to, link_frames, marker_at
+from mobee.robot.motor_units import limit_zones, motor_units
+from mobee.robot.robot import Array, Ints, Robot
+
+FORCE_GAIN = math.radians(5000.0)  # rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
+
+RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
+ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
+LONGEST = 0.2  # m: beyond it the pull grows no more
+TOLERANCE = 2e-3  # m
+SOFT = 0.03  # of the size of J E J^T: damping
+WALL = 0.5  # rad/s^2: what holds the motors back half counts as a wall where it is that strong
+SMOOTH = 0.25  # s, over which the error is averaged before it is judged
+BETTER = 5e-4  # m, that count as nearer
+WAIT = 0.6  # s: what has come nearer since has not arrived
+PATIENCE = 3.0  # s without coming nearer: no way out is tried any more
+WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
+CURVED = 1e-3  # of the size of J E J^T: curvature that counts
+NUDGE = 0.1  # rad, out of a singular pose
+PROBE = 1e-4  # rad
+NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that nothing moves
+
+
+@dataclass(slots=True, eq=False)
+class Reach:
+    """A reach under way: by which motors, and what the default law remembers from tick to tick."""
+
+    robot: Robot
+    gains: Gains
+    marker: str
+    target: ReachTarget
+    motors: Ints  # (m,) those that are pulled
+    seen: Array = field(default_factory=lambda: np.zeros(6))  # m, the error without the encoders' noise
+    left: float = 0.0  # m, the size of that
+    best: float = math.inf  # m, the least so far
+    since: float = 0.0  # s, how long ago that was
+    way: Array | None = None  # (m,) rad, the last way out of a singular pose
+
+    @property
+    def nears(self) -> bool:
+        """Whether the marker is not there yet and still comes nearer: then it is not over, however slow the motors are."""
+        return self.left > 0.75 * TOLERANCE and self.since < WAIT
+
+
+def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
+    """Pull with the motors of a part, or of the whole body, that may be moved and that move the marker."""
+    moving = (robot.coupling[0][joints_to(robot, robot.marker(marker).link)] != 0.0).any(axis=0) & (gains.weight(robot.motors) > 0)
+    if part is not None:
+        moving[: robot.part(part).slice.start] = moving[robot.part(part).slice.stop :] = False
+    return Reach(robot, gains, marker, target, np.flatnonzero(moving))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """The target as seen from a pose."""
+
+    error: Array  # (3,) m to where the marker is to be
+    turn: Array  # (3,) n x n*, about which the normal is to turn
+    facing: float  # n . n*
+    columns: Array  # (k, 6) how each joint from the base to the marker moves and turns it
+    drives: Array  # (k, m) how each motor that is pulled drives each of these joints, in the motor's unit
+
+    @property
+    def jacobian(self) -> Array:
+        """How the marker moves and turns with each motor that is pulled, (6, m)."""
+        found: Array = self.columns.T @ self.drives
+        return found
+
+
+def view(r: Reach, q: Array) -> View:
+    """Evaluate the marker and its Jacobian at q (n,) rad."""
+    frames, target = link_frames(r.robot, q), r.target
+    place, normal = marker_at(r.robot, frames, r.marker)
+    error = target.position - place
+    if target.aim == "surface":
+        error = error * max(0.0, 1.0 - target.radius / max(float(np.linalg.norm(error)), NOTHING))
+    wanted = normal if target.normal is None else target.normal
+    joints = joints_to(r.robot, r.robot.marker(r.marker).link)[::-1]
+    columns = np.array([joint_column(r.robot, frames, j, place) for j in joints])
+    drives = r.robot.coupling[0][joints][:, r.motors] * motor_units(r.robot)[r.motors]
+    return View(error, np.cross(normal, wanted), float(normal @ wanted), columns, drives)
+
+
+def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
+    """What the reach adds to eq. 5.7, (n,) rad/s^2; `against` (n,) is what acts on the motors beside their springs, dt s the tick."""
+    total, seen = np.zeros(len(s.q)), view(r, s.q)
+    if r.gains.law == "published_2014":
+        total[r.motors] = bounded(r, published(r, seen))
+        return total
+    force, nudge = drawn(r, seen, s, dt, against)
+    most, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_spring", "stiffness"))
+    spring = squash((s.attractor - s.q)[r.motors], most, slope)
+    total[r.motors] = bounded(r, force) - spring + squash(nudge * motor_units(r.robot)[r.motors], most, slope)
+    return total
+
+
+def bounded(r: Reach, force: Array) -> Array:
+    """L as for a client's force, of the motors that are pulled (m,)."""
+    maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
+    unit = motor_units(r.robot)[r.motors]
+    if r.gains.client_squash == "each":
+        return squash(force * unit, maximum, slope)
+    return squash_together(force * unit, maximum, slope, unit)
+
+
+def published(r: Reach, v: View) -> Array:
+    """The 2014 program: J^T f, f = 5000 (x* - x), and where a normal is asked for the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*)."""
+    twist = 0.5 * float(np.linalg.norm(v.error)) * (1.0 - v.facing) * v.turn
+    force: Array = FORCE_GAIN * v.jacobian.T @ np.concatenate([v.error, twist])
+    return force
+
+
+def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
+    """The default law: the force of the motors that are pulled (m,) before it is bounded, and where a nudge moves their springs to."""
+    jacobian, error = rows(r, v)
+    note_missing(r, error, dt)
+    slope = jacobian.T @ error  # how fast half the square of the error falls along each motor
+    ease = eased(r, s.q, slope)
+    give = (jacobian * ease) @ jacobian.T
+    size = max(float(np.linalg.norm(give)), NOTHING)
+    weak = float(slope @ (ease * slope)) < WEAK**2 * size * float(error @ error)
+    nudge = np.zeros(len(r.motors))
+    if weak and r.left > TOLERANCE and r.since <= PATIENCE:
+        nudge = NUDGE * way_out(r, s.q, ease, size)
+    fading = r.left / (r.left + 0.5 * TOLERANCE)  # so that at the target the encoders' noise is not followed
+    pull = RATE * fading / (1.0 + float(np.linalg.norm(error)) / LONGEST) * error / size
+    force = jacobian.T @ pushed(r, v, give / size, pull, ease)
+    return along_walls(r, v, s, against, force, ease, size, pull), nudge
+
+
+def rows(r: Reach, v: View) -> tuple[Array, Array]:
+    """Jacobian (rows, m) and error (rows,), in m: three rows, six where a normal is asked for."""
+    if r.target.normal is None:
+        return v.jacobian[:3], v.error
+    return v.jacobian * np.repeat([1.0, ARM], 3)[:, None], np.concatenate([v.error, ARM * v.turn])
+
+
+def note_missing(r: Reach, error: Array, dt: float) -> None:
+    """Average the error over SMOOTH, and keep for how long it has not become less."""
+    seen = r.seen[: len(error)]
+    seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
+    r.left = float(np.linalg.norm(seen))
+    if r.left < r.best - BETTER:
+        r.best, r.since = r.left, 0.0
+    r.since += dt
+
+
+def eased(r: Reach, q: Array, slope: Array) -> Array:
+    """E: how fast each motor goes for a torque of 1, slope of the squash over damping; 0 for one that its limit keeps."""
+    zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
+    low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
+    kept = ((q < low)[r.motors] & (slope < 0.0)) | ((q > high)[r.motors] & (slope > 0.0))
+    ease = r.gains.of_robot("client_slope", r.robot) / r.gains.of_robot("damping", r.robot)
+    return np.where(kept, 0.0, ease[r.motors])
+
+
+def pushed(r: Reach, v: View, give: Array, pull: Array, ease: Array) -> Array:
+    """The force on the marker (rows,): (J E J^T / size + damping)^-1 of the pull, with so much damping that the bend makes it not swing."""
+    soft = SOFT
+    while True:
+        push: Array = np.asarray(np.linalg.solve(give + soft * np.eye(len(give)), pull), dtype=np.float64)
+        bend = bend_of_path(v, push, ease)
+        if largest_eigenvalue(bend, ease, turns=12)[0] < RATE:
+            return push
+        soft *= 2.0
+
+
+def bend_of_path(v: View, push: Array, ease: Array) -> Array:
+    """How the force on the motors changes as they move, because the marker's path bends: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
+
+    Of joints a and b, a the nearer to the base, the path's second derivative is the axis of a times (x) the motion of b.
+    """
+    count = len(v.columns)
+    along = np.zeros((count, count))
+    for a in range(count):
+        for b in range(a, count):
+            axis, (motion, turning) = v.columns[a, 3:], (v.columns[b, :3], v.columns[b, 3:])
+            along[a, b] = push[:3] @ np.cross(axis, motion)
+            if len(push) == 6 and a != b:
+                along[a, b] += 0.5 * ARM * push[3:] @ np.cross(axis, turning)
+            along[b, a] = along[a, b]
+    found: Array = -(v.drives.T @ along @ v.drives) * np.sqrt(np.outer(ease, ease))
+    return found
+
+
+def largest_eigenvalue(matrix: Array, ease: Array, turns: int) -> tuple[float, Array]:
+    """The largest eigenvalue of a symmetric matrix and its vector, by power iteration, which costs little; motors without ease rest."""
+    shift = float(np.linalg.norm(matrix))  # makes it the largest in size, too
+    vector: Array = 1.0 + 0.1 * np.arange(len(matrix), dtype=np.float64)
+    length = 0.0
+    for _ in range(turns):
+        vector = shift * vector + matrix @ vector
+        length = float(np.linalg.norm(vector))
+        vector = np.where(ease > 0.0, vector / length, 0.0) if length > 0.0 else np.zeros(len(matrix))
+    return length - shift, vector
+
+
+def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, ease: Array, size: float, pull: Array) -> Array:
+    """The force (m,) where something holds the motors back: along it as along a wall, not into it."""
+    jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
+    limit = limit_force(s)[r.motors]
+    limited = np.where(limit * force < 0.0, np.abs(limit) / unit, 0.0)  # of each motor alone
+    held = (against[r.motors] - limit) / unit  # by all else: a direction of the motors
+    into = float(held @ (ease * force)) < 0.0
+    if not (limited.any() or into):
+        return force
+    share, ease = WALL / (WALL + limited), ease * WALL / (WALL + limited)
+    give, across = (jacobian * ease) @ jacobian.T, float(held @ (ease * held))
+    wall = 0.0
+    if into and across > 0.0:
+        strength = float(np.linalg.norm(held))
+        wall = strength / (strength + WALL) / across
+        away = jacobian @ (ease * held)
+        give = give - wall * np.outer(away, away)  # in that direction the motors give no way, the less the weaker it is
+    force = jacobian.T @ pushed(r, v, give / size, pull, ease)
+    return (force - wall * float(held @ (ease * force)) * held) * share
+
+
+def way_out(r: Reach, q: Array, ease: Array, size: float) -> Array:
+    """From a pose that the pull does not move: the way (m,) along which the error falls on both sides; zeros where there is none."""
+    curve = np.empty((len(r.motors), len(r.motors)))
+    for k, motor in enumerate(r.motors):
+        probe = np.zeros(len(q))
+        probe[motor] = PROBE * motor_units(r.robot)[motor]
+        curve[k] = (slope_at(r, q + probe) - slope_at(r, q - probe)) / (2.0 * PROBE)
+    curve = 0.5 * (curve + curve.T) * np.sqrt(np.outer(ease, ease))
+    falls, way = largest_eigenvalue(curve, ease, turns=60)
+    before = np.zeros(len(way)) if r.way is None else r.way
+    if falls < CURVED * size:
+        r.way = None
+        return np.zeros(len(way))
+    middle = (r.robot.limits.mean(axis=1) - q)[r.motors]
+    side = float(way @ before) or float(way @ middle)  # as before, at first toward the middle of the motors' ranges
+    r.way = -way if side < 0.0 else way
+    return r.way
+
+
+def slope_at(r: Reach, q: Array) -> Array:
+    """How fast half the square of the error falls along each motor that is pulled, at q (n,) rad."""
+    jacobian, error = rows(r, view(r, q))
+    slope: Array = jacobian.T @ error
+    return slope
