@@ -76,7 +76,8 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
     }
     const double size = std::sqrt(nearest);
     if (size <= touching) return;
-    const Vec3 n = over(-corner, size);
+    Vec3 n = over(-corner, size);
+    n = n - dot(n, c) * c;  // again, for where the corner is near the axis
     const double reach = swept.reach(n);
     if (reach < best.reach - tie) best = {reach, n};
 }

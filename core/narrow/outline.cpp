@@ -5,6 +5,7 @@ namespace mobee::narrow {
 namespace outline_of_disc {
 
 constexpr int most_steps = 80, most_arcs = 16;
+constexpr double level = 1e-12;    // so near to an axis of the plane, rounding shall not choose the side
 constexpr double settled = 1e-10;  // rad; the reach is then within its square of the minimum
 
 inline Point normalized(Point v) { return (1.0 / std::sqrt(dot(v, v))) * v; }
@@ -89,49 +90,41 @@ void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit&
     }
 }
 
-// The directions where the corner changes, in order against the clock; the second half are opposite to the first.
-struct Kinks {
-    Point n[6], swell[6];  // and the disc's point that is farthest along each
-    int count = 0;
-
-    explicit Kinks(const Disc& disc) {
-        const double size = std::sqrt(dot(disc.axis, disc.axis));
-        const bool leans = size > flat;
-        Point across = (1.0 / (leans ? size : 1.0)) * beside(disc);
-        if (across.y < 0.0 || (across.y == 0.0 && across.x < 0.0)) across = -across;
-        n[count++] = {1.0, 0.0};
-        if (leans && across.x > 0.0) n[count++] = across;
-        n[count++] = {0.0, 1.0};
-        if (leans && !(across.x > 0.0)) n[count++] = across;
-        for (int k = 0; k < count; ++k) {
-            swell[k] = support(disc, {0.0, 0.0}, n[k]).point;
-            n[count + k] = -n[k];
-            swell[count + k] = -swell[k];
-        }
-        count *= 2;
+// Between two kinks, and opposite to that: `swell` is the disc's outline there, about a corner.
+inline void improve_part(const Disc& disc, Point shift, Point corner, Point from, Point to, Point swell_from, Point swell_to, Exit& best) {
+    const Point first = corner + swell_from, chord = swell_to - swell_from;
+    const double reach = dot(from, first), off = dot(from, shift);
+    const double area = cross(first, chord), aside = cross(shift, chord), square = dot(chord, chord);
+    // Cheaper than to tell the two sides apart where, mostly, neither can be shorter.
+    const double limit = least(best.reach, reach - std::fabs(off)) - tie, lower = area - std::fabs(aside);
+    if (reach - std::fabs(off) >= best.reach - tie && lower > 0.0 && lower * lower >= limit * limit * square) return;
+    for (const double side : {1.0, -1.0}) {
+        if (reach + side * off < best.reach - tie) best = {reach + side * off, side * from};
+        improve_between(disc, shift + side * corner, side * from, side * to, best);
     }
-};
+}
 
 }  // namespace outline_of_disc
 
-void improve_around(const Disc& disc, Point shift, Point half, Exit& best) {
+void improve_around(const Disc& seen, Point shift, Point half, Exit& best) {
+    using namespace outline_of_disc;
     // A disc seen from the side has no smooth minimum.
-    if (disc.lean <= flat * flat) return;
-    const outline_of_disc::Kinks kinks(disc);
-    for (int k = 0; k < kinks.count; ++k) {
-        const int next = k + 1 < kinks.count ? k + 1 : 0;
-        const Point from = kinks.n[k], to = kinks.n[next], middle = from + to;
-        // The opposite ones are shorter.
-        if (dot(shift, from) > tie && dot(shift, to) > tie) continue;
-        const Point corner = shift + Point{std::copysign(half.x, middle.x), std::copysign(half.y, middle.y)} +
-                             std::copysign(disc.height, dot(middle, disc.axis)) * disc.axis;
-        const Point first = corner + kinks.swell[k], chord = kinks.swell[next] - kinks.swell[k];
-        const double reach = dot(from, first);
-        if (reach < best.reach - tie) best = {reach, from};
-        const double limit = best.reach - tie, area = cross(first, chord);
-        if (area > 0.0 && area * area >= limit * limit * dot(chord, chord)) continue;
-        outline_of_disc::improve_between(disc, corner, from, to, best);
-    }
+    if (seen.lean <= flat * flat) return;
+    // Mirrored, so that the axis points into the first quadrant and the kinks are in this order.
+    const double size = std::sqrt(dot(seen.axis, seen.axis));
+    const bool leans = size > flat;
+    const double mirror = leans && seen.axis.x * seen.axis.y < -level ? -1.0 : 1.0;
+    Disc disc = seen;
+    disc.axis = {std::fabs(seen.axis.x), std::fabs(seen.axis.y)};
+    shift.x *= mirror;
+    const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x;
+    const Point out_x = support(disc, {0.0, 0.0}, x).point, out_y = support(disc, {0.0, 0.0}, y).point;
+    const Point out_square = (disc.radius + disc.ball) * square, end = disc.height * disc.axis;
+    Exit found = best;
+    improve_part(disc, shift, half + end, x, y, out_x, out_y, found);
+    improve_part(disc, shift, Point{-half.x, half.y} + end, y, square, out_y, out_square, found);
+    improve_part(disc, shift, Point{-half.x, half.y} - end, square, -x, out_square, -out_x, found);
+    if (found.reach < best.reach) best = {found.reach, {mirror * found.n.x, found.n.y}};
 }
 
 }  // namespace mobee::narrow

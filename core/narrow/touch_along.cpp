@@ -54,9 +54,16 @@ int of_hull(const Volume& v, Vec3 n, const Plane& plane, Vec3 center, Point* out
 }
 
 int of_cap(const Volume& v, double z, const Plane& plane, Vec3 center, Point* out) {
-    for (int k = 0; k < cap_corners; ++k) {
-        const double angle = 2.0 * 3.14159265358979323846 * k / cap_corners;
-        out[k] = plane.seen(center + out_of(v.rotation, {v.half.x * std::cos(angle), v.half.x * std::sin(angle), z}));
+    // The cosines of the first quarter, in steps of a 32nd turn.
+    constexpr double cosine[9] = {1.0, 0.9807852804032304, 0.9238795325112867, 0.8314696123025452, 0.7071067811865476, 0.5555702330196023, 0.38268343236508984, 0.19509032201612833, 0.0};
+    const Point middle = plane.seen(center + out_of(v.rotation, {0.0, 0.0, z}));
+    const Point x = v.half.x * plane.seen(v.rotation.column(0)), y = v.half.x * plane.seen(v.rotation.column(1));
+    for (int k = 0; k < 8; ++k) {
+        const Point along = cosine[k] * x + cosine[8 - k] * y, beside = cosine[k] * y - cosine[8 - k] * x;
+        out[k] = middle + along;
+        out[k + 8] = middle + beside;
+        out[k + 16] = middle - along;
+        out[k + 24] = middle - beside;
     }
     return cap_corners;
 }
@@ -189,12 +196,13 @@ Point crossing(const Point* one, const Point* two) {
 Point shared(Point* one, int ones, Point* two, int twos, Point* spare, int room) {
     if (ones == 1 && twos == 1) return {(one[0].x + two[0].x) / 2.0, (one[0].y + two[0].y) / 2.0};
     if (ones == 2 && twos == 2) return crossing(one, two);
-    // The one with more corners is the window that the other is seen through.
     if (twos < ones) {
         std::swap(one, two);
         std::swap(ones, twos);
     }
-    return ones == 1 ? one[0] : clipped(one, ones, two, twos, spare, room);
+    if (ones == 1) return one[0];
+    // The window that the other is seen through has few sides, but it is no segment.
+    return ones == 2 ? clipped(one, ones, two, twos, spare, room) : clipped(two, twos, one, ones, spare, room);
 }
 
 }  // namespace polygon
