@@ -224,35 +224,4 @@ MOBEE_CALL void mobee_neighbours_state(const Neighbours* near, std::int64_t* sta
     state[2] = near->served;
 }
 
-// Whether straight motions between poses touch anything: the middle of each first, and no pose more after the first that touches.
-// Fills `free` (edges,) for the poses q (., motors) of each edge (edges, 2), of which `between` (edges,) lie between the ends, which
-// themselves are not looked at; returns how many poses were looked at.
-MOBEE_CALL std::int64_t mobee_sweep(Neighbours* near, const double* q, const std::int64_t* edges, std::int64_t count, const std::int64_t* between,
-                                    bool* free) {
-    struct Stretch {
-        std::int64_t first, last;
-    };
-    const std::int64_t motors = near->scene->robot->motors;
-    Array<Stretch> stretches;  // of poses of which none was looked at, the long ones first
-    Array<double> pose(motors);
-    std::int64_t looked = 0;
-    for (std::int64_t e = 0; e < count; ++e) {
-        const double *a = q + edges[2 * e] * motors, *b = q + edges[2 * e + 1] * motors;
-        const double share = 1.0 / (static_cast<double>(between[e]) + 1.0);
-        free[e] = true;
-        stretches.clear();
-        if (between[e] > 0) stretches.push({1, between[e]});
-        for (std::size_t done = 0; free[e] && done < stretches.size(); ++done) {
-            const Stretch here = stretches[done];
-            const std::int64_t middle = (here.first + here.last) / 2;
-            for (std::int64_t k = 0; k < motors; ++k) pose[k] = a[k] + (b[k] - a[k]) * (share * static_cast<double>(middle));
-            ++looked;
-            free[e] = find(*near, pose.data()) == 0;
-            if (here.first < middle) stretches.push({here.first, middle - 1});
-            if (middle < here.last) stretches.push({middle + 1, here.last});
-        }
-    }
-    return looked;
-}
-
 }  // namespace mobee

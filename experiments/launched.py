@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from mobee.errors import MobeeError
 
 _STARTS, _ENDS = 120.0, 30.0  # s
+_LOOK = 0.5  # s between two calls of who watches
 
 
 class LaunchFailed(MobeeError):
@@ -30,10 +33,12 @@ def summary_of(
     ticks: int | None = None,
     environment: Mapping[str, str] | None = None,
     runs: Path | None = None,
+    watch: Callable[[int], None] = lambda pid: None,
 ) -> dict[str, Any]:
     """Launch a scenario without monitor, wait for its end, and return its summary.  Raises LaunchFailed.
 
     It ends after `duration` seconds, or in lockstep after so many `ticks`.  `runs`: where its folder stays; None: nowhere.
+    `watch` is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
         argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
@@ -47,7 +52,7 @@ def summary_of(
             argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0, env={**os.environ, **(environment or {})}
         )
         try:
-            said, news = process.communicate(timeout=None if ticks else _STARTS + _ENDS + (duration or 0.0))
+            said, news = _watched(process, watch, math.inf if ticks else _STARTS + _ENDS + (duration or 0.0))
         except subprocess.TimeoutExpired:
             raise LaunchFailed(f"{scenario}: no end in sight") from None
         finally:
@@ -55,6 +60,20 @@ def summary_of(
     if process.returncode != 0:
         raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(news.strip().splitlines() or ['it said nothing'])[-1]}")
     return dict(json.loads(said))
+
+
+def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], seconds: float) -> tuple[str, str]:
+    """What it said on both streams until its end; raises TimeoutExpired."""
+    late = time.monotonic() + seconds
+    while True:
+        try:
+            said, news = process.communicate(timeout=_LOOK)
+        except subprocess.TimeoutExpired:
+            if time.monotonic() > late:
+                raise
+            watch(process.pid)
+        else:
+            return said, news
 
 
 def stop(process: subprocess.Popen[Any]) -> int:

@@ -16,7 +16,7 @@ from typing import Any
 
 from mobee.errors import InvalidValue
 
-PACKAGES = ("mobee", "numpy", "numba", "python-fcl", "mujoco", "matplotlib")
+PACKAGES = ("mobee", "numpy", "python-fcl", "mujoco", "matplotlib")
 CONFIG, VERSIONS, RESULTS = "config.json", "versions.json", "results.json"
 
 

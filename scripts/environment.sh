@@ -155,10 +155,3 @@ ensure_environment() {
     install_environment
   ) 9>"$root/.venv.lock"
 }
-
-# Compiles the model's engine when its machine code is missing or its sources have changed; says how far it is.
-ensure_engine() {
-  local folder
-  folder="$("$venv/bin/python" -I "$root/mobee/engine/cache.py")" || return 1
-  [[ -e "$folder/ready" ]] || (cd "$root" && "$venv/bin/python" -m mobee.engine >/dev/null)
-}

@@ -1,7 +1,7 @@
 // Two cylinders.
 //
 // Their difference is two discs and two segments.  Its shortest way out is along an axis, across both axes, a smooth minimum among the
-// directions square to one axis, or one where both rims meet: only that last one needs a polytope.
+// directions square to one axis, or the least distance of a rim of one from a rim of the other.
 #include <limits>
 
 #include "difference.hpp"
@@ -53,28 +53,142 @@ double across_axes(const Volume& a, const Volume& b) {
 
 }  // namespace cylinders
 
-bool Bands::hold(Vec3 n, double half_tangent, double limit) const {
-    const double cosine = axis.z, sine = std::sqrt(axis.x * axis.x + axis.y * axis.y), whole = 1.0 + half_tangent * half_tangent;
-    const double sin_angle = 2.0 * half_tangent / whole, cos_angle = (2.0 - whole) / whole;
-    for (int which = 0; which < 2; ++which) {
-        const Vec3 c = which == 0 ? Vec3{0.0, 0.0, 1.0} : axis, other = which == 0 ? axis : Vec3{0.0, 0.0, 1.0};
-        const double up = dot(n, c), level = std::sqrt(most(1.0 - up * up, 0.0));
-        if (!(sin_angle < 0.5 * level)) continue;
-        // Below, `turn` is more than how far the direction square to c may turn.
-        const double turn = 1.1 * sin_angle / level;
-        const Vec3 square = (1.0 / level) * (n - up * c);
-        const double q = dot(square, other), around = std::sqrt(most(1.0 - q * q, 0.0)), least_around = most(around - turn, std::fabs(cosine));
-        if (!(least_around > 0.0)) continue;
-        // The point of the difference that is farthest along it is off the first's middle by this much along c.
-        const double rim = dot(shift, c) - radius[1 - which] * q * cosine / around, cap = height[1 - which] * cosine;
-        const double middle = std::fabs(q) > turn ? std::fabs(rim + std::copysign(cap, q * cap)) : std::fabs(rim) + std::fabs(cap);
-        const double room = height[which] - middle - radius[1 - which] * sine * turn / least_around;
-        // Along c it reaches that far beyond: h cos + room sin is not less than h up to here.
-        const double high = std::fabs(up) * cos_angle + level * sin_angle, flat_part = level * cos_angle - std::fabs(up) * sin_angle;
-        if (room > 0.0 && flat_part > 0.0 && high * limit <= room * (1.0 + flat_part)) return true;
+// Where the shortest way out is smooth, from a point of one rim to a point of another, their distance is a local minimum of that of
+// two circles: the second derivatives of the reach and of the distance have the same sign there.
+namespace rims {
+
+constexpr int most_steps = 60, most_arcs = 16;
+
+// In the axes of the first cylinder, whose own axis is z.
+struct Pair {
+    Vec3 shift, axis;  // of the second
+    double radius, height, other_radius, other_height;
+    double sine;  // of the angle between the axes
+
+    double reach(Vec3 n) const {
+        return dot(n, shift) + height * std::fabs(n.z) + radius * std::sqrt(n.x * n.x + n.y * n.y) + other_height * std::fabs(dot(n, axis)) +
+               other_radius * length(cross(n, axis));
+    }
+};
+
+// A circle about the z axis and another: its middle, and two radii of it, of which the second is level.
+struct Circles {
+    double radius, height;
+    Vec3 middle, rising, level;
+};
+
+// A point of the other circle and what is nearest on the first.
+struct Near {
+    Vec3 way;     // from there
+    Vec3 across;  // both circles
+    double side, distance;
+    double slope, bend;  // first and second derivative of half the squared distance
+
+    Near(const Circles& circles, Point at) {
+        const Vec3 out = at.x * circles.rising + at.y * circles.level, along = at.x * circles.level - at.y * circles.rising;
+        const Vec3 p = circles.middle + out;
+        side = std::sqrt(p.x * p.x + p.y * p.y);
+        const Vec3 radial = side > 0.0 ? Vec3{p.x / side, p.y / side, 0.0} : Vec3{1.0, 0.0, 0.0}, round = {-radial.y, radial.x, 0.0};
+        way = p - circles.radius * radial - Vec3{0.0, 0.0, circles.height};
+        across = cross(round, along);
+        distance = length(way);
+        slope = dot(way, along);
+        const double turning = dot(along, round);
+        bend = dot(along, along) - circles.radius / side * turning * turning - dot(way, out);
+    }
+};
+
+struct Arc {
+    Point from, to;
+};
+
+inline Point normalized(Point v) { return (1.0 / std::sqrt(dot(v, v))) * v; }
+
+// The minimum within an angle of a point, where the slope rises all along; false if there is none.
+bool descend(const Circles& circles, Point start, double angle, Near& found) {
+    // The point at x is start + x aside, made a unit.
+    const Point aside = {-start.y, start.x};
+    const double end = std::tan(least(1.01 * angle, 1.5));
+    double low = -end, high = end, x = 0.0;
+    for (int step = 0; step < 40; ++step) {
+        (found.slope > 0.0 ? high : low) = x;
+        const double turn = found.bend > 0.0 ? -found.slope / found.bend : found.slope > 0.0 ? -1.0 : 1.0;
+        if (std::fabs(turn) < 1e-12) return true;
+        if ((x == end && found.slope < 0.0) || (x == -end && found.slope > 0.0)) return false;
+        double next = x + turn * (1.0 + x * x);
+        if (!(next > low)) next = low == -end ? low : 0.5 * (low + high);
+        if (!(next < high)) next = high == end ? high : 0.5 * (low + high);
+        if (next == x) return true;
+        x = next;
+        found = Near(circles, normalized(start + x * aside));
+    }
+    return true;
+}
+
+void prefer(Way& best, const Pair& pair, const Near& near, double up) {
+    Vec3 n = near.distance > touching ? near.way : near.across;
+    n = (1.0 / length(n)) * n;
+    n.z *= up;
+    for (const double turn : {1.0, -1.0}) {
+        const double reach = pair.reach(turn * n);
+        if (reach < best.reach - tie) best = {reach, turn * n};
+    }
+}
+
+// Of the arcs of the other circle that are below the first; false if they are too many.
+bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up) {
+    const double other = pair.other_radius, rise = circles.rising.z, above = circles.height - circles.middle.z;
+    const double high = clamp(above / rise, -1.0, 1.0), low = clamp((above - best.reach) / rise, -1.0, 1.0);
+    if (!(low < high)) return true;
+    const double beside_high = std::sqrt(1.0 - high * high), beside_low = std::sqrt(1.0 - low * low);
+    Arc stack[most_arcs] = {{{high, beside_high}, {low, beside_low}}, {{low, -beside_low}, {high, -beside_high}}};
+    int waiting = 2;
+    for (int step = 0; step < most_steps; ++step) {
+        if (waiting == 0) return true;
+        const Arc arc = stack[--waiting];
+        const Point chord = arc.to - arc.from, middle = normalized({chord.y, -chord.x});
+        // No end is farther from the middle than this angle, nor its point than `far`.
+        const double half = 0.5 * std::sqrt(dot(chord, chord)), angle = half * (1.0 + 0.58 * half * half), far = other * angle;
+        Near near(circles, middle);
+        const double side = near.side - far;
+        if (near.distance - far >= best.reach - tie || side >= circles.radius) continue;
+        if (side > 0.0) {
+            // Bounds of the second and third derivative.
+            const double tight = circles.radius / side, square = other * other, distance = near.distance + far;
+            if (std::fabs(near.slope) > angle * (square * most(1.0, tight - 1.0) + other * distance)) continue;
+            const double change = angle * (3.0 * tight * square * (1.0 + other / side) + other * distance);
+            if (near.bend < -change) continue;
+            if (near.bend > change) {
+                if (descend(circles, middle, angle, near)) prefer(best, pair, near, up);
+                continue;
+            }
+        }
+        if (waiting + 2 > most_arcs) return false;
+        stack[waiting++] = {arc.from, middle};
+        stack[waiting++] = {middle, arc.to};
     }
     return false;
 }
+
+// Whether all ways from rim to rim have been tried.
+bool prefer_where_they_meet(Way& best, const Pair& pair) {
+    for (const double up : {1.0, -1.0}) {
+        // Turned so that the first's rim is the upper one.
+        const Vec3 axis = {pair.axis.x, pair.axis.y, up * pair.axis.z}, shift = {pair.shift.x, pair.shift.y, up * pair.shift.z};
+        const Vec3 rising = (1.0 / pair.sine) * (Vec3{0.0, 0.0, 1.0} - axis.z * axis), level = cross(axis, rising);
+        for (const double turn : {1.0, -1.0}) {
+            const Vec3 middle = shift + turn * pair.other_height * axis;
+            // The first's rim must come below the other's end, too, by less than the shortest way.
+            const double off = turn * dot(Vec3{0.0, 0.0, pair.height} - shift, axis), swing = pair.radius * pair.sine;
+            if (off - swing > pair.other_height || off + swing < pair.other_height - best.reach) continue;
+            const Circles circles = {pair.radius, pair.height, middle, pair.other_radius * rising, pair.other_radius * level};
+            if (!prefer_along(best, pair, circles, up)) return false;
+        }
+    }
+    return true;
+}
+
+}  // namespace rims
 
 double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     using namespace cylinders;
@@ -100,11 +214,11 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     Difference difference(a, b);
     const double gap = known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
     if (gap > 0.0) return -gap;
-    const Bands bands = {d, c, {a.half.x, b.half.x}, {a.half.y, b.half.y}};
-    const Way way = way_out(difference, best, &bands);
-    if (way.reach < best.reach) found = touch_along(a, b, out_of(a.rotation, way.direction), way.reach);
+    const double known = best.reach;
+    if (leans && !rims::prefer_where_they_meet(best, {d, c, a.half.x, a.half.y, b.half.x, b.half.y, sine})) best = way_out(difference, best);
+    if (best.reach < known) found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
     touch = found;
-    return way.reach;
+    return best.reach;
 }
 
 }  // namespace mobee::narrow

@@ -6,19 +6,84 @@ namespace mobee::narrow {
 
 namespace core_support {
 
-// The corner of a hull that is farthest along v.
-Vec3 of_hull(const Hull& hull, Vec3 v) {
-    std::int32_t best = 0;
-    double farthest = -std::numeric_limits<double>::infinity();
-    for (std::int32_t k = 0; k < hull.count; ++k) {
-        const double along = dot(v, hull.corners[k]);
-        if (along > farthest) best = k, farthest = along;
+constexpr std::int32_t few = 100;  // corners: looking at all of so many costs less than going from one to the next
+
+// Four at a time, without branches.
+std::int32_t farthest_of_all(const Hull& hull, Vec3 v) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    double farthest[4] = {-infinity, -infinity, -infinity, -infinity};
+    std::int32_t at[4] = {0, 0, 0, 0};
+    std::int32_t k = 0;
+    for (; k + 4 <= hull.count; k += 4) {
+        for (std::int32_t lane = 0; lane < 4; ++lane) {
+            const double along = dot(v, hull.corners[k + lane]);
+            const bool better = along > farthest[lane];
+            farthest[lane] = better ? along : farthest[lane];
+            at[lane] = better ? k + lane : at[lane];
+        }
     }
-    return hull.corners[best];
+    for (; k < hull.count; ++k) {
+        const double along = dot(v, hull.corners[k]);
+        if (along > farthest[0]) farthest[0] = along, at[0] = k;
+    }
+    for (int lane = 1; lane < 4; ++lane)
+        if (farthest[lane] > farthest[0]) farthest[0] = farthest[lane], at[0] = at[lane];
+    return at[0];
+}
+
+Reach of_corners(const Hull& hull, Vec3 n) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    double low[4] = {infinity, infinity, infinity, infinity}, high[4] = {-infinity, -infinity, -infinity, -infinity};
+    std::int32_t k = 0;
+    for (; k + 4 <= hull.count; k += 4) {
+        for (std::int32_t lane = 0; lane < 4; ++lane) {
+            const double along = dot(n, hull.corners[k + lane]);
+            low[lane] = least(along, low[lane]);
+            high[lane] = most(along, high[lane]);
+        }
+    }
+    for (; k < hull.count; ++k) {
+        const double along = dot(n, hull.corners[k]);
+        low[0] = least(along, low[0]);
+        high[0] = most(along, high[0]);
+    }
+    return {least(least(low[0], low[1]), least(low[2], low[3])), most(most(high[0], high[1]), most(high[2], high[3]))};
+}
+
+// The best of the first few corners that an edge joins to others; -1 if there is none.
+std::int32_t first_corner(const Hull& hull, Vec3 v) {
+    std::int32_t best = -1, looked_at = 0;
+    for (std::int32_t k = 0; k < hull.count && looked_at < 6; ++k) {
+        if (hull.starts[k] == hull.starts[k + 1]) continue;
+        if (best < 0 || dot(v, hull.corners[k]) > dot(v, hull.corners[best])) best = k;
+        ++looked_at;
+    }
+    return best;
+}
+
+// From a corner along edges that lead farther along v, until there is none.
+std::int32_t climb(const Hull& hull, Vec3 v, std::int32_t from) {
+    double farthest = dot(v, hull.corners[from]);
+    for (std::int32_t at = from;; at = from) {
+        for (std::int32_t k = hull.starts[at]; k < hull.starts[at + 1]; ++k) {
+            const double along = dot(v, hull.corners[hull.edges[k]]);
+            if (along > farthest) from = hull.edges[k], farthest = along;
+        }
+        if (from == at) return at;
+    }
+}
+
+// The corner of a hull that is farthest along v; `last` is where the search starts, and then that corner.
+Vec3 of_hull(const Hull& hull, Vec3 v, std::int32_t& last) {
+    if (hull.edges != nullptr && hull.count > few) {
+        if (last < 0) last = first_corner(hull, v);
+        if (last >= 0) return hull.corners[last = climb(hull, v, last)];
+    }
+    return hull.corners[farthest_of_all(hull, v)];
 }
 
 // The point of a core that is farthest along v, both in its own axes.
-Vec3 of_core(const Volume& volume, Vec3 v) {
+Vec3 of_core(const Volume& volume, Vec3 v, std::int32_t& last) {
     const Vec3 half = volume.half;
     switch (volume.kind) {
         case Kind::sphere: return {};
@@ -31,7 +96,21 @@ Vec3 of_core(const Volume& volume, Vec3 v) {
         }
         case Kind::convex: break;
     }
-    return of_hull(volume.hull, v);
+    return of_hull(volume.hull, v, last);
+}
+
+// From where to where a core reaches along n, in its own axes.
+Reach of_core_along(const Volume& volume, Vec3 n) {
+    const Vec3 half = volume.half;
+    double high = 0.0;
+    switch (volume.kind) {
+        case Kind::sphere: break;
+        case Kind::capsule: high = half.y * std::fabs(n.z); break;
+        case Kind::box: high = dot(half, absolute(n)); break;
+        case Kind::cylinder: high = half.x * std::sqrt(n.x * n.x + n.y * n.y) + half.y * std::fabs(n.z); break;
+        case Kind::convex: return of_corners(volume.hull, n);
+    }
+    return {-high, high};
 }
 
 bool holds(const Volume& v, Vec3 point) {
@@ -57,7 +136,13 @@ Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), 
 }
 
 Vec3 Difference::farthest(Vec3 n) {
-    return shift + out_of(turn, core_support::of_core(second, into(turn, n))) - core_support::of_core(first, -n);
+    return shift + out_of(turn, core_support::of_core(second, into(turn, n), corner_of_second)) - core_support::of_core(first, -n, corner_of_first);
+}
+
+Reach Difference::along(Vec3 n) const {
+    const Reach of_first = core_support::of_core_along(first, n), of_second = core_support::of_core_along(second, into(turn, n));
+    const double middle = dot(n, shift);
+    return {middle + of_second.low - of_first.high, middle + of_second.high - of_first.low};
 }
 
 double Difference::apart() { return closest(*this, 0.0).distance; }

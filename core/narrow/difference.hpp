@@ -7,6 +7,10 @@
 
 namespace mobee::narrow {
 
+struct Reach {
+    double low, high;
+};
+
 struct Difference {
     const Volume& first;
     const Volume& second;
@@ -18,6 +22,9 @@ struct Difference {
 
     // The point of the difference that is farthest along n, in the first's axes.
     Vec3 farthest(Vec3 n);
+
+    // From where to where it reaches along n.
+    Reach along(Vec3 n) const;
 
     // A lower bound of how far the two cores are apart; 0 if they meet.
     double apart();
@@ -35,16 +42,6 @@ struct Nearest {
 // Once the distance is known to be larger than `limit`, a lower bound of it that is larger, too.
 Nearest closest(Difference& difference, double limit);
 
-// Of two cylinders, in the axes of the first: the directions around those that are square to the axis of either.
-struct Bands {
-    Vec3 shift;  // from the first's centre to that of the second
-    Vec3 axis;   // of the second
-    double radius[2], height[2];  // half
-
-    // Whether no direction within an angle of n reaches less than `limit`, where none that is square to an axis does; tan(angle / 2).
-    bool hold(Vec3 n, double half_tangent, double limit) const;
-};
-
 struct Way {
     double reach;
     Vec3 direction;
@@ -52,6 +49,6 @@ struct Way {
 
 // The least reach of a difference that holds the origin, over all directions [m], and that direction, in the first's axes.
 // A way that is known already stays unless another is shorter by more than `tie`.
-Way way_out(Difference& difference, Way known, const Bands* bands = nullptr);
+Way way_out(Difference& difference, Way known);
 
 }  // namespace mobee::narrow

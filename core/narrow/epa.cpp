@@ -33,7 +33,6 @@ struct Polytope {
     Face face[most_faces];
     double nx[most_faces], ny[most_faces], nz[most_faces];  // unit normals
     double low[most_faces];                                 // how far out
-    double open[most_faces];                                // the same, or infinity where no shorter way is behind the face
     int faces = 0;
 
     Vec3 corner(int k) const { return {px[k], py[k], pz[k]}; }
@@ -48,7 +47,7 @@ struct Polytope {
         const Vec3 out = (1.0 / (thin ? 1.0 : std::sqrt(squared))) * n;
         face[faces] = added;
         nx[faces] = out.x, ny[faces] = out.y, nz[faces] = out.z;
-        low[faces] = open[faces] = thin ? infinity : dot(out, a);
+        low[faces] = thin ? infinity : dot(out, a);
         ++faces;
     }
 
@@ -56,32 +55,20 @@ struct Polytope {
         --faces;
         face[k] = face[faces];
         nx[k] = nx[faces], ny[k] = ny[faces], nz[k] = nz[faces];
-        low[k] = low[faces], open[k] = open[faces];
+        low[k] = low[faces];
     }
 
-    // The open face that is closest to the origin.
+    // The face that is closest to the origin.
     int closest_face() const {
         double lowest[4] = {infinity, infinity, infinity, infinity};
         int k = 0;
         for (; k + 4 <= faces; k += 4)
-            for (int lane = 0; lane < 4; ++lane) lowest[lane] = least(open[k + lane], lowest[lane]);
-        for (; k < faces; ++k) lowest[0] = least(open[k], lowest[0]);
+            for (int lane = 0; lane < 4; ++lane) lowest[lane] = least(low[k + lane], lowest[lane]);
+        for (; k < faces; ++k) lowest[0] = least(low[k], lowest[0]);
         const double found = least(least(lowest[0], lowest[1]), least(lowest[2], lowest[3]));
         for (k = 0; k < faces - 1; ++k)
-            if (open[k] == found) break;
+            if (low[k] == found) break;
         return k;
-    }
-
-    // How far the foot of the origin's perpendicular on a face is from the nearest side; negative outside the face.
-    double foot_within(int k) const {
-        const Vec3 n = normal(k), foot = low[k] * n;
-        const int at[4] = {face[k].a, face[k].b, face[k].c, face[k].a};
-        double within = infinity;
-        for (int side = 0; side < 3; ++side) {
-            const Vec3 from = corner(at[side]), along = corner(at[side + 1]) - from;
-            within = least(dot(cross(n, along), foot - from) / length(along), within);
-        }
-        return within;
     }
 
     // Take away the faces that see a corner, and span new ones from it to the edge of the hole.
@@ -183,19 +170,6 @@ Start tetrahedron(Difference& difference, Polytope& polytope) {
     return {width, axis[0]};
 }
 
-// Whether no way shorter than the limit, but those that are known, is behind the face: the polytope reaches less than the limit only
-// in a part of the directions around a face that the foot of the perpendicular lies on, which is small and in a band that is known.
-bool decided(const Polytope& polytope, int face, const Bands& bands, double limit) {
-    const double low = polytope.low[face];
-    if (!(low > 0.0)) return false;
-    const double within = polytope.foot_within(face);
-    if (within < 0.0) return within < -1e-6 * length(polytope.corner(polytope.face[face].a) - polytope.corner(polytope.face[face].b));
-    // At this angle from the normal, low cos + within sin is the limit.
-    const double gap = limit - low, sum = limit + low, squared = within * within - sum * gap;
-    if (!(squared > 0.0)) return false;
-    return bands.hold(polytope.normal(face), gap / (within + std::sqrt(squared)), limit);
-}
-
 }  // namespace epa
 
 // A last search around a way out of curved volumes that the expanding polytope could not end, because many are nearly as short.
@@ -243,7 +217,7 @@ Way search(Difference& difference, Way best) {
 
 }  // namespace polish
 
-Way way_out(Difference& difference, Way known, const Bands* bands) {
+Way way_out(Difference& difference, Way known) {
     epa::Polytope polytope;
     epa::Start start;
     if (!epa::spread(difference, known.direction, polytope, start)) start = epa::tetrahedron(difference, polytope);
@@ -252,20 +226,8 @@ Way way_out(Difference& difference, Way known, const Bands* bands) {
     Way best = {epa::infinity, known.direction};
     double low = -epa::infinity;
     Vec3 n = start.normal;
-    int cursor = 4;
-    for (int count = 4; count < epa::most_corners;) {
-        if (start.size > 0.0 && bands != nullptr) {
-            const double target = least(best.reach, known.reach - tie) - exact;
-            while (cursor > 0 && !(polytope.low[cursor - 1] < target)) --cursor;
-            if (cursor == 0) break;
-            const int face = cursor - 1;
-            n = polytope.normal(face);
-            low = polytope.low[face];
-            if (epa::decided(polytope, face, *bands, known.reach - tie)) {
-                --cursor;
-                continue;
-            }
-        } else if (start.size > 0.0) {
+    for (int count = 4; count < epa::most_corners; ++count) {
+        if (start.size > 0.0) {
             const int face = polytope.closest_face();
             n = polytope.normal(face);
             low = polytope.low[face];
@@ -273,14 +235,13 @@ Way way_out(Difference& difference, Way known, const Bands* bands) {
         const Vec3 p = difference.farthest(n);
         const double reach = dot(n, p);
         if (reach < best.reach) best = {reach, n};
-        if (start.size == 0.0 || best.reach <= 0.0 || (bands == nullptr && least(least(best.reach, known.reach - tie), reach) - low <= exact)) break;
+        if (start.size == 0.0 || best.reach <= 0.0 || least(least(best.reach, known.reach - tie), reach) - low <= exact) break;
         if (polytope.faces > epa::full) {
             best = polish::search(difference, best.reach < known.reach - tie ? best : known);
             break;
         }
         polytope.set(count, p);
-        polytope.expand(count++, 0.1 * exact);
-        cursor = polytope.faces;
+        polytope.expand(count, 0.1 * exact);
     }
     return best.reach < known.reach - tie ? best : known;
 }

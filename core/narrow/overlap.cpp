@@ -11,7 +11,7 @@ namespace narrow {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // The shortest way out along the axes of either volume, across two axes, or straight away from the axis of either.
-Way natural(Difference& difference) {
+Way natural(const Difference& difference) {
     const Vec3 first = {0.0, 0.0, 1.0}, second = difference.turn.column(2), shift = difference.shift;
     const Vec3 tried[9] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 0.0, 0.0},
                            difference.turn.column(2), difference.turn.column(0), difference.turn.column(1),
@@ -20,11 +20,10 @@ Way natural(Difference& difference) {
     for (const Vec3 axis : tried) {
         const double size = length(axis);
         if (size <= tie) continue;
-        for (const double turn : {1.0, -1.0}) {
-            const Vec3 n = over(turn * axis, size);
-            const double reach = dot(n, difference.farthest(n));
-            if (reach < best.reach - tie) best = {reach, n};
-        }
+        const Vec3 n = over(axis, size);
+        const Reach reach = difference.along(n);
+        if (reach.high < best.reach - tie) best = {reach.high, n};
+        if (-reach.low < best.reach - tie) best = {-reach.low, -n};
     }
     return best;
 }

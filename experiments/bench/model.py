@@ -33,7 +33,7 @@ from mobee.robot.robot import Array, Robot
 BATCH, CALL, OBJECTS, KINEMATICS = "batch", "one call", "one call, Contact objects", "one call, kinematics only"
 MUJOCO, PAIRS, TREES = "MuJoCo", "python-fcl, pair by pair", "python-fcl, trees of boxes"
 ICUB = "iCub"
-_VERSIONS = {"numba": "numba", "numpy": "numpy", "mujoco": "mujoco", "python-fcl": "fcl", "coal": "coal"}  # package and its module
+_VERSIONS = {"numpy": "numpy", "mujoco": "mujoco", "python-fcl": "fcl", "coal": "coal"}  # package and its module
 _FCL_TESTS = 60_000  # of pairs in one round; a pose has up to 130 000
 _AROUND = (0, random_robots.OBJECTS)
 

@@ -98,7 +98,9 @@ def robot_file(name: str, examples: Path, folder: Path) -> Path:
     if name in BULLET:
         spec = importlib.util.find_spec("pybullet_data")
         if spec is None or not spec.submodule_search_locations:
-            raise InvalidValue("pybullet_data is not installed: pip install --force-reinstall --no-deps pybullet")
+            raise InvalidValue(
+                "pybullet_data is not installed, or was left out by ./launch: pip install --force-reinstall --no-deps pybullet"
+            )
         return Path(spec.submodule_search_locations[0]) / BULLET[name]
     path = folder / f"{name.replace(' ', '_')}.urdf"
     path.write_text(MADE[name](), encoding="utf-8")

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import mobee
-from mobee.engine.pack import Flags
 from mobee.roadmap.building.flood import Patience, flooded
 from mobee.roadmap.building.goals import Goals
 from mobee.roadmap.building.task import Task
@@ -80,7 +80,7 @@ def valid(
     y: Array,
     motors: Sequence[str] | None = None,
     start: Array | None = None,
-) -> Flags:
+) -> NDArray[np.bool_]:
     """Which poses q (V, n) are, by the reference engine, within all tolerances, their limits and the box, and where y (V, m) says, (V,)."""
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)

@@ -83,7 +83,6 @@ _neighbours_enter = function("neighbours_enter", ADDRESS, ADDRESS, ADDRESS)
 _neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS, ADDRESS)
 _neighbours_state = function("neighbours_state", ADDRESS, ADDRESS)
 _follow = function("follow", ADDRESS, BYTES, INTEGER, ADDRESS, result=INTEGER)
-_sweep = function("sweep", ADDRESS, ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, result=INTEGER)
 _sines_cosines = function("sines_cosines", ADDRESS, INTEGER, ADDRESS, ADDRESS)
 _place = function("place", ADDRESS, ADDRESS, ADDRESS)
 _scene_counts = function("scene_counts", ADDRESS, ADDRESS)
@@ -186,15 +185,6 @@ class Following:
         numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
         _neighbours_rows(self.at, address(numbers), address(reals))
         return numbers, reals, torque
-
-    def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
-        """Whether nothing touches between the poses q (V, n) of each edge (E, 2), (E,), and how many poses were looked at.
-
-        `between` (E,): how many poses there are between the ends, which themselves are not looked at.
-        """
-        free = np.empty(len(edges), dtype=np.bool_)
-        looked: int = _sweep(self.at, address(q), address(edges), len(edges), address(between), address(free))
-        return free, looked
 
     def state(self) -> tuple[int, int, int]:
         """What is remembered (nothing, a pose, a list, a pose to renew), how many pairs are listed, how many poses the list has served."""

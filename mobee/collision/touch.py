@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -26,11 +24,9 @@ def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
     """The names of the world objects in contact with these links, in order, from the contacts of one pose."""
-    if not len(table):
-        return ()
-    outside = np.flatnonzero(table.second_link < 0)
-    found = {table.name(int(table.second[row])) for row in outside if int(table.first_link[row]) in moved}
-    return tuple(sorted(found))
+    rows = table.numbers.tolist()
+    found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}
+    return tuple(sorted(map(table.name, found)))
 
 
 @lru_cache(maxsize=8)

@@ -41,8 +41,8 @@ class Controller:
     """
 
     __slots__ = (
-        "_attractor", "_client", "_last_forces", "_pushes", "_reaches", "_state", "_track", "contact_forces", "forced", "gains", "law",
-        "max_dt", "modality", "model", "propagate", "robot", "terms", "weight",
+        "_attractor", "_client", "_last_forces", "_pushes", "_reaches", "_state", "_track", "contact_forces", "force_names", "forced",
+        "gains", "law", "max_dt", "modality", "model", "propagate", "robot", "terms", "weight",
     )  # fmt: skip
 
     def __init__(
@@ -80,6 +80,8 @@ class Controller:
         self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
         """The law with its numbers."""
         self.terms = valid_terms(terms)
+        self.force_names = (*term_names(), *(term.name for term in self.terms))
+        """The names of all forces in `last_forces`, in the order in which they are added."""
         self._reaches = Reaches(self.robot, self.law)
         self._last_forces: Forces | Array
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
@@ -133,11 +135,6 @@ class Controller:
     def pushed(self) -> bool:
         """Whether forces act on markers, which depend on the pose."""
         return bool(self._pushes)
-
-    @property
-    def force_names(self) -> tuple[str, ...]:
-        """The names of all forces in `last_forces`, in the order in which they are added."""
-        return (*term_names(), *(term.name for term in self.terms))
 
     @property
     def reaches(self) -> Reaches:

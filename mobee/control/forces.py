@@ -33,6 +33,9 @@ class Forces(Mapping[str, Array]):
 
     def __init__(self, *rows: Array, **more: Array) -> None:
         """The law's in their order or by their names, and any others by theirs."""
+        if not more and len(rows) == len(term_names()):
+            self._rows = dict(zip(term_names(), rows, strict=True))
+            return
         given = {**dict(zip(term_names(), rows, strict=False)), **more}
         if len(rows) > len(term_names()) or len(given) < len(rows) + len(more):
             raise InvalidValue(

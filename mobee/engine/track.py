@@ -12,8 +12,7 @@ from mobee.collision.contact import ContactTable
 from mobee.collision.snapshot import Snapshot
 from mobee.engine.engine import Engine, Scene
 from mobee.engine.hands import Hands, hand_numbers
-from mobee.engine.robot_tables import Flags
-from mobee.robot.robot import Array, Ints
+from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.pose import Pose
@@ -35,10 +34,6 @@ class Neighbours:
         self.enter(snapshot, reaching)
         numbers, reals, torque = self._core.follow(q)
         return self._engine.table(snapshot, numbers, reals), torque
-
-    def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[Flags, int]:
-        """As `Following.sweep`, in the world and with the hands of the last `enter`."""
-        return self._core.sweep(q, edges, between)
 
     def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
         """Be in that world; what is remembered of another is forgotten.  Returns the address of the core's `Neighbours`."""

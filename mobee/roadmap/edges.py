@@ -12,6 +12,7 @@ from mobee.errors import InvalidValue
 from mobee.model import Model
 from mobee.roadmap.ik.solids import solid_model
 from mobee.robot.robot import Array, Ints
+from mobee.threads import checked_threads
 
 STEP = 0.001  # m
 SKIN = 0.04  # m: an edge moves a hand by a centimetre, and an elbow by more
@@ -28,7 +29,7 @@ class Checked:
     poses: int
 
 
-def check_edges(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Flags:
+def check_edges(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> Flags:
     """Along which edges (E, 2) between poses q (V, n) rad nothing touches anything, (E,).
 
     Every vertex is looked at once.  Of each edge the middle comes first, and the first pose that touches is the last that is looked
@@ -40,24 +41,26 @@ def check_edges(model: Model, q: Array, edges: Ints, step: float = STEP, marker:
         edges: as of a Roadmap.
         step: how far the marker moves from one pose to the next, at most [m], along a straight line.
         marker: None: whatever shape of the robot moves farthest.
+        threads: how many share the edges; the result is the same for any number.
     """
-    return checked(model, q, edges, step, marker).free
+    return checked(model, q, edges, step, marker, threads).free
 
 
-def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Checked:
+def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> Checked:
     """What `check_edges` finds, and how many poses that took."""
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
+    checked_threads(threads)
     solid = solid_model(model)
     vertices, ends = np.unique(edges, return_inverse=True)
-    q, ends = np.ascontiguousarray(q[vertices]), ends.reshape(-1, 2)
+    q, ends = np.ascontiguousarray(q[vertices], dtype=np.float64), ends.reshape(-1, 2)
     stands = np.ones(len(q), dtype=bool)
     for some in np.array_split(np.arange(len(q)), len(q) // _AT_ONCE + 1):
         stands[some] = np.asarray(solid.evaluate(q[some]).count) == 0
     free: Flags = stands[ends[:, 0]] & stands[ends[:, 1]]
     left = np.flatnonzero(free)
     poses = between(solid, q, ends[left], step, marker)
-    free[left], looked = _sweep(solid, q, ends[left], poses)
+    free[left], looked = _sweep(solid, q, ends[left], poses, threads)
     return Checked(free, len(vertices) + looked)
 
 
@@ -88,9 +91,10 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def _sweep(model: Model, q: Array, edges: Ints, poses: Ints) -> tuple[Flags, int]:
-    from mobee.engine.track import Neighbours  # loads the core: not before somebody asks
+def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int) -> tuple[Flags, int]:
+    from mobee._core.edges import sweep  # loads the core: not before somebody asks
+    from mobee.engine.track import Neighbours
 
-    neighbours = Neighbours(engine_of(model.robot), SKIN)
-    neighbours.enter(model.world.snapshot, model.hands)
-    return neighbours.sweep(q, np.ascontiguousarray(edges, dtype=np.int64), poses)
+    users = [Neighbours(engine_of(model.robot), SKIN) for _ in range(threads)]
+    snapshot, hands = model.world.snapshot, model.hands
+    return sweep([one.enter(snapshot, hands) for one in users], q, np.ascontiguousarray(edges, dtype=np.int64), poses)

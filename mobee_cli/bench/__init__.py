@@ -11,6 +11,7 @@ from mobee_cli.errors import ENVIRONMENT, UserError
 BENCHES = {
     "lockstep": "the live processes in lockstep, in multiples of real time",
     "agree": "the live processes in lockstep against the offline plant: one law",
+    "start": "import, first pose, and the whole system: time and memory",
     "live": "the live processes in real time: how late commands are",
     "plant": "the offline plant beside MuJoCo's stepper",
     "vi": "planning: value iteration beside SciPy and quantecon",

@@ -16,7 +16,7 @@ from bus_schema.rpc import Stat
 Phase = Literal["waiting", "starting", "ready", "failed", "fault", "ended"]
 
 _ONE_THREAD = {
-    f"{pool}_NUM_THREADS": "1" for pool in ("OMP", "OPENBLAS", "MKL", "NUMBA", "RAYON", "NUMEXPR", "VECLIB_MAXIMUM")
+    f"{pool}_NUM_THREADS": "1" for pool in ("OMP", "OPENBLAS", "MKL", "RAYON", "NUMEXPR", "VECLIB_MAXIMUM")
 }  # the processes are the parallelism
 
 

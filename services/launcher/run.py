@@ -33,7 +33,6 @@ from services.launcher.checks import (
     check_services,
 )
 from services.launcher.child import Program
-from services.launcher.engine import EngineMissing, compile_engine
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
@@ -76,17 +75,16 @@ def launch(options: Options) -> int:
         check_rate(scenario, robots)
         check_extras(scenario)
         check_ports(scenario)
-        compile_engine()
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
         if scenario.is_locked:
             spare_threads()
         session = open_router(endpoint, max(part.config.patience for part in scenario.parts) if scenario.is_locked else LEASE)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (CoreUnavailable, MissingExtra, PortInUse, EngineMissing, BusUnreachable) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
-        return _refuse("interrupted before anything was started; what is compiled of the engine so far is kept", INTERRUPTED)
+        return _refuse("interrupted before anything was started", INTERRUPTED)
     with session:
         try:
             directory = make_run_directory(options.runs, scenario, endpoint)

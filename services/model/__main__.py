@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mobee.engine.load import load as load_engine
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.service import Service
@@ -16,7 +15,6 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the model until it is told to end."""
     config = load_config(Config, argv, "services.model")
     with explained("services.model"):
-        load_engine()  # before the bus hears of it: compiled anew, it takes half a minute
         robot = robot_of(config)
         with Service("model", config, robot, prompt=True) as service:
             ModelNode(service, config, robot)

@@ -24,6 +24,16 @@ trace = plant.run(80)
 told = [alone.step(q, plant.dt).velocity for q in trace.encoders]
 print(np.array_equal(told, trace.velocity), np.array_equal(alone.last_forces["viscous"], plant.controller.last_forces["viscous"]))
 print(bool(np.abs(alone.last_forces.viscous).max() > 0.01), list(alone.last_forces))
+
+from bus_schema import VERSION, decode, encode, encoding_of
+from bus_schema.messages import Forces
+
+header = {"v": VERSION, "run": "r", "src": "controller", "seq": 0, "k": 80, "t": 0, "tw": 0}
+rows = {name: force.tolist() for name, force in alone.last_forces.items()}
+said = Forces(**header, re_k=80, terms=rows, part_age={}, touched={})
+heard = decode(Forces, encode(said), encoding_of(Forces), robot=len(goal))
+back = mobee.Forces(**{name: np.array(row) for name, row in heard.terms.items()})
+print(np.array_equal(back.viscous, alone.last_forces.viscous), np.array_equal(back.total, alone.last_forces.total))
 """
 
 
@@ -50,8 +60,9 @@ def test_the_arm_moves_slower_into_contact_with_it(tmp_path: Path) -> None:
     assert float(with_it.split()[7]) > 1.4 * float(without.split()[7])
 
 
-def test_the_offline_plant_and_the_controller_agree_with_it(tmp_path: Path) -> None:
+def test_plant_and_controller_agree_with_it_and_the_bus_carries_it(tmp_path: Path) -> None:
     written(tmp_path)
-    same, acts = run(tmp_path, SAME)
+    same, acts, carried = run(tmp_path, SAME)
     assert same == "True True"
     assert acts == "True ['limits', 'constraints', 'collision', 'viscous']"
+    assert carried == "True True"

@@ -57,10 +57,13 @@ def test_shipped_scenarios_are_right(name: str) -> None:
     assert scenario.title
 
 
-def test_model_and_controller_must_use_one_set_of_gains() -> None:
+def test_model_and_controller_must_use_one_set_of_gains_and_terms() -> None:
     check_gains(read_scenario("default", ["shared.gains=default"]))
     with pytest.raises(ConfigError, match="model default, controller published_2014"):
         check_gains(read_scenario("default", ["services.model.gains=default"]))
+    check_gains(read_scenario("default", ['shared.terms=["my_forces:viscous"]']))
+    with pytest.raises(ConfigError, match="terms differ: model .*set it once, as shared.terms"):
+        check_gains(read_scenario("default", ['services.controller.terms=["my_forces:viscous"]']))
 
 
 def test_parts_come_in_the_order_of_their_start() -> None:

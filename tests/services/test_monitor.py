@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 import pytest
 
-from bus_schema import keys
+from bus_schema import VERSION, keys
 from bus_schema.messages import ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, Transition, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.kinematics import link_transforms
@@ -136,6 +136,20 @@ def test_the_page_shows_the_parts_of_any_robot(tmp_path: Path) -> None:
         "value/arm",
         "transitions/arm",
     }
+
+
+def test_the_plot_of_forces_has_all_that_are_told() -> None:
+    """Those of the law from the beginning, those from outside as soon as the controller tells them."""
+    notebook = Notebook()
+    plots = Plots(notebook.stream, ROBOT)
+    header = {"v": VERSION, "run": "r", "src": "s", "seq": 0, "k": 1, "t": 0, "tw": 0, "re_k": 1, "part_age": {}, "touched": {}}
+    plots.log_forces(Forces(**header, terms={"limits": [3.0, 4.0], "constraints": [0.0, 0.0], "collision": [1.0, 0.0]}))
+    plots.log_forces(Forces(**header, terms={"viscous": [0.0, -2.0]}))
+    logged = notebook.logged["plots/forces"]
+    styles = [style.names.as_arrow_array().to_pylist() for style in logged if isinstance(style, rr.SeriesLines)]
+    scalars = [one.scalars.as_arrow_array().to_pylist() for one in logged if isinstance(one, rr.Scalars)]
+    assert styles == [["limits", "constraints", "collision"], ["limits", "constraints", "collision", "viscous"]]
+    assert scalars == [[5.0, 0.0, 1.0], [5.0, 0.0, 1.0, 2.0]]
 
 
 def test_the_meshes_move_as_the_model_s_links_do(rng: np.random.Generator) -> None:

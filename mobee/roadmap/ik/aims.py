@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.engine.aim_kinds import ALONG, AT_MOST, COORDINATE, MOTOR
+from mobee.roadmap.ik.aim_kinds import ALONG, AT_MOST, COORDINATE, MOTOR
 from mobee.roadmap.ik.term import UPRIGHT, Aim, direction_frame
 from mobee.robot.robot import Array, Marker
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.collision.contact import ContactTable
-from mobee.engine.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
 from mobee.errors import InvalidValue
 from mobee.kinematics.masses import centre_of_mass, centre_of_mass_at_home
 from mobee.pose import Pose
+from mobee.roadmap.ik.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
 from mobee.roadmap.ik.costs_between import across, aligned, at_most, plane, relative_orientation, relative_position
 from mobee.roadmap.ik.function import Function
 from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.engine.aim_kinds import ALONG, PLACE, TURNED
 from mobee.pose import Pose
+from mobee.roadmap.ik.aim_kinds import ALONG, PLACE, TURNED
 from mobee.roadmap.ik.aims import below, level
 from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
 from mobee.roadmap.ik.vectors import angle_between, lengths, rotation, turn_between, unit_vector, vector

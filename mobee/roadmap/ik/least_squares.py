@@ -4,41 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from types import ModuleType
 
 import numpy as np
 
-from mobee.engine.pack import Flags, Packed, pack
-from mobee.roadmap.ik.needed import needed
+from mobee.errors import InvalidValue
+from mobee.roadmap.ik.aim_kinds import KINDS
+from mobee.roadmap.ik.needed import Flags, needed
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.term import Aim
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Array, Ints, Robot
+from mobee.threads import checked_threads
 
 RESTARTS, AT_ONCE = 40, 4
 STEPS = 60  # of one start at most
 NEAR = 0.15  # of the motors' ranges: standard deviation of every second restart about the start; the others are anywhere
+REALS = 26  # of an aim, see `aim_reals`
 _EXACT = 1e-6  # m or rad, for a term that is without tolerance
 
 
 class Descent:
-    """Least squares of a problem's aims, and of others besides, from any starts; the others' goals may differ from start to start."""
+    """Least squares of a problem's aims, and of others besides, from any starts; the others' goals may differ from start to start.
 
-    def __init__(self, problem: Problem, besides: Sequence[tuple[Aim, float]] = ()) -> None:
+    `threads` share the starts; the results are the same for any number.
+    """
+
+    def __init__(self, problem: Problem, besides: Sequence[tuple[Aim, float]] = (), threads: int = 1) -> None:
         robot = problem.model.robot
         pairs = [(aim, one.tolerance) for one in problem.terms if one.aims is not None for aim in one.aims(robot)]
         self._own = aim_reals(pairs)
         pairs += besides
         self.count = len(pairs)
         self._aims = [aim for aim, _ in pairs]
-        self._numbers = np.array(
-            [number for aim, _ in pairs for number in (aim.kind, aim.first_link, aim.second_link, aim.motor)], dtype=np.int64
-        )
+        self._numbers = _numbers(robot, self._aims)
         self._reals = aim_reals(pairs)[None]
+        if self._reals.shape != (1, REALS * self.count) or not np.isfinite(self._reals).all():
+            raise InvalidValue("an aim has points, frames or numbers that are not (3,), (3, 3) or (9,), and finite.")
         self._enough = np.array([np.inf if tolerance is None else tolerance for _, tolerance in pairs])
-        self._packed = _packed(robot)
-        self._problem = problem
-        self._low, self._high = (np.ascontiguousarray(side) for side in problem.limits.T)
+        self._problem, self._threads = problem, checked_threads(threads)
+        self._limits = np.ascontiguousarray(problem.limits[:, 0]), np.ascontiguousarray(problem.limits[:, 1])
 
     @cached_property
     def drawn(self) -> Flags:
@@ -61,11 +64,16 @@ class Descent:
 
         `goals`: what the aims besides the problem's own are to be at each start, (B, reals of those), see `aim_reals`; None: as given.
         """
-        ends = q.copy()
+        from mobee._core.least_squares import descend  # loads the core: not before somebody asks
+        from mobee.engine.engine import robot_handle
+
+        robot = self._problem.model.robot
+        ends = np.array(q, dtype=np.float64, order="C")
         reals = self._reals if goals is None else np.concatenate([np.repeat(self._own[None], len(goals), axis=0), goals], axis=1)
-        evaluations, residuals = _compiled().descend(
-            self._packed.integers, self._packed.floats, self._numbers, reals, self._problem.free, self._low, self._high, STEPS, ends
-        )
+        if ends.ndim != 2 or ends.shape[1] != len(robot.motors) or reals.shape[1] != self._reals.shape[1] or len(reals) not in (1, len(q)):
+            raise InvalidValue(f"starts of shape {ends.shape}, with goals {reals.shape}: give (B, {len(robot.motors)}), and a row of each.")
+        free = np.asarray(self._problem.free, dtype=np.int64)
+        evaluations, residuals = descend(robot_handle(robot), self._numbers, reals, free, self._limits, STEPS, ends, self._threads)
         self._problem.evaluations += evaluations
         return ends, residuals
 
@@ -103,7 +111,7 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags)
 
 
 def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
-    """All that compiled code wants to know of aims in real numbers, one after the other; with how much each may miss."""
+    """All that the core wants to know of aims in real numbers, REALS each, one after the other; with how much each may miss."""
     return np.concatenate([_reals(aim, tolerance) for aim, tolerance in aims]) if aims else np.empty(0)
 
 
@@ -112,12 +120,11 @@ def _reals(aim: Aim, tolerance: float | None) -> Array:
     return np.concatenate([aim.first_point, first, aim.second_point, second, [aim.length, tolerance or _EXACT]])
 
 
-@per_robot
-def _packed(robot: Robot) -> Packed:
-    return pack(robot)
-
-
-def _compiled() -> ModuleType:
-    from mobee.engine.load import load_only
-
-    return load_only("mobee.engine.descent")
+def _numbers(robot: Robot, aims: Sequence[Aim]) -> Ints:
+    """Kind, links and motor of each aim, (K, 4)."""
+    found = [(aim.kind, aim.first_link, aim.second_link, aim.motor) for aim in aims]
+    valid = len(KINDS), len(robot.links), len(robot.links), len(robot.motors)
+    for one in found:
+        if not all(0 <= number < count for number, count in zip(one, valid, strict=True)):
+            raise InvalidValue(f"an aim of kind {one[0]} has links {one[1]} and {one[2]} and motor {one[3]}; there are fewer of them.")
+    return np.array(found, dtype=np.int64).reshape(-1, 4)

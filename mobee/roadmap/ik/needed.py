@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mobee.engine.aim_kinds import MOTOR
-from mobee.engine.pack import Flags
+from mobee.roadmap.ik.aim_kinds import MOTOR
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.term import Aim
 from mobee.robot.robot import Robot
+
+Flags = NDArray[np.bool_]
 
 PROBES = 3  # random poses in which a motor is moved, to see whether a term feels it
 _FELT = 1e-9

@@ -22,7 +22,7 @@ UPRIGHT = np.eye(3)  # the frame of an aim that needs none
 class Aim:
     """What least squares takes a term for: a kind, two links (0: the root frame), a point and a frame on each, a length [m], a motor.
 
-    See `mobee.engine.aim_kinds`.
+    See `mobee.roadmap.ik.aim_kinds`.
     """
 
     kind: int

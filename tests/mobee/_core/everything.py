@@ -12,7 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 import mobee
+from mobee._core.histories import gaussian_sums
+from mobee.learning.reaching.histories import Histories
+from mobee.learning.tabular import TabularPlant, half_space
 from mobee.roadmap.edges import check_edges
+from mobee.roadmap.ik.least_squares import Descent
+from mobee.roadmap.ik.problem import Problem
 from mobee.robot.load import Robot
 
 ARM = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
@@ -92,6 +97,34 @@ def inverse_kinematics() -> str:
     return digest(found.q, list(found.residuals.values()))
 
 
+def least_squares() -> str:
+    """Where many starts lead to, in threads."""
+    robot = mobee.load_robot("icub")
+    costs = [mobee.costs.position("left_palm", (-0.3, 0.2, 0.15)), mobee.costs.palm_to_palm(), mobee.costs.gaze("left_palm")]
+    problem = Problem(mobee.Model(robot), costs, None, None)
+    starts = np.random.default_rng(7).uniform(*robot.limits.T, (30, len(robot.motors)))
+    return digest(*Descent(problem, threads=3).ends(starts))
+
+
+def exploring() -> str:
+    """An agent that follows its plans, of actions that fail now and then."""
+    space = mobee.Lattice(mobee.load_robot("icub"), joints=list(ARM))
+    agent = mobee.CuriousAgent(space, TabularPlant(space, *half_space(space), seed=8), "depleting")
+    agent.run(150)
+    return digest(agent.model.counts, *agent.plan())
+
+
+def histories() -> str:
+    """Weighted and Gaussian sums."""
+    rng = np.random.default_rng(9)
+    known = Histories(4, 0.01)
+    for _ in range(50):
+        known.add(int(rng.integers(4)), rng.normal(size=3), float(rng.normal()))
+    sums = np.zeros((2, 30))
+    gaussian_sums(rng.normal(size=(30, 5)), rng.normal(size=(40, 6)), sums)
+    return digest(known.average(np.zeros(3), 1.0), sums)
+
+
 def edges() -> str:
     """Which straight motions are free."""
     robot = mobee.load_robot("icub")
@@ -99,7 +132,18 @@ def edges() -> str:
     return digest(check_edges(mobee.Model(robot, mobee.load_world("table")), q, np.array([(i, i + 1) for i in range(10)]), 0.1))
 
 
-PARTS: tuple[Callable[[], str], ...] = (evaluation, jacobians, control, plant, planning, inverse_kinematics, edges)
+PARTS: tuple[Callable[[], str], ...] = (
+    evaluation,
+    jacobians,
+    control,
+    plant,
+    planning,
+    inverse_kinematics,
+    least_squares,
+    exploring,
+    histories,
+    edges,
+)
 
 if __name__ == "__main__":
     print(json.dumps({part.__name__: part() for part in PARTS}))

@@ -105,7 +105,8 @@ def test_the_velocity_is_the_controllers_own_and_not_a_difference_of_encoders() 
 
 def test_given_forces_are_used_and_remembered() -> None:
     controller = arm_controller()
-    forces = Forces(np.array([1.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, -2.0]))
+    given = {"limits": np.array([1.0, 0.0, 0.0]), "collision": np.array([0.0, 0.0, -2.0])}
+    forces = Forces(**{**controller.last_forces, **given})
     command = controller.step(STRETCHED, DT, forces)
     assert command.velocity == pytest.approx(DT * forces.total)
     assert controller.last_forces is forces

@@ -50,7 +50,9 @@ def test_the_law_has_the_terms_of_the_core_and_then_those_that_are_given() -> No
     assert {name: force.tolist() for name, force in controller.last_forces.items()} == {
         name: force.tolist() for name, force in alone.last_forces.items()
     }
-    assert np.array_equal(controller.last_forces.total, forces.limits + forces.constraints + forces.collision + more["pull"] + more["steady"])
+    assert np.array_equal(
+        controller.last_forces.total, forces.limits + forces.constraints + forces.collision + more["pull"] + more["steady"]
+    )
 
 
 @pytest.mark.parametrize("modality", ["velocity", "torque"])

@@ -81,3 +81,18 @@ def test_bad_steps_and_markers_are_told(model: mobee.Model, poses: np.ndarray) -
         check_edges(model, poses, EDGES, 0.0)
     with pytest.raises(UnknownName, match="right_palm"):
         check_edges(model, poses, EDGES, marker="right_plam")
+
+
+def test_any_number_of_threads_finds_the_same(model: mobee.Model, poses: np.ndarray) -> None:
+    one = checked(model, poses, EDGES, STEP)
+    for threads in (2, 3, 64):
+        many = checked(model, poses, EDGES, STEP, threads=threads)
+        np.testing.assert_array_equal(many.free, one.free)
+        assert many.poses == one.poses
+    assert check_edges(model, poses, np.empty((0, 2), dtype=np.intp), threads=2).shape == (0,)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.0, True, 10**6, None])
+def test_numbers_of_threads_that_are_none_are_told(model: mobee.Model, poses: np.ndarray, threads: object) -> None:
+    with pytest.raises(InvalidValue, match="whole number from 1"):
+        check_edges(model, poses, EDGES, STEP, threads=threads)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mobee
+from mobee.errors import InvalidValue
 from mobee.roadmap.ik import costs
 from mobee.roadmap.ik.aims import level
 from mobee.roadmap.ik.least_squares import Descent, aim_reals, least_squares
@@ -155,3 +156,56 @@ def test_what_a_plain_function_feels_is_drawn(free: mobee.Model, icub: mobee.Rob
     assert drawn[finger] and not drawn[icub.motor_index("l_pinky")] and not drawn[icub.motor_index("r_thumb_oppose")]
     found = least_squares(problem, np.random.default_rng(0))
     assert found is not None and abs(found[finger] - 1.0) <= 0.3
+
+
+def test_any_number_of_threads_leads_to_the_same_ends(free: mobee.Model, icub: mobee.Robot) -> None:
+    rng, (low, high) = np.random.default_rng(2), icub.limits.T
+    terms = list(terms_at(free, rng.uniform(low, high)).values())
+    starts, found = rng.uniform(low, high, (30, len(low))), []
+    for threads in (1, 2, 7, 100):
+        problem = Problem(free, terms, None, None)
+        ends, missing = Descent(problem, threads=threads).ends(starts)
+        found.append((ends.tobytes(), missing.tobytes(), problem.evaluations))
+    alone = [Descent(Problem(free, terms, None, None)).ends(start[None])[0] for start in starts]
+    assert len(set(found)) == 1 and np.concatenate(alone).tobytes() == found[0][0]
+    with pytest.raises(InvalidValue, match="whole number from 1"):
+        Descent(Problem(free, terms, None, None), threads=0)
+
+
+def test_no_start_is_no_trouble(free: mobee.Model) -> None:
+    problem = Problem(free, [costs.position("right_palm", [0.2, 0.0, 0.0])], None, None)
+    ends, missing = Descent(problem, threads=2).ends(problem.start[None][:0])
+    assert ends.shape == (0, len(problem.start)) and missing.shape == (0, 1)
+
+
+def test_starts_and_goals_of_other_shapes_are_refused(free: mobee.Model, icub: mobee.Robot) -> None:
+    problem = Problem(free, [costs.position("right_palm", [0.2, 0.0, 0.0])], None, None)
+    start = problem.start
+    goals = aim_reals([(level(icub.marker("right_palm"), np.array([1.0, 0.0, 0.0]), 0.1), 1e-4)])
+    for q, given in (
+        (start, None),
+        (start[None, :-1], None),
+        (np.stack([start] * 3), goals[None].repeat(2, axis=0)),
+        (start[None], goals[None]),
+    ):
+        with pytest.raises(InvalidValue, match="starts of shape"):
+            Descent(problem).ends(q, given)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"kind": 8},
+        {"kind": -1},
+        {"first_link": 10**6},
+        {"second_link": -1},
+        {"motor": 41},
+        {"first_point": np.zeros(2)},
+        {"length": np.nan},
+    ],
+)
+def test_aims_at_what_there_is_not_are_refused(free: mobee.Model, icub: mobee.Robot, wrong: dict[str, object]) -> None:
+    aim = dataclasses.replace(level(icub.marker("right_palm"), np.array([1.0, 0.0, 0.0]), 0.1), **wrong)
+    term = dataclasses.replace(costs.position("right_palm", [0.2, 0.0, 0.0]), aims=lambda robot: (aim,))
+    with pytest.raises(InvalidValue, match="an aim"):
+        Descent(Problem(free, [term], None, None))

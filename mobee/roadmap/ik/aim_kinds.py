@@ -1,4 +1,4 @@
-"""The kinds of aims of least squares, see `aims`, for those who need no compiled code."""
+"""The kinds of aims of least squares, numbered as in core/aims.hpp."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from __future__ import annotations
 # apart.  FACING: the first direction points to the second point.  COORDINATE: the first point is a length further than the second in a
 # direction of the root frame, the first three numbers of the second frame, of any length itself.  AT_MOST: no further than
 # that.  MOTOR: a motor is at a value, the length.
-PLACE, TURNED, ALONG, HOLD, FACING, COORDINATE, AT_MOST, MOTOR = range(8)
+KINDS = PLACE, TURNED, ALONG, HOLD, FACING, COORDINATE, AT_MOST, MOTOR = tuple(range(8))
