@@ -52,10 +52,11 @@ make_venv() { # interpreter
 
 # Byte code is written when a module is first imported: most never are.
 install_packages() { # lock file, its size in words
-  local log="$venv/pip.log" code=0 counter=""
-  say "1 of 3: $(grep -c '^[a-z].*==' "$1") packages into .venv, $2 ..."
+  local log="$venv/pip.log" code=0 counter="" locked
+  locked="$(grep -c '^[a-z].*==' "$1")"
+  say "1 of 3: $locked packages into .venv, $2 ..."
   : >"$log"
-  if [[ -t 2 ]]; then count_packages "$log" & counter=$!; fi
+  if [[ -t 2 ]]; then count_packages "$log" "$locked" & counter=$!; fi
   pip install --progress-bar off --no-compile --require-hashes -r "$1" >"$log" 2>&1 || code=$?
   if [[ -n "$counter" ]]; then
     kill "$counter" 2>/dev/null || true
@@ -66,15 +67,15 @@ install_packages() { # lock file, its size in words
   return "$code"
 }
 
-count_packages() { # what pip says
+count_packages() { # what pip says, how many it is told to install
   local before all
   before="$(installed_packages)"
-  while kill -0 $$; do # a Ctrl-C does not come here
+  while kill -0 $$ 2>/dev/null; do # a Ctrl-C does not come here
     all="$(sed -n 's/^Installing collected packages: //p' "$1" | wc -w)"
     if ((all > 0)); then
-      printf '\r  unpacked: %d of %d   ' $(($(installed_packages) - before)) "$all" >&2
+      printf '\r  unpacking: %d of %d   ' $(($(installed_packages) - before)) "$all" >&2
     else
-      printf '\r  downloaded: %d   ' "$(grep -c '^Collecting' "$1")" >&2
+      printf '\r  downloading: %d of %d   ' "$(grep -c '^Collecting' "$1")" "$2" >&2
     fi
     sleep 0.3
   done
