@@ -33,11 +33,12 @@ _PROGRAMS = {
     NUMPY: "import numpy",
     IMPORT: "import mobee",
     POSE: (
-        "import mobee; model = mobee.Model(mobee.load_robot('icub'), mobee.load_world('table')); "
-        "model.evaluate(model.robot.home).contacts"
+        "import mobee; model = mobee.Model(mobee.load_robot('icub'), mobee.load_world('table')); model.evaluate(model.robot.home).contacts"
     ),
 }
-_TIMED = "import time; wall, own = time.perf_counter(), time.process_time()\n{}\nprint(time.perf_counter() - wall, time.process_time() - own)"
+_TIMED = (
+    "import time; wall, own = time.perf_counter(), time.process_time()\n{}\nprint(time.perf_counter() - wall, time.process_time() - own)"
+)
 
 
 @dataclass(frozen=True, slots=True)
