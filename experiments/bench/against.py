@@ -63,7 +63,7 @@ class Checkout:
     python: str = sys.executable
 
     def start(self, case: str) -> Worker:
-        """A process that has the case prepared; raises AgainstFailed."""
+        """A process that prepares the case."""
         return Worker(self, case)
 
 
@@ -80,22 +80,29 @@ class Worker:
         )
 
     def __enter__(self) -> Worker:
-        library = Path(self._heard()["library"])
-        if not library.is_relative_to(self._checkout.folder):
-            raise AgainstFailed(f"{self._case}: the library was taken from {library}, not from {self._checkout.folder}")
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         assert self._process.stdin is not None and self._process.stdout is not None
-        self._process.stdin.close()
+        if error is not None:
+            self._process.terminate()
+        with contextlib.suppress(BrokenPipeError):  # it has ended before
+            self._process.stdin.close()
         self._process.wait()
         self._process.stdout.close()
         self._news.close()
 
+    def prepared(self) -> None:
+        """Wait until it is ready to work; raises AgainstFailed."""
+        library = Path(self._heard()["library"])
+        if not library.is_relative_to(self._checkout.folder):
+            raise AgainstFailed(f"{self._case}: the library was taken from {library}, not from {self._checkout.folder}")
+
     def work(self) -> dict[str, Any]:
         """Do the work once: what the process says of it; raises AgainstFailed."""
         assert self._process.stdin is not None
-        print("again", file=self._process.stdin, flush=True)
+        with contextlib.suppress(BrokenPipeError):  # `_heard` says why
+            print("again", file=self._process.stdin, flush=True)
         return self._heard()
 
     def _heard(self) -> dict[str, Any]:
@@ -113,7 +120,7 @@ class Worker:
 @contextlib.contextmanager
 def checkout(what: str, python: str = sys.executable) -> Iterator[Checkout]:
     """A folder, or a commit of this repository as a folder that is there meanwhile; raises AgainstFailed."""
-    if Path(what).is_dir():
+    if what and Path(what).is_dir():
         yield Checkout(Path(what).resolve(), python)
         return
     with tempfile.TemporaryDirectory() as scratch:
@@ -151,6 +158,8 @@ def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
     seconds = {"old": 0.0, "new": 0.0}
     with old.start(case) as one, new.start(case) as other:
         workers = {"old": one, "new": other}
+        for worker in workers.values():
+            worker.prepared()
         work = {}
         for turn in range(turns):
             for name in ("old", "new") if turn % 2 == 0 else ("new", "old"):

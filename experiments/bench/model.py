@@ -11,7 +11,7 @@ import importlib.util
 import inspect
 import itertools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from typing import Any
@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from experiments.bench import random_robots, workload
-from experiments.bench.agreement import MINIMAL, Scene, agreements
+from experiments.bench.agreement import MINIMAL, Agreement, Scene, agreements
 from experiments.bench.calibration import Crew
 from experiments.bench.fcl_peers import FclPairs, FclTrees
-from experiments.bench.mujoco_peer import MujocoPeer
+from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.random_robots import MAKERS, MIXED, PLAIN
 from experiments.bench.requirement import all_passed, judged
 from experiments.bench.rounds import Contestant, one_core, rates
@@ -90,8 +90,9 @@ TWO_THREADS = 0.9  # of the gain that two processes have over one
 
 def measure(settings: Settings) -> dict[str, Any]:
     """Everything that `mobee bench model --json` prints; raises MujocoMissing."""
+    load_mujoco()
     robot, with_coal = workload.robot(), importlib.util.find_spec("pinocchio") is not None
-    measured: dict[str, dict[int, Rates]] = {ICUB: {}} | {maker.name: {} for maker in MAKERS}
+    measured: dict[str, dict[int, Rates]] = {name: {} for name in (ICUB, *(maker.name for maker in MAKERS))}
     scenes = [_scene(ICUB, count, settings.compared_poses) for count in settings.compared_boxes]
     scenes += [_scene(maker.name, count, settings.compared_poses) for maker in MAKERS for count in _AROUND]
     with Progress() as progress:
@@ -103,7 +104,8 @@ def measure(settings: Settings) -> dict[str, Any]:
                 progress.show(0.5 + 0.2 * done / 6.0, f"timing {maker.name}")
                 measured[maker.name][count] = rates(beside_mujoco(_scene(maker.name, count, settings.other_poses)), settings.rounds)
         threads = _on_two_threads(_scene(ICUB, 0, settings.poses), settings.rounds)
-        compared, off = [], 0.0
+        compared: list[Agreement] = []
+        off = 0.0
         for done, scene in enumerate(scenes):
             progress.show(0.7 + 0.3 * done / len(scenes), f"comparing contacts of {scene.name}")
             found, farthest = agreements(scene, with_coal)
@@ -113,16 +115,18 @@ def measure(settings: Settings) -> dict[str, Any]:
         "workload": _about(robot, settings),
         "core": core,
         "versions": {name: metadata.version(name) for name in _VERSIONS if importlib.util.find_spec(_VERSIONS[name])},
-        "agreement": [asdict(one) for one in compared],
         "coal": with_coal,
-        **told(measured),
-        "threads": threads,
-        **verdict(measured, threads, off, [one.passed for one in compared]),
+        **summed_up(measured, threads, off, compared),
     }
 
 
-def told(measured: Mapping[str, Mapping[int, Rates]]) -> dict[str, Any]:
-    """Medians of the rates, and of the ratios to the peers; the iCub's, and under "others" those of other makers."""
+def summed_up(
+    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, compared: Sequence[Agreement]
+) -> dict[str, Any]:
+    """Medians of the rates and of the ratios to the peers, the iCub's, and under "others" those of other makers; and the verdict.
+
+    `threads`: what two threads gain, and what two processes do; `off`: see `agreements`.
+    """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:
         return {
@@ -133,12 +137,12 @@ def told(measured: Mapping[str, Mapping[int, Rates]]) -> dict[str, Any]:
             },
         }
 
-    return {**tables(measured[ICUB]), "others": {name: tables(found) for name, found in measured.items() if name != ICUB}}
+    others = {name: tables(found) for name, found in measured.items() if name != ICUB}
+    about = {"others": others, "threads": threads, "agreement": [asdict(one) for one in compared]}
+    return {**tables(measured[ICUB]), **about, **_verdict(measured, threads, off, all(one.passed for one in compared))}
 
 
-def verdict(
-    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, agree: list[bool]
-) -> dict[str, Any]:
+def _verdict(measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, agree: bool) -> dict[str, Any]:
     """Whether we are as fast beside the peers as required, and find the same contacts with right depths."""
     required = [
         judged(one.name, _ratio(measured[one.robot][one.objects], one.what, one.peer), at_least=one.least, aim=one.aim)
@@ -148,7 +152,7 @@ def verdict(
     if threads is not None:
         required.append(judged("2 threads' gain over 2 processes'", threads["gain"] / threads["processes"], at_least=TWO_THREADS))
     required.append(judged("depths off the way out, m", off, at_most=MINIMAL))
-    return {"requirements": required, "passed": all_passed(required) and all(agree)}
+    return {"requirements": required, "passed": all_passed(required) and agree}
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:

@@ -65,12 +65,12 @@ def _others(result: dict[str, Any]) -> str:
 
 
 def _agreement(result: dict[str, Any]) -> str:
-    lines = [f"{'agreement':<18}{'N':>4}{'':<12}{'contacts':>9}{'differ':>9}{'same depths':>13}{'longer':>9}"]
+    lines = [f"{'agreement':<18}{'N':>4}{'':<12}{'contacts':>8}{'differ':>10}{'same depths':>12}{'longer':>8}"]
     for one in result["agreement"]:
         differing = f"{one['other_pairs']}" + (f", {one['deepest_other']:.0e}" if one["other_pairs"] else "")
         lines.append(
-            f"  {one['scene']:<16}{one['objects']:>4}  {one['peer']:<10}{one['contacts']:>9}{differing:>9}"
-            f"{100.0 * one['same_depths']:>11.1f} %{one['beaten']:>9.0e}{'' if one['passed'] else ' DIFFERS'}"
+            f"  {one['scene']:<16}{one['objects']:>4}  {one['peer']:<10}{one['contacts']:>8}{differing:>10}"
+            f"{100.0 * one['same_depths']:>10.1f} %{one['beaten']:>8.0e}{'' if one['passed'] else ' DIFFERS'}"
         )
     if not result["coal"]:
         lines.append("  coal: not installed: pip install '.[dev]' in MoBeE's folder")

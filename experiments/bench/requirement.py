@@ -31,13 +31,17 @@ def all_passed(requirements: Iterable[Mapping[str, Any]]) -> bool:
 def lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
     """A line each of at most 80 columns, that ends with its verdict."""
     return [
-        f"  {one['name']:<44}{one['found']:>9.4g} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}"
+        f"  {one['name']:<44}{_number(one['found']):>9} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}"
         for one in requirements
     ]
 
 
+def _number(value: float) -> str:
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+
+
 def _bound(one: Mapping[str, Any]) -> str:
-    return f">= {one['at_least']:.4g}" if "at_least" in one else f"<= {one['at_most']:.4g}"
+    return f">= {_number(one['at_least'])}" if "at_least" in one else f"<= {_number(one['at_most'])}"
 
 
 def _aim(one: Mapping[str, Any]) -> str:

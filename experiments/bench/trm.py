@@ -36,7 +36,7 @@ REQUIREMENTS = tuple(
         ("s on 2 cores", "standard_wall_s", "most", seconds),
         ("coverage", "coverage", "least", 0.99),
         ("largest hole, spacings", "largest_hole", "most", 1.5),
-        ("share of poses valid by python-fcl", "valid", "least", 1.0),
+        ("valid by python-fcl", "valid", "least", 1.0),
     )
 )
 VERTICES = 4000

@@ -1,53 +1,71 @@
+"""The benches' verbs, on given numbers: nothing is measured here."""
+
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mobee_cli.__main__ import main
-
-SHORT = ("--quick", "--objects", "0", "--rounds", "1")
-
-
-@pytest.fixture(scope="module")
-def told() -> tuple[int, dict]:
-    """What one short run prints as JSON, and its exit code."""
-    pytest.importorskip("mujoco")
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        code = main(["bench", "model", *SHORT, "--json"])
-    return code, json.loads(said.getvalue())
+from mobee_cli.bench import BENCHES
 
 
-def test_json_tells_rates_ratios_requirements_and_agreement(told: tuple[int, dict]) -> None:
-    _, result = told
-    rates, ratios = result["poses_per_second"]["0"], result["times_mujoco"]["0"]
-    assert {"batch", "one call", "one call, Contact objects", "MuJoCo", "python-fcl, pair by pair", "python-fcl, trees of boxes"} <= set(
-        rates
-    )
-    assert all(rate > 0.0 for rate in rates.values())
-    assert ratios["batch"] == pytest.approx(rates["batch"] / rates["MuJoCo"])
-    assert [(one["name"], one["boxes"], one["least"]) for one in result["requirements"]][:2] == [("batch", 0, 2.2), ("one call", 0, 1.7)]
-    assert {one["peer"] for one in result["agreement"]} >= {"MuJoCo", "python-fcl"}
-    assert all(one["passed"] for one in result["agreement"])
+def model_result(ours: float = 100.0, passed: bool = True) -> dict[str, Any]:
+    """What the model's bench would say if a batch of ours were that many times as fast as MuJoCo, and one call half of it."""
+    from experiments.bench.agreement import Agreement
+    from experiments.bench.model import BATCH, CALL, ICUB, KINEMATICS, MUJOCO, OBJECTS, PAIRS, TREES, summed_up
+    from experiments.bench.random_robots import MAKERS
+
+    names = {BATCH: ours, CALL: ours / 2, OBJECTS: 3.0, KINEMATICS: 9.0, MUJOCO: 1.0, PAIRS: 0.01, TREES: 0.02}
+    rates = {name: 1000.0 * times * np.array([0.9, 1.0, 1.2]) for name, times in names.items()}
+    others = {name: rates[name] for name in (BATCH, CALL, MUJOCO)}
+    measured = {ICUB: {0: rates, 100: rates}} | {maker.name: {0: others, 100: others} for maker in MAKERS}
+    one = Agreement("coal", ICUB, 100, 500, 14_076, 3, 1e-7, {"box-capsule": 1e-12}, 0.98, 1e-12, passed)
+    about = {"motors": 41, "joints": 61, "primitives": 129, "pairs": 7451, "poses": 2000, "rounds": 3}
+    threads = {"gain": 1.9, "processes": 1.95}
+    return summed_up(measured, threads, 1e-12, [one]) | {"workload": about, "core": 1, "versions": {}, "coal": True}
 
 
-def test_the_exit_code_says_whether_all_is_met(told: tuple[int, dict]) -> None:
-    code, result = told
-    assert code == (0 if all(one["passed"] for one in result["requirements"] + result["agreement"]) else 1)
+def test_every_bench_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in BENCHES:
+        with pytest.raises(SystemExit, match="0"):
+            main(["bench", name, "--help"])
+        assert "Exit code: 0 every requirement is met" in capsys.readouterr().out
 
 
-def test_the_report_fits_80_columns_and_marks_what_falls_short(told: tuple[int, dict]) -> None:
+@pytest.mark.parametrize(("ours", "agree", "code"), [(100.0, True, 0), (5.0, True, 1), (100.0, False, 1)])
+def test_the_exit_code_says_whether_all_is_met(
+    ours: float, agree: bool, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("experiments.bench.model.measure", lambda settings: model_result(ours, agree))
+    monkeypatch.setattr("experiments.bench.model.load_mujoco", lambda: None)
+    assert main(["bench", "model", "--json"]) == code
+    result = json.loads(capsys.readouterr().out)
+    assert result["passed"] == (code == 0)
+
+
+def test_the_model_is_judged_by_ratios_of_the_same_round() -> None:
+    result = model_result(ours=6.0)
+    assert result["times_mujoco"][0]["batch"] == pytest.approx(6.0)
+    assert result["others"]["hulls"]["times_mujoco"][100]["one call"] == pytest.approx(3.0)
+    passed = {one["name"]: one["passed"] for one in result["requirements"]}
+    assert not passed["iCub, batch, 100: x MuJoCo"]  # 8 are required
+    assert passed["boxes, cylinders, batch, 0: x MuJoCo"] and passed["iCub, batch, 0: x python-fcl"]
+    assert "iCub, batch, 1000: x MuJoCo" not in passed  # not measured
+    assert not any(name.startswith("hulls") for name in passed)  # printed beside them
+
+
+def test_the_report_fits_80_columns_and_marks_what_falls_short() -> None:
     from experiments.bench.model_report import report
 
-    result = told[1]
-    result["requirements"][0] |= {"passed": False, "ratio": 0.5}
-    lines = report(result).splitlines()
+    lines = report(model_result(ours=5.0, passed=False)).splitlines()
     assert max(map(len, lines)) <= 80
-    assert [line.split()[-2:] for line in lines if line.endswith("SHORT")] == [["0.5", "SHORT"]]
+    assert sum(line.endswith("SHORT") for line in lines) == 4  # batch and one call of the iCub, 0 and 100 boxes
+    assert sum(line.endswith("DIFFERS") for line in lines) == 1
 
 
 def test_without_mujoco_it_names_the_extra(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,12 +84,14 @@ def test_a_number_of_objects_that_there_are_not_is_refused(given: str, capsys: p
 
 
 def test_a_figure_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    for module in ("mujoco", "matplotlib"):
-        pytest.importorskip(module)
-    monkeypatch.setattr("experiments.bench.model_cost.BOXES", (0, 10))
-    monkeypatch.setattr("experiments.bench.model_cost.PRIMITIVES", (8, 16))
+    pytest.importorskip("matplotlib")
+    from experiments.bench.model import BATCH, CALL, MUJOCO, TREES
+
+    costs = {name: 10.0 for name in (BATCH, CALL, MUJOCO, TREES)}
+    curves = {"boxes": {0: costs, 10: costs}, "primitives": {8: costs, 16: costs}}
+    monkeypatch.setattr("experiments.bench.model_cost.measure", lambda rounds: curves)
     path = tmp_path / "cost.png"
-    assert main(["bench", "model", "--figure", str(path), "--rounds", "1"]) == 0
+    assert main(["bench", "model", "--figure", str(path)]) == 0
     assert path.read_bytes().startswith(b"\x89PNG")
     assert capsys.readouterr().out.strip() == str(path)
 
@@ -83,18 +103,13 @@ def test_a_figure_that_cannot_be_written_is_refused_before_anything_is_measured(
     assert given in capsys.readouterr().err
 
 
-def test_the_plant_is_timed_beside_mujoco_and_repeats_itself() -> None:
-    pytest.importorskip("mujoco")
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        code = main(["bench", "plant", "--quick", "--json"])
-    result = json.loads(said.getvalue())
-    assert result["same_hash"]
-    assert [(one["name"], one["least"]) for one in result["requirements"]] == [
-        ("one arm, times real time", 2000.0),
-        ("one arm, actions/s", 700.0),
-        ("one arm reaching, times real time", 2000.0),
-        ("three agents at the table, transitions/s", 1500.0),
-    ]
-    assert result["one_arm"]["seconds_per_action"] == pytest.approx(6.4, abs=1.0)
-    assert result["times_mujoco"] == pytest.approx(result["mujoco_us_per_tick"] / result["one_arm"]["us_per_tick"])
-    assert code == (0 if all(one["passed"] for one in result["requirements"]) else 1)
+@pytest.mark.parametrize(("old", "said"), [("no-such-commit", "git worktree: "), ("", "git worktree: ")])
+def test_a_checkout_that_is_not_there_is_told(old: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "against", old, "--cases", "edges"]) == 3
+    assert capsys.readouterr().err.startswith(f"mobee bench: {said}")
+
+
+def test_a_case_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["bench", "against", "HEAD", "--cases", "everything"])
+    assert "'three agents'" in capsys.readouterr().err

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.bench.edges import Settings, measure, report
+from experiments.bench.edges import Settings, measure, report, verdict
 from experiments.bench.edges_workload import palm_map
 
 
@@ -21,6 +21,13 @@ def test_the_report_fits_80_columns(result: dict) -> None:
     lines = report(result).splitlines()
     assert max(map(len, lines)) <= 80
     assert [line.split()[-1] for line in lines[-2:]] == ["pass" if one["passed"] else "SHORT" for one in result["requirements"]]
+
+
+def test_times_are_judged_as_on_the_standard_machine() -> None:
+    slow = {"standard_thesis_s": 1.4, "standard_once_us": 4.0, "thesis_s": 100.0, "once_s": 100.0}
+    assert verdict(slow, agree=True)["passed"]
+    assert not verdict(slow, agree=False)["passed"]
+    assert not verdict(slow | {"standard_thesis_s": 5.0}, agree=True)["passed"]
 
 
 def test_the_map_is_of_free_poses_above_the_table() -> None:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.bench.ik import FINE, REQUIREMENTS, Settings, measure, report
-from experiments.bench.ik_solvers import RIVALS
-from experiments.bench.ik_workload import BOXES, MOTORS, scene, targets
+from experiments.bench.calibration import Calibration
+from experiments.bench.ik import FINE, HYBRID, NES, REQUIREMENTS, WHOLE, Settings, measure, report, verdict
+from experiments.bench.ik_solvers import IN_TURN, RIVALS, Entrant, Solve, tried
+from experiments.bench.ik_workload import BOXES, MOTORS, Target, scene, targets
 from experiments.bench.mink_peer import MinkMissing, MinkPeer
 from mobee.roadmap.ik.problem import Problem
 
@@ -93,3 +94,28 @@ def test_a_short_run_tells_all_rows_and_requirements() -> None:
     assert result["passed"] == all(one["passed"] for one in result["requirements"])
     lines = report(result).splitlines()
     assert max(map(len, lines)) <= 84
+
+
+def test_times_are_judged_as_on_the_standard_machine_or_beside_a_peer() -> None:
+    one = {"reached": 1.0, "ms": 1000.0, "standard_ms": 0.5, "standard_ms_95": 2.0, "times_cma": 200.0}
+    assert verdict({HYBRID: one, NES: one, WHOLE: one})["passed"]
+    assert not verdict({HYBRID: one | {"times_cma": 50.0}, NES: one, WHOLE: one})["passed"]
+    assert not verdict({HYBRID: one, NES: one | {"standard_ms": 100.0}, WHOLE: one})["passed"]
+
+
+def test_solvers_take_turns_and_every_target_has_its_own_seed() -> None:
+    given: list[tuple[str, int]] = []
+
+    def solver(name: str) -> Solve:
+        def solve(aim: Target, seed: int) -> tuple[bool, int]:
+            given.append((name, seed))
+            return name == "a", 7
+
+        return solve
+
+    aims = [Target(np.zeros(3), np.eye(3))] * (IN_TURN + 2)
+    found = tried({"a": Entrant(solver("a"), aims), "b": Entrant(solver("b"), aims[:3])}, Calibration(lambda: 0.5), lambda done, name: None)
+    turns = [("a", 0), ("b", 0), *(("a", seed) for seed in range(IN_TURN)), *(("b", seed) for seed in range(3))]
+    assert given == [*turns, ("a", IN_TURN), ("a", IN_TURN + 1)]
+    assert found["a"].reached == [True] * len(aims) and found["b"].evaluations == [7] * 3
+    assert found["a"].standard_ms == [0.5 * ms for ms in found["a"].ms]

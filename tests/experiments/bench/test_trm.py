@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.bench.trm import LEAST_SQUARES, Settings, measure, report
+from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, report, verdict
 from experiments.trm import coverage
 from mobee.roadmap.building.flood import Patience
 
@@ -32,3 +32,10 @@ def test_the_report_fits_80_columns_and_marks_what_falls_short(result: dict) -> 
     lines = report(result).splitlines()
     assert max(map(len, lines)) <= 80
     assert [line.split()[-1] for line in lines if line.endswith(("pass", "SHORT"))][1] == "SHORT"
+
+
+def test_times_are_judged_as_on_the_standard_machine() -> None:
+    row = {"wall_s": 100.0, "standard_wall_s": 1.0, "coverage": 1.0, "largest_hole": 1.0, "valid": 1.0, "vertices": 5000}
+    assert verdict({LEAST_SQUARES: row, NES: row | {"standard_wall_s": 15.0}}, vertices=4000)["passed"]
+    assert not verdict({LEAST_SQUARES: row | {"standard_wall_s": 15.0}}, vertices=4000)["passed"]
+    assert not verdict({LEAST_SQUARES: row}, vertices=6000)["passed"]

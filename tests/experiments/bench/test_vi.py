@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from experiments.bench.vi import Settings, contestants, measure, report
+from experiments.bench.vi import Settings, contestants, measure, report, verdict
 from experiments.bench.vi_peers import Problem, QuanteconMissing, load_quantecon
 from experiments.bench.vi_workload import at_work, of_size
 from mobee.learning.policy_iteration import policy_iteration
@@ -15,7 +15,7 @@ from mobee_cli.__main__ import main
 @pytest.fixture(scope="module")
 def result():
     pytest.importorskip("quantecon")
-    return measure(Settings(problems=4, rounds=1, observations=2, large=200))
+    return measure(Settings(problems=4, rounds=1, observations=2, large=200, large_rounds=1))
 
 
 def test_plans_are_right_on_random_problems(result):
@@ -36,6 +36,15 @@ def test_the_report_fits_80_columns_and_marks_what_falls_short(result):
     lines = report(changed).splitlines()
     assert max(map(len, lines)) <= 80
     assert sum(line.endswith("SHORT") for line in lines) == 1
+
+
+@pytest.mark.parametrize("slower", [1.0, 3.0])
+def test_nothing_but_ratios_and_errors_is_judged(result, slower):
+    met = {"difference": 1e-12, "residual": 0.99, "cold_times_scipy": 8.0, "cold_times_quantecon": 11.0}
+    met |= {"warm_times_scipy": 20.0, "warm_times_quantecon": 26.0, "large_times_scipy": 1.5}
+    same = result | met | {"us": {name: slower * us for name, us in result["us"].items()}}
+    assert verdict(same)["passed"]
+    assert not verdict(same | {"warm_times_scipy": 5.0})["passed"]
 
 
 def test_peers_solve_the_same_problem():

@@ -1,0 +1,94 @@
+"""Two checkouts: what is made of their times, and how their processes are driven, with a toy for a checkout."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.bench import against
+from experiments.bench.against import HERE, LEAST, AgainstFailed, Checkout, checkout, compared, measure, report, verdict
+from experiments.bench.against_cases import CASES
+
+
+def one_round(old: float, new: float, poses: int = 10) -> against.Pair:
+    return {"old": {"seconds": old, "work": {"poses": 10}}, "new": {"seconds": new, "work": {"poses": poses}}}
+
+
+def test_every_case_has_its_requirement() -> None:
+    assert CASES.keys() == LEAST.keys()
+
+
+def test_the_median_of_the_rounds_ratios_counts() -> None:
+    found = compared([one_round(2.0, 1.0), one_round(9.0, 3.0), one_round(40.0, 10.0), one_round(1.0, 10.0), one_round(5.0, 1.0)])
+    assert found["ratio"] == 3.0 and found["quartiles"] == [2.0, 4.0] and found["range"] == [0.1, 5.0]
+    assert found["old_s"] == 5.0 and found["new_s"] == 3.0
+    assert found["same_work"]
+
+
+def test_other_work_is_told() -> None:
+    found = {"edges": compared([one_round(2.0, 1.0, poses=11)])}
+    assert not found["edges"]["same_work"]
+    lines = report({"rounds": 1, "cases": found, **verdict(found)}).splitlines()
+    assert [line.strip() for line in lines if "poses" in line] == ["old: poses 10", "new: poses 11"]
+
+
+def test_as_much_faster_as_required_or_no_slower() -> None:
+    ratios = {"one arm": 1.9, "lockstep": 1.3, "edges": 0.98, "vi warm": 0.9}
+    found = {case: compared([one_round(ratio, 1.0)]) for case, ratio in ratios.items()}
+    passed = {one["name"]: one["passed"] for one in verdict(found)["requirements"]}
+    assert passed == {"one arm": False, "lockstep": True, "edges": True, "vi warm": False}
+
+
+def test_the_report_fits_80_columns() -> None:
+    found = {case: compared([one_round(123.456, 100.0)]) for case in LEAST}
+    result = {"rounds": 5, "cases": found, **verdict(found)}
+    assert max(map(len, report(result).splitlines())) <= 80
+
+
+@pytest.fixture
+def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Checkout, Checkout]:
+    """Two checkouts whose library says how long its work takes, and cases that ask it."""
+    for name, seconds in (("old", 3.0), ("new", 1.0)):
+        folder = tmp_path / name / "mobee"
+        folder.mkdir(parents=True)
+        (folder / "__init__.py").write_text(f"SECONDS = {seconds}\n")
+    cases = tmp_path / "cases.py"
+    cases.write_text(
+        "import json, sys, mobee\n"
+        "if sys.argv[1] == 'lockstep': raise SystemExit('this checkout has none')\n"
+        "print(json.dumps({'library': mobee.__file__}), flush=True)\n"
+        "for _ in sys.stdin: print(json.dumps({'seconds': mobee.SECONDS, 'work': {'poses': 7}}), flush=True)\n"
+    )
+    monkeypatch.setattr(against, "_CASES", cases)
+    return Checkout(tmp_path / "old"), Checkout(tmp_path / "new")
+
+
+def test_each_checkout_works_with_its_own_library(toys: tuple[Checkout, Checkout]) -> None:
+    result = measure(*toys, ["edges", "one arm"], rounds=2)
+    assert [result["cases"][case]["ratio"] for case in ("edges", "one arm")] == [3.0, 3.0]
+    assert result["passed"] and result["rounds"] == 2
+
+
+def test_a_case_that_fails_says_its_last_word(toys: tuple[Checkout, Checkout]) -> None:
+    with pytest.raises(AgainstFailed, match="lockstep in .*: this checkout has none"):
+        measure(*toys, ["lockstep"], rounds=1)
+
+
+def test_a_library_from_elsewhere_is_found_out(toys: tuple[Checkout, Checkout]) -> None:
+    (toys[0].folder / "mobee" / "__init__.py").unlink()
+    (toys[0].folder / "mobee").rmdir()
+    with pytest.raises(AgainstFailed, match="library was taken from|No module named"):
+        measure(*toys, ["edges"], rounds=1)
+
+
+def test_a_commit_is_checked_out_meanwhile_and_a_folder_is_taken_as_it_is(tmp_path: Path) -> None:
+    with checkout(str(tmp_path)) as found:
+        assert found == Checkout(tmp_path.resolve(), sys.executable)
+    if subprocess.run(["git", "-C", str(HERE), "rev-parse", "HEAD"], capture_output=True, check=False).returncode:
+        pytest.skip("not a clone")
+    with checkout("HEAD") as found:
+        assert (found.folder / "mobee" / "__init__.py").exists()
+    assert not found.folder.exists()

@@ -1,0 +1,46 @@
+"""The plant's bench on given numbers, and that its workloads repeat themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from experiments.bench.plant import REQUIREMENTS, report, verdict
+from experiments.bench.plant_workload import Pace, trajectory_hash
+
+
+def result(speed: float, slower: float = 1.0) -> dict[str, Any]:
+    """Of a machine of that speed on which everything takes so many times longer than on the standard machine."""
+    paces = {
+        "one_arm": Pace(1.0, 12_000.0, 600_000, 1850),
+        "reaching": Pace(1.0, 8000.0, 400_000, 780),
+        "three_agents": Pace(1.0, 3900.0, 195_000, 1700),
+    }
+    measured = {name: Pace(slower * one.seconds, one.plant_seconds, one.ticks, one.ended) for name, one in paces.items()}
+    about = {"tick": 0.02, "core": 1, "rounds": 3, "speed": speed, "mujoco_us_per_tick": 100.0, "times_mujoco": 60.0}
+    return about | {name: one.numbers | one.standard(speed) for name, one in measured.items()}
+
+
+@pytest.mark.parametrize("slower", [1.0, 3.0])
+def test_the_verdict_is_the_same_on_a_slower_machine(slower: float) -> None:
+    found = result(1.0 / slower, slower)
+    judged = verdict(found, same_hash=True)
+    assert judged["passed"]
+    assert [one["found"] for one in judged["requirements"]] == pytest.approx([12_000.0, 1850.0, 8000.0, 1700.0])
+    assert found["one_arm"]["times_real_time"] == pytest.approx(12_000.0 / slower)
+
+
+def test_what_is_slower_than_the_machine_falls_short_and_so_does_another_hash() -> None:
+    assert [one["passed"] for one in verdict(result(1.0, slower=3.0), same_hash=True)["requirements"]] == [False] * len(REQUIREMENTS)
+    assert not verdict(result(1.0), same_hash=False)["passed"]
+
+
+def test_the_report_fits_80_columns() -> None:
+    found = result(0.5, slower=2.0)
+    lines = report(found | verdict(found, same_hash=True)).splitlines()
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_same_seed_has_the_same_hash() -> None:
+    assert trajectory_hash(3) == trajectory_hash(3)
