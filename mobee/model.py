@@ -139,8 +139,7 @@ class Model:
     def _checked(self, q: ArrayLike) -> Array:
         n = self._motors
         # The common case is a tenth of the general one's time.
-        plain = type(q) is np.ndarray and q.dtype is _FLOAT and q.ndim == 1
-        value = q.copy() if plain else real_array("q", q)
+        value = q.copy() if type(q) is np.ndarray and q.dtype is _FLOAT and q.ndim == 1 else real_array("q", q)
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")
         # For one pose the first test takes a tenth of the second's time; for many it would wake the threads of BLAS.

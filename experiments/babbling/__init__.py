@@ -27,9 +27,8 @@ from experiments.babbling.trial import TrialFailed, run_trial
 from experiments.options import positive_number
 from experiments.progress import Progress
 from mobee import load_robot
-from mobee.errors import InvalidValue, MobeeError
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-from services.launcher.engine import EngineMissing, compile_engine
 
 NAME = "babbling"
 CLAIM = "random position moves break nothing under MoBeE, and 2.0 deflects them less than 1.0"
@@ -49,10 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Run the trials that are not there yet; returns the table, and whether the claims stand."""
-    try:
-        compile_engine()  # here, where progress is seen: the launcher's own words go to a file
-    except EngineMissing as error:
-        raise MobeeError(str(error)) from None
     robot = load_robot(ROBOT)
     lengths = trial_lengths(arguments.minutes, arguments.trial)
     total, done = len(lengths) * len(arguments.modes), 0

@@ -43,7 +43,6 @@ from experiments.progress import Progress
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.store import STORE
-from services.launcher.engine import EngineMissing, compile_engine
 
 NAME = "live-reach"
 CLAIM = "the learned reacher puts the palm on what can be reached, live, and touches nothing else"
@@ -82,10 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Train, refine and evaluate; what is there already is not done again.  Raises OmplMissing before anything is begun."""
     require_ompl()
-    try:
-        compile_engine()
-    except EngineMissing as error:
-        raise InvalidValue(str(error)) from None
     sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts
     with Progress() as progress:
         for number in range(starts):

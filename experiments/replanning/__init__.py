@@ -28,7 +28,6 @@ from experiments.replanning.findings import CLAIMS, findings
 from experiments.replanning.job import Job
 from experiments.replanning.live import perform
 from experiments.replanning.measured import MEASURED, Measured, keep_poses, measure, read_measured
-from experiments.walking.live import compiled
 from mobee.errors import InvalidValue
 
 NAME = "replanning"
@@ -49,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Do the crossings that are not there yet."""
-    compiled()
     after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, 2 if arguments.quick else arguments.crossings)
     pieces = [after[i : i + PIECE].tolist() for i in range(0, len(after), PIECE)]
     with Progress() as progress:

@@ -24,7 +24,6 @@ from experiments.roadmap_from_scratch.findings import CLAIMS, findings
 from experiments.roadmap_from_scratch.live import finish, read_live
 from experiments.roadmap_from_scratch.trial import explored
 from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
-from experiments.walking.live import compiled
 from mobee.roadmap.ompl import require_ompl
 
 NAME = "roadmap-from-scratch"
@@ -56,8 +55,6 @@ def work(cell: Cell) -> dict[str, Any]:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Do what is left; raises OmplMissing before anything is begun."""
     require_ompl()
-    if arguments.live:
-        compiled()
     run_cells(work, cells(arguments), folder, arguments)
     if arguments.live:
         finish(folder / "live", arguments.seed, QUICK if arguments.quick else None)

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from experiments.launched import summary_of
-from mobee.errors import MobeeError
-from services.launcher.engine import EngineMissing, compile_engine
 
 PATIENCE = 60.0  # s for a tick of lockstep: a way is looked for in one
 
@@ -64,11 +62,3 @@ def launch(
     scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **told))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)
-
-
-def compiled() -> None:
-    """Compile the engine here, where progress is seen; raises MobeeError if that cannot be."""
-    try:
-        compile_engine()
-    except EngineMissing as error:
-        raise MobeeError(str(error)) from None

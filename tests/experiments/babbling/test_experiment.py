@@ -88,7 +88,6 @@ def test_the_table_has_80_columns_and_a_line_a_pair() -> None:
 
 
 def test_a_finished_run_is_told_as_a_table_with_what_is_judged_below(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(babbling, "compile_engine", lambda: None)
     monkeypatch.setattr(babbling, "_run_until_repeatable", lambda *settings: None)
     monkeypatch.setattr(babbling, "read_trials", lambda folder, mode: [GOOD[mode]])
     assert main(["experiment", "run", "babbling", "--minutes", "1", "--runs", str(tmp_path)]) == 0
