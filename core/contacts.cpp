@@ -41,9 +41,9 @@ bool push_links(const Array<Contact>& contacts, Array<Wrench>& wrench) {
 
 double overlap_of(const Scene& scene, Placed& placed, Pair pair, Touch& touch) {
     const Robot& robot = *scene.robot;
-    const auto shapes = static_cast<std::int32_t>(robot.shapes());
+    const auto slots = static_cast<std::int32_t>(robot.slots());
     const Volume& one = placed_volume(robot, placed, pair.first);
-    const Volume& two = pair.second < shapes ? placed_volume(robot, placed, pair.second) : scene.volume[pair.second - shapes];
+    const Volume& two = pair.second < slots ? placed_volume(robot, placed, pair.second) : scene.volume[pair.second - slots];
     return overlap(one, two, touch);
 }
 
@@ -51,8 +51,8 @@ bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double dept
     const Robot& robot = *scene.robot;
     const Shape& one = robot.shape[pair.first];
     contact = {one.field ? field_contact : solid_contact, contacts::name_of(scene, one), 0, one.link, -1, depth, touch};
-    if (pair.second >= robot.shapes()) {
-        const std::int64_t object = pair.second - robot.shapes();
+    if (pair.second >= robot.slots()) {
+        const std::int64_t object = pair.second - robot.slots();
         contact.second = robot.own_shapes + scene.name[object];
         return !(scene.target[object] && spares(robot, one, hands));
     }
@@ -78,7 +78,33 @@ void find_contacts(const Scene& scene, const Hands& hands, Placed& placed, const
     }
 }
 
-void sort_contacts(Array<Contact>& found) { std::sort(found.begin(), found.end(), contacts::before); }
+void sort_contacts(const Scene& scene, Contacts& contacts) {
+    constexpr std::size_t few = 16;
+    Array<Contact>& found = contacts.found;
+    if (found.size() <= few || scene.carried.size() > 0) {
+        std::sort(found.begin(), found.end(), contacts::before);
+        return;
+    }
+    // Each contact goes to the place of its kind and first shape, and there behind those with a smaller second.
+    const std::int64_t shapes = scene.robot->own_shapes;
+    const auto place_of = [shapes](const Contact& one) { return static_cast<std::size_t>(one.kind * shapes + one.first); };
+    std::swap(contacts.found, contacts.unsorted);
+    found.spare(contacts.unsorted.size());
+    found.shorten(contacts.unsorted.size());
+    Array<std::int32_t>&starts = contacts.starts, &ends = contacts.ends;
+    starts.clear();
+    starts.resize(static_cast<std::size_t>(2 * shapes + 1));
+    for (const Contact& one : contacts.unsorted) ++starts[place_of(one) + 1];
+    for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
+    ends.clear();
+    std::copy(starts.begin(), starts.end(), ends.spare(starts.size()));
+    for (const Contact& one : contacts.unsorted) {
+        const std::size_t place = place_of(one);
+        std::int32_t at = ends[place]++;
+        for (; at > starts[place] && one.second < found[at - 1].second; --at) found[at] = found[at - 1];
+        found[at] = one;
+    }
+}
 
 void project(const Robot& robot, const Frame* frames, const Array<Contact>& found, bool cut, Array<Wrench>& wrench, double* torque) {
     if (!contacts::push_links(found, wrench)) return;

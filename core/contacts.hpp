@@ -23,8 +23,15 @@ bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double dept
 // Put a contact in `found` for every pair that overlaps.
 void find_contacts(const Scene& scene, const Hands& hands, Placed& placed, const Array<Pair>& pairs, Array<Contact>& found);
 
+// The contacts of a pose, and what sorting them needs.
+struct Contacts {
+    Array<Contact> found;
+    Array<Contact> unsorted;
+    Array<std::int32_t> starts, ends;  // of those of one kind and first shape
+};
+
 // By kind, first and second.
-void sort_contacts(Array<Contact>& contacts);
+void sort_contacts(const Scene& scene, Contacts& contacts);
 
 // Add what contacts of fields do to the motors, the sum of J^T (depth * normal) (thesis eq. 5.11), to `torque` (motors,).
 //

@@ -3,6 +3,7 @@
 
 #include "contacts.hpp"
 #include "interface.hpp"
+#include "lanes.hpp"
 #include "rows.hpp"
 
 namespace mobee {
@@ -11,7 +12,7 @@ namespace mobee {
 struct Worker {
     Placed placed;
     Pairs pairs;
-    Array<Contact> found;
+    Contacts contacts;
     Array<Wrench> wrench;
     Rows rows;
 };
@@ -30,7 +31,7 @@ struct Request {
     const Scene* scene;
     const double* q;          // (poses, motors)
     double* torque;           // (poses, motors), overwritten
-    ContactNumbers* numbers;  // (few,): the rows are written here if there are no more
+    ContactNumbers* numbers;  // (few,): the rows of a single pose are written here if there are no more
     ContactReals* reals;      // (few,)
     std::int64_t poses, few, cut, threads;
     Hands hands;
@@ -56,12 +57,12 @@ void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& w
         place(robot, placed);
         bound_clusters(robot, placed);
         find_pairs(scene, placed, 0.0, worker.pairs);
-        sieve(scene, placed, worker.pairs.list);
-        find_contacts(scene, request.hands, placed, worker.pairs.list, worker.found);
-        if (worker.found.size() == 0) continue;
-        sort_contacts(worker.found);
-        project(robot, placed.links.frame.data(), worker.found, request.cut != 0, worker.wrench, torque);
-        worker.rows.append(b, worker.found);
+        sieve(scene, placed, worker.pairs);
+        find_contacts(scene, request.hands, placed, worker.pairs.left, worker.contacts.found);
+        if (worker.contacts.found.size() == 0) continue;
+        sort_contacts(scene, worker.contacts);
+        project(robot, placed.links.frame.data(), worker.contacts.found, request.cut != 0, worker.wrench, torque);
+        worker.rows.append(b, worker.contacts.found);
     }
 }
 
@@ -100,31 +101,58 @@ MOBEE_CALL Room* mobee_room_new() { return make<Room>(); }
 
 MOBEE_CALL void mobee_room_free(Room* room) { discard(room); }
 
-// Write the rows of the last evaluation, in the order of the poses.
-MOBEE_CALL void mobee_room_rows(Room* room, ContactNumbers* numbers, ContactReals* reals) {
-    std::size_t used = 0;
-    for (Worker* worker : room->workers) {
-        const std::size_t rows = worker->rows.numbers.size();
-        worker->rows.hand_over(numbers, reals, used);
-        used += rows;
+// Give the rows of the last evaluation away, in the order of the poses: the numbers, and the reals; `mobee_free` ends each.
+MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
+    Rows& all = room->workers[0]->rows;
+    for (std::size_t k = 1; k < room->workers.size(); ++k) {
+        all.append(room->workers[k]->rows);
+        room->workers[k]->rows.size = 0;
     }
+    all.give(arrays);
 }
 
-// Find the contacts of all poses; returns how many there are.  If they are more than few, `mobee_room_rows` hands them over.
+MOBEE_CALL void mobee_free(void* memory) { std::free(memory); }
+
+// Find the contacts of all poses; returns how many there are.  If they are more than few, `mobee_room_rows` gives them.
 MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     const std::int64_t most_threads = request->poses > 1 ? request->poses : 1;
     const std::int64_t threads = request->threads < most_threads ? request->threads : most_threads;
     while (static_cast<std::int64_t>(room->workers.size()) < threads) room->workers.push(make<Worker>());
-    for (Worker* worker : room->workers) worker->rows.clear();
+    for (Worker* worker : room->workers) worker->rows.size = 0;
     if (threads == 1) {
         evaluation::run(*request, 0, request->poses, *room->workers[0]);
     } else {
         evaluation::run_all(*room, *request, threads);
     }
     std::size_t rows = 0;
-    for (const Worker* worker : room->workers) rows += worker->rows.numbers.size();
-    if (static_cast<std::int64_t>(rows) <= request->few) mobee_room_rows(room, request->numbers, request->reals);
+    for (const Worker* worker : room->workers) rows += worker->rows.size;
+    const Rows& first = room->workers[0]->rows;
+    if (request->poses == 1 && static_cast<std::int64_t>(rows) <= request->few) first.copy_to(request->numbers, request->reals);
     return static_cast<std::int64_t>(rows);
+}
+
+// The same for the one pose at q (motors,).
+MOBEE_CALL std::int64_t mobee_evaluate_one(Room* room, Request* request, const double* q) {
+    request->q = q;
+    return mobee_evaluate(room, request);
+}
+
+// Every link in the poses q (count, motors): (count, links, 4, 4).
+MOBEE_CALL void mobee_link_poses(Room* room, const Robot* robot, const double* q, std::int64_t count, double* out) {
+    if (room->workers.size() == 0) room->workers.push(make<Worker>());
+    Links& links = room->workers[0]->placed.links;
+    room->workers[0]->placed.fit(*robot);
+    for (std::int64_t b = 0; b < count; ++b) {
+        place_links_at(*robot, q + b * robot->motors, links);
+        for (const Frame& frame : links.frame) {
+            Four x = frame.x, y = frame.y, z = frame.z, shift = frame.shift;
+            shift[3] = 1.0;
+            transpose(x, y, z, shift);
+            const Four rows[4] = {x, y, z, shift};
+            std::memcpy(out, rows, sizeof rows);
+            out += 16;
+        }
+    }
 }
 
 }  // namespace mobee

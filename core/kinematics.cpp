@@ -14,21 +14,23 @@ constexpr double pi_2_high = 1.5707963267341256, pi_2_middle = 6.077100506303966
 constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52: added to a number, it leaves the nearest integer in the last bits
 
 // Reduction to a quarter turn (Cody and Waite), then Taylor to 1e-17.
-inline void sine_cosine(Lanes angle, Lanes& sine, Lanes& cosine) {
-    const Lanes shifted = angle * 0.6366197723675814 + rounder;
-    const Lanes quarter = shifted - rounder;
-    const Lanes x = ((angle - quarter * pi_2_high) - quarter * pi_2_middle) - quarter * pi_2_low;
-    const Lanes z = x * x;
-    Lanes s = z * (1.6059043836821613e-10 - z * 7.647163731819816e-13);
+inline void sine_cosine(Four angle, Four& sine, Four& cosine) {
+    const Four shifted = angle * 0.6366197723675814 + rounder;
+    const Four quarter = shifted - rounder;
+    const Four x = ((angle - quarter * pi_2_high) - quarter * pi_2_middle) - quarter * pi_2_low;
+    const Four z = x * x;
+    Four s = z * (1.6059043836821613e-10 - z * 7.647163731819816e-13);
     s = z * (-1.984126984126984e-04 + z * (2.7557319223985893e-06 - z * 2.505210838544172e-08 + z * s));
     s = x + x * z * (-1.6666666666666666e-01 + z * 8.333333333333333e-03 + z * s);
-    Lanes c = z * (2.08767569878681e-09 - z * (1.1470745597729725e-11 - z * 4.779477332387385e-14));
+    Four c = z * (2.08767569878681e-09 - z * (1.1470745597729725e-11 - z * 4.779477332387385e-14));
     c = z * (-1.3888888888888889e-03 + z * (2.48015873015873e-05 - z * 2.755731922398589e-07 + z * c));
     c = z * (0.5 - z * (4.1666666666666664e-02 + c));
-    const Marks turn = bits_of(shifted) & 3;
-    const Marks odd = (turn & 1) == 1;
-    const Lanes big = odd ? 1.0 - c : s;
-    const Lanes small = odd ? s : 1.0 - c;
+    FourMarks turn;
+    std::memcpy(&turn, &shifted, sizeof turn);
+    turn &= 3;
+    const FourMarks odd = (turn & 1) == 1;
+    const Four big = odd ? 1.0 - c : s;
+    const Four small = odd ? s : 1.0 - c;
     sine = turn >= 2 ? -big : big;
     cosine = turn == 0 ? c : 1.0 - (((turn ^ (turn >> 1)) & 1) == 1 ? -small : small);
 }
@@ -61,19 +63,26 @@ void joint_angles(const Robot& robot, const double* q, double* angles) {
 }
 
 void sines_cosines(const double* angles, std::int64_t count, double* sines, double* cosines) {
-    Lanes sine, cosine, largest{};
-    for (std::int64_t j = 0; j < count; j += lanes) {
-        const std::int64_t some = count - j < lanes ? count - j : lanes;
-        Lanes angle{};
-        std::memcpy(&angle, angles + j, some * sizeof(double));
+    Four sine, cosine, largest{};
+    const auto look_at = [&](Four angle) {
         kinematics::sine_cosine(angle, sine, cosine);
-        std::memcpy(sines + j, &sine, some * sizeof(double));
-        std::memcpy(cosines + j, &cosine, some * sizeof(double));
-        const Lanes size = angle < 0.0 ? -angle : angle;
+        const Four size = angle < 0.0 ? -angle : angle;
         largest = size < largest ? largest : size;  // NaN, of angles that have overflown, is the largest
+    };
+    std::int64_t j = 0;
+    for (; j + 4 <= count; j += 4) {
+        look_at(load<Four>(angles + j));
+        std::memcpy(sines + j, &sine, sizeof sine);
+        std::memcpy(cosines + j, &cosine, sizeof cosine);
+    }
+    if (j < count) {
+        Four rest{};
+        for (std::int64_t k = j; k < count; ++k) rest[k - j] = angles[k];
+        look_at(rest);
+        for (std::int64_t k = j; k < count; ++k) sines[k] = sine[k - j], cosines[k] = cosine[k - j];
     }
     bool all_small = true;
-    for (int k = 0; k < lanes; ++k) all_small &= largest[k] < kinematics::large;
+    for (int k = 0; k < 4; ++k) all_small &= largest[k] < kinematics::large;
     if (!all_small) kinematics::set_large_ones(angles, count, sines, cosines);
 }
 
@@ -122,24 +131,6 @@ void add_jacobian(const Robot& robot, const Frame* frames, std::int64_t link, Ve
 
 MOBEE_CALL void mobee_sines_cosines(const double* angles, std::int64_t count, double* sines, double* cosines) {
     sines_cosines(angles, count, sines, cosines);
-}
-
-// Every link in the poses q (count, motors): (count, links, 4, 4).
-MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64_t count, double* out) {
-    Links links;
-    links.fit(*robot);
-    for (std::int64_t b = 0; b < count; ++b) {
-        place_links_at(*robot, q + b * robot->motors, links);
-        for (const Frame& frame : links.frame) {
-            for (int row = 0; row < 3; ++row) {
-                const Four values{frame.x[row], frame.y[row], frame.z[row], frame.shift[row]};
-                std::memcpy(out + 4 * row, &values, sizeof values);
-            }
-            out[12] = out[13] = out[14] = 0.0;
-            out[15] = 1.0;
-            out += 16;
-        }
-    }
 }
 
 // How a link's point, root frame at zero pose, moves with each motor in the poses q (count, motors): (count, 6, motors).

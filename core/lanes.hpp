@@ -1,27 +1,120 @@
-// Eight numbers in one register, or in several where the processor has none so wide: the results are the same bits.
+// Four or eight numbers in one register, or in several where the processor has none so wide: the results are the same bits.
 #pragma once
 
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include "vector.hpp"
+
 namespace mobee {
 
-typedef double Lanes __attribute__((vector_size(64)));
-typedef std::int64_t Marks __attribute__((vector_size(64)));  // of lanes: all bits set, or none
+typedef std::int64_t FourMarks __attribute__((vector_size(32)));  // of four: all bits set, or none
+typedef float Eight __attribute__((vector_size(32)));
+typedef std::int32_t EightInts __attribute__((vector_size(32)));
 constexpr std::int64_t lanes = 8;
 
-inline Lanes load(const double* from) {
-    Lanes value;
+template <class V>
+inline V load(const void* from) {
+    V value;
     std::memcpy(&value, from, sizeof value);
     return value;
 }
 
-inline void store(double* to, Lanes value) { std::memcpy(to, &value, sizeof value); }
+// NaN of a gives b, as of `least` and `most`.
+inline Four least_of(Four a, Four b) { return a < b ? a : b; }
+inline Four most_of(Four a, Four b) { return a > b ? a : b; }
+inline Four unit_of(Four value) { return least_of(most_of(value, Four{} - 1.0), Four{} + 1.0); }
+inline Four absolute_of(Four value) { return most_of(value, -value); }
 
-inline Marks bits_of(Lanes value) {
-    Marks bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    return bits;
+// Bit k says whether a[k] < b[k].
+inline unsigned less(Four a, Four b) {
+#if defined(__AVX__)
+    return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(reinterpret_cast<__m256d>(a), reinterpret_cast<__m256d>(b), _CMP_LT_OQ)));
+#else
+    unsigned found = 0;
+    for (int k = 0; k < 4; ++k) found |= static_cast<unsigned>(a[k] < b[k]) << k;
+    return found;
+#endif
 }
+
+inline unsigned less(Eight a, Eight b) {
+#if defined(__AVX__)
+    return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b), _CMP_LT_OQ)));
+#else
+    unsigned found = 0;
+    for (int k = 0; k < lanes; ++k) found |= static_cast<unsigned>(a[k] < b[k]) << k;
+    return found;
+#endif
+}
+
+inline Eight root_of(Eight value) {
+#if defined(__AVX__)
+    return reinterpret_cast<Eight>(_mm256_sqrt_ps(reinterpret_cast<__m256>(value)));
+#else
+    for (int k = 0; k < lanes; ++k) value[k] = std::sqrt(value[k]);
+    return value;
+#endif
+}
+
+#if defined(__AVX2__) && !defined(__AVX512VL__)
+// For each choice of eight which are chosen, one after the other.
+struct Choices {
+    std::uint8_t of[256][lanes] = {};
+
+    constexpr Choices() {
+        for (int which = 0; which < 256; ++which)
+            for (int k = 0, count = 0; k < lanes; ++k)
+                if ((which >> k & 1) != 0) of[which][count++] = static_cast<std::uint8_t>(k);
+    }
+};
+
+inline constexpr Choices choices;
+#endif
+
+// Write those of the eight numbers of which the bit is set, one after the other, and up to eight in all; returns where they end.  There is
+// no branch: which volumes are near is hard to guess.
+inline std::int32_t* put(std::int32_t* to, EightInts from, unsigned which) {
+#if defined(__AVX512VL__)
+    const __m256i chosen = _mm256_maskz_compress_epi32(static_cast<__mmask8>(which), reinterpret_cast<__m256i>(from));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), chosen);
+    return to + std::popcount(which);
+#elif defined(__AVX2__)
+    const __m256i order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(choices.of[which])));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(from), order));
+    return to + std::popcount(which);
+#else
+    for (; which != 0; which &= which - 1) *to++ = from[std::countr_zero(which)];
+    return to;
+#endif
+}
+
+inline void put(float* to, const float* from, unsigned which) { put(reinterpret_cast<std::int32_t*>(to), load<EightInts>(from), which); }
+
+inline void store_single(float* to, Four value) {
+    typedef float FourSingle __attribute__((vector_size(16)));
+    const FourSingle single = __builtin_convertvector(value, FourSingle);
+    std::memcpy(to, &single, sizeof single);
+}
+
+// Of four vectors their first, second, third and fourth numbers.
+inline void transpose(Four& a, Four& b, Four& c, Four& d) {
+    const Four p = __builtin_shufflevector(a, b, 0, 4, 2, 6), q = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const Four r = __builtin_shufflevector(c, d, 0, 4, 2, 6), s = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    a = __builtin_shufflevector(p, r, 0, 1, 4, 5);
+    b = __builtin_shufflevector(q, s, 0, 1, 4, 5);
+    c = __builtin_shufflevector(p, r, 2, 3, 6, 7);
+    d = __builtin_shufflevector(q, s, 2, 3, 6, 7);
+}
+
+// The first three numbers of a, and the fourth of b.
+inline Four with_fourth(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 7); }
+
+inline double sum_of_three(Four v) { return v[0] + v[1] + v[2]; }
 
 }  // namespace mobee

@@ -11,18 +11,25 @@ namespace motion {
 
 constexpr std::int64_t most_groups = 4;  // of a link
 
+// Call `what(slot)` for every shape.
+template <class What>
+void for_each_shape(const Robot& robot, What what) {
+    for (const Cluster cluster : robot.cluster)
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) what(i);
+}
+
 // Give the shapes of a link to groups, by where they are along the longest side of the box that holds their centres.
 void group_link(const Robot& robot, std::int64_t link, Motion& to) {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     std::int64_t number = 0;
-    for (const Shape& shape : robot.shape) {
-        if (shape.link != link) continue;
+    for_each_shape(robot, [&](std::int64_t i) {
+        if (robot.link[i] != link) return;
         ++number;
         for (int k = 0; k < 3; ++k) {
-            low[k] = least(low[k], shape.volume.center[k]);
-            high[k] = most(high[k], shape.volume.center[k]);
+            low[k] = least(low[k], robot.shape[i].volume.center[k]);
+            high[k] = most(high[k], robot.shape[i].volume.center[k]);
         }
-    }
+    });
     int longest = 0;
     for (int k = 1; k < 3; ++k)
         if (high[k] - low[k] > high[longest] - low[longest]) longest = k;
@@ -30,25 +37,25 @@ void group_link(const Robot& robot, std::int64_t link, Motion& to) {
     to.group.resize(to.group.size() + groups);
     for (std::int64_t g = 0; g < groups; ++g) to.group[first + g].link = link;
     const double length = high[longest] - low[longest];
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
-        const Shape& shape = robot.shape[i];
-        if (shape.link != link) continue;
-        const double share = length > 0.0 ? (shape.volume.center[longest] - low[longest]) / length : 0.0;
+    for_each_shape(robot, [&](std::int64_t i) {
+        if (robot.link[i] != link) return;
+        const double share = length > 0.0 ? (robot.shape[i].volume.center[longest] - low[longest]) / length : 0.0;
         to.group_of[i] = first + std::min(static_cast<std::int64_t>(share * static_cast<double>(groups)), groups - 1);
-    }
+    });
 }
 
 }  // namespace motion
 
 void Motion::fit(const Robot& robot) {
-    const std::int64_t shapes = robot.shapes();
+    const std::int64_t slots = robot.slots();
     moved.resize(robot.links);
     moved_in.resize(robot.links);
-    for (Array<std::int64_t>* of_shapes : {&placed_in, &group_of}) of_shapes->resize(shapes);
+    for (Array<std::int64_t>* of_slots : {&placed_in, &group_of}) of_slots->resize(slots);
     for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
     for (Array<double>* of_links : {&turned, &bend, &sway, &chain}) of_links->resize(robot.links);
-    for (Array<double>* of_shapes : {&x, &y, &z, &arm, &way}) of_shapes->resize(shapes);
+    for (Array<double>* of_slots : {&arm, &way}) of_slots->resize(slots);
     frame.resize(robot.links);
+    center.resize(slots);
     if (serial == robot.serial) return;
     serial = robot.serial;
     make_groups(robot);
@@ -57,18 +64,18 @@ void Motion::fit(const Robot& robot) {
 void Motion::make_groups(const Robot& robot) {
     group.clear();
     for (std::int64_t link = 0; link < robot.links; ++link) motion::group_link(robot, link, *this);
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+    motion::for_each_shape(robot, [&](std::int64_t i) {
         Group& one = group[group_of[i]];
         one.middle = one.middle + robot.shape[i].volume.center;
         ++one.number;
-    }
+    });
     for (Group& one : group) one.middle = 1.0 / most(static_cast<double>(one.number), 1.0) * one.middle;
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
+    motion::for_each_shape(robot, [&](std::int64_t i) {
         const Volume& volume = robot.shape[i].volume;
         Group& one = group[group_of[i]];
         arm[i] = volume.bound - (volume.kind <= Kind::capsule ? volume.radius : 0.0);
         one.spread = most(one.spread, length(volume.center - one.middle) + arm[i]);
-    }
+    });
 }
 
 void find_moved(const Robot& robot, const double* angles, bool fresh, Motion& motion) {
@@ -86,9 +93,7 @@ void remember(const Placed& placed, Motion& motion) {
     const auto copy = [](const auto& from, auto& to) { std::copy(from.begin(), from.begin() + to.size(), to.begin()); };
     copy(placed.links.angles, motion.angles);
     copy(placed.links.frame, motion.frame);
-    copy(placed.x, motion.x);
-    copy(placed.y, motion.y);
-    copy(placed.z, motion.z);
+    for (std::size_t i = 0; i < placed.outline.size(); ++i) motion.center[i] = placed.outline[i].center;
     std::fill(motion.way.begin(), motion.way.end(), 0.0);
     for (Group& one : motion.group) {
         one.then = move(motion.frame[one.link], one.middle);
@@ -113,28 +118,27 @@ double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
     return farthest;
 }
 
-double way_of(const Robot& robot, std::int64_t i, Placed& placed, Motion& motion) {
-    const std::int64_t link = robot.shape[i].link;
-    if (motion.placed_in[i] >= motion.moved_in[link]) return motion.way[i];
-    place_shape(robot, i, placed);
-    motion.placed_in[i] = motion.pose;
-    const Vec3 way{placed.x[i] - motion.x[i], placed.y[i] - motion.y[i], placed.z[i] - motion.z[i]};
-    motion.way[i] = length(way) + motion.turned[link] * motion.arm[i];
-    return motion.way[i];
+double way_of(const Robot& robot, std::int64_t slot, Placed& placed, Motion& motion) {
+    const std::int64_t link = robot.link[slot];
+    if (motion.placed_in[slot] >= motion.moved_in[link]) return motion.way[slot];
+    place_shape(robot, slot, placed);
+    motion.placed_in[slot] = motion.pose;
+    motion.way[slot] = length(three(placed.outline[slot].center - motion.center[slot])) + motion.turned[link] * motion.arm[slot];
+    return motion.way[slot];
 }
 
 double measure_shapes(const Robot& robot, Placed& placed, Motion& motion) {
     double farthest = 0.0;
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) farthest = most(farthest, way_of(robot, i, placed, motion));
+    motion::for_each_shape(robot, [&](std::int64_t i) { farthest = most(farthest, way_of(robot, i, placed, motion)); });
     return farthest;
 }
 
 void place_shapes(const Robot& robot, Placed& placed, Motion& motion) {
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) {
-        if (motion.placed_in[i] >= motion.moved_in[robot.shape[i].link]) continue;
+    motion::for_each_shape(robot, [&](std::int64_t i) {
+        if (motion.placed_in[i] >= motion.moved_in[robot.link[i]]) return;
         place_shape(robot, i, placed);
         motion.placed_in[i] = motion.pose;
-    }
+    });
 }
 
 void bend_links(const Robot& robot, const double* angles, Motion& motion) {
@@ -156,9 +160,12 @@ MOBEE_CALL void mobee_swung(const Robot* robot, const double* then, const double
     motion.fit(*robot);
     std::copy(then, then + robot->joints, motion.angles.begin());
     bend_links(*robot, now, motion);
-    for (const Shape& shape : robot->shape) {
-        for (std::int64_t other = 0; other < robot->links; ++other)
-            *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+    for (const Cluster cluster : robot->cluster) {
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) {
+            const Shape& shape = robot->shape[i];
+            for (std::int64_t other = 0; other < robot->links; ++other)
+                *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+        }
     }
 }
 

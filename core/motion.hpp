@@ -19,23 +19,23 @@ struct Group {
 };
 
 struct Motion {
-    std::int64_t serial = 0;             // of the robot that it fits
-    std::int64_t pose = 0;               // number of the present pose
-    Array<bool> moved;                   // (links,): since the last pose
-    Array<double> last;                  // (joints,): the angles of the last pose
-    Array<std::int64_t> moved_in;        // (links,): the pose in which each has moved last
-    Array<std::int64_t> placed_in;       // (shapes,): the pose in which each has been placed last, see `place_shapes`
+    std::int64_t serial = 0;        // of the robot that it fits
+    std::int64_t pose = 0;          // number of the present pose
+    Array<bool> moved;              // (links,): since the last pose
+    Array<double> last;             // (joints,): the angles of the last pose
+    Array<std::int64_t> moved_in;   // (links,): the pose in which each has moved last
+    Array<std::int64_t> placed_in;  // (slots,): the pose in which each has been placed last, see `place_shapes`
 
     // The earlier pose.
     Array<double> angles;   // (joints,)
     Array<Frame> frame;     // (links,)
-    Array<double> x, y, z;  // (shapes,)
+    Array<Four> center;     // (slots,), of outlines
 
-    Array<double> arm;                // (shapes,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
-    Array<Group> group;
-    Array<std::int64_t> group_of;     // (shapes,)
+    Array<double> arm;                // (slots,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
+    Array<double> way;                // (slots,), see `way_of`
     Array<double> turned;             // (links,): by which a point 1 m from a centre that turns with the link has moved [m]
-    Array<double> way;                // (shapes,), see `way_of`
+    Array<Group> group;
+    Array<std::int64_t> group_of;     // (slots,)
     Array<double> bend, sway, chain;  // (links,), see `bend_links`
 
     void fit(const Robot& robot);
@@ -52,7 +52,7 @@ void remember(const Placed& placed, Motion& motion);
 double measure_groups(const Robot& robot, const Links& links, Motion& motion);
 
 // How far any point of a shape may be from where it was [m], after `measure_groups`; places the shape if its link has moved.
-double way_of(const Robot& robot, std::int64_t shape, Placed& placed, Motion& motion);
+double way_of(const Robot& robot, std::int64_t slot, Placed& placed, Motion& motion);
 
 // The most of all ways; places all shapes.
 double measure_shapes(const Robot& robot, Placed& placed, Motion& motion);

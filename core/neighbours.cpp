@@ -37,7 +37,7 @@ struct Neighbours {
     Pairs pairs;
     Array<Neighbour> list;
     Array<Contact> kept;  // when the list was made
-    Array<Contact> found;
+    Contacts contacts;
     Array<Pair> close;    // pairs of the list that are looked at
     Array<Wrench> wrench;
     Rows rows;
@@ -66,14 +66,14 @@ bool pays(Neighbours& near, double farthest) {
 double way_of_pair(Neighbours& near, Pair pair) {
     const Robot& robot = *near.scene->robot;
     const double way = way_of(robot, pair.first, near.placed, near.motion);
-    return pair.second < robot.shapes() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
+    return pair.second < robot.slots() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
 }
 
 // The same from their groups alone: no less, and it places nothing.
 double way_of_groups(const Neighbours& near, Pair pair) {
     const Motion& motion = near.motion;
     const double way = motion.group[motion.group_of[pair.first]].far;
-    return pair.second < near.scene->robot->shapes() ? way + motion.group[motion.group_of[pair.second]].far : way;
+    return pair.second < near.scene->robot->slots() ? way + motion.group[motion.group_of[pair.second]].far : way;
 }
 
 // How far two shapes of the robot may have come nearer, as seen from the link that carries both.
@@ -87,17 +87,17 @@ double approach(const Neighbours& near, Pair pair) {
 // Collect the listed pairs that may have met, and the contacts of those of which neither has moved.
 void gather(Neighbours& near) {
     near.close.clear();
-    near.found.clear();
+    near.contacts.found.clear();
     bool bent = false;
     for (const Neighbour& one : near.list) {
         if (way_of_groups(near, one.pair) < one.gap) continue;
         const double between = way_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
-            if (one.kept >= 0) near.found.push(near.kept[one.kept]);
+            if (one.kept >= 0) near.contacts.found.push(near.kept[one.kept]);
             continue;
         }
-        if (one.gap > 0.0 && one.pair.second < near.scene->robot->shapes()) {
+        if (one.gap > 0.0 && one.pair.second < near.scene->robot->slots()) {
             if (!bent) bend_links(*near.scene->robot, near.placed.links.angles.data(), near.motion);
             bent = true;
             if (approach(near, one.pair) < one.gap) continue;
@@ -112,27 +112,30 @@ void use_list(Neighbours& near) {
     Contact contact;
     for (const Pair pair : near.close) {
         const double depth = overlap_of(*near.scene, near.placed, pair, touch);
-        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) near.found.push(contact);
+        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) near.contacts.found.push(contact);
     }
 }
 
 void make_list(Neighbours& near) {
     near.list.clear();
-    near.found.clear();
+    near.contacts.found.clear();
     Touch touch;
     Contact contact;
-    for (const Pair pair : near.pairs.list) {
-        const double depth = overlap_of(*near.scene, near.placed, pair, touch);
-        if (-depth >= near.skin) continue;
-        Neighbour one{pair, -depth - margin, -1};
-        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
-            one.kept = static_cast<std::int64_t>(near.found.size());
-            near.found.push(contact);
+    for (const PairList* pairs : {&near.pairs.thick, &near.pairs.others}) {
+        for (std::size_t k = 0; k < pairs->size(); ++k) {
+            const Pair pair{pairs->first[k], pairs->second[k]};
+            const double depth = overlap_of(*near.scene, near.placed, pair, touch);
+            if (-depth >= near.skin) continue;
+            Neighbour one{pair, -depth - margin, -1};
+            if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
+                one.kept = static_cast<std::int64_t>(near.contacts.found.size());
+                near.contacts.found.push(contact);
+            }
+            near.list.push(one);
         }
-        near.list.push(one);
     }
     near.kept.clear();
-    for (const Contact& one : near.found) near.kept.push(one);
+    for (const Contact& one : near.contacts.found) near.kept.push(one);
 }
 
 // Look at all pairs.
@@ -144,8 +147,8 @@ void start_anew(Neighbours& near, bool build) {
     if (build) {
         make_list(near);
     } else {
-        sieve(scene, near.placed, near.pairs.list);
-        find_contacts(scene, near.hands, near.placed, near.pairs.list, near.found);
+        sieve(scene, near.placed, near.pairs);
+        find_contacts(scene, near.hands, near.placed, near.pairs.left, near.contacts.found);
     }
     near.state = build ? Remembered::list : Remembered::pose;
     near.served = 0;
@@ -168,15 +171,15 @@ std::int64_t find(Neighbours& near, const double* q) {
         if (fresh) place_shapes(robot, near.placed, near.motion);
         following::start_anew(near, following::pays(near, farthest));
     }
-    return static_cast<std::int64_t>(near.found.size());
+    return static_cast<std::int64_t>(near.contacts.found.size());
 }
 
 void feel(Neighbours& near, double* torque) {
-    sort_contacts(near.found);
-    project(*near.scene->robot, near.placed.links.frame.data(), near.found, near.cut, near.wrench, torque);
+    sort_contacts(*near.scene, near.contacts);
+    project(*near.scene->robot, near.placed.links.frame.data(), near.contacts.found, near.cut, near.wrench, torque);
 }
 
-const Contact& contact(const Neighbours& near, std::int64_t index) { return near.found[index]; }
+const Contact& contact(const Neighbours& near, std::int64_t index) { return near.contacts.found[index]; }
 
 MOBEE_CALL Neighbours* mobee_neighbours_new(double skin, std::int64_t cut) {
     Neighbours* near = make<Neighbours>();
@@ -203,19 +206,18 @@ MOBEE_CALL void mobee_neighbours_enter(Neighbours* near, const Scene* scene, con
 // Find the contacts in the poses q (poses, motors), one after the other, and what they do, (poses, motors); returns how many there are.
 MOBEE_CALL std::int64_t mobee_follow(Neighbours* near, const double* q, std::int64_t poses, double* torque) {
     const std::int64_t motors = near->scene->robot->motors;
-    near->rows.clear();
+    near->rows.size = 0;
     std::memset(torque, 0, poses * motors * sizeof(double));
     for (std::int64_t b = 0; b < poses; ++b) {
         if (find(*near, q + b * motors) == 0) continue;
         feel(*near, torque + b * motors);
-        near->rows.append(b, near->found);
+        near->rows.append(b, near->contacts.found);
     }
-    return static_cast<std::int64_t>(near->rows.numbers.size());
+    return static_cast<std::int64_t>(near->rows.size);
 }
 
-MOBEE_CALL void mobee_neighbours_rows(Neighbours* near, ContactNumbers* numbers, ContactReals* reals) {
-    near->rows.hand_over(numbers, reals, 0);
-}
+// Give the rows of the last `mobee_follow` away, see `mobee_room_rows`.
+MOBEE_CALL void mobee_neighbours_rows(Neighbours* near, void** arrays) { near->rows.give(arrays); }
 
 // For tests: the state, how many pairs are listed, how many poses the list has served.
 MOBEE_CALL void mobee_neighbours_state(const Neighbours* near, std::int64_t* state) {

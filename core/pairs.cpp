@@ -1,74 +1,112 @@
 #include "pairs.hpp"
 
+#include <bit>
+
+#include "lanes.hpp"
+
 namespace mobee {
 
 namespace pairs {
 
-// The robot's own pairs.  Distances are compared in columns without branches, so that the compiler can use vector instructions; only
-// rows with a hit are looked through.
-void own(const Robot& robot, const Placed& placed, double skin, Array<Pair>& found) {
-    const double *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data();
-    const Outline* outline = placed.outline.data();
-    for (const ClusterPair& two : robot.cluster_pair) {
-        const Ball &a = placed.ball[two.first], &b = placed.ball[two.second];
-        const bool same = two.first == two.second;
-        const double u = a.x - b.x, v = a.y - b.y, w = a.z - b.z, near = a.radius + b.radius + skin;
-        if (!same && u * u + v * v + w * w >= near * near) continue;
-        const Cluster rows = robot.cluster[two.first], columns = robot.cluster[two.second];
-        for (std::int64_t i = rows.first; i < rows.end; ++i) {
-            const double xi = x[i], yi = y[i], zi = z[i], bound = outline[i].bound;
-            const double p = xi - b.x, q = yi - b.y, r = zi - b.z, far = b.radius + bound + skin;
-            if (!same && p * p + q * q + r * r >= far * far) continue;
-            const double* reach = robot.reach.data() + i * robot.shapes();
-            const std::int64_t begin = same ? i + 1 : columns.first, end = columns.end;
-            Pair* pair = found.spare(static_cast<std::size_t>(end - begin));
-            std::size_t count = 0;
-            if (skin > 0.0) {
-                for (std::int64_t j = begin; j < end; ++j) {
-                    const double d = xi - x[j], e = yi - y[j], f = zi - z[j], wide = bound + outline[j].bound + skin;
-                    pair[count] = {static_cast<std::int32_t>(i), static_cast<std::int32_t>(j)};
-                    count += reach[j] >= 0.0 && d * d + e * e + f * f < wide * wide;
-                }
-            } else {
-                std::int64_t hits = 0;
-                for (std::int64_t j = begin; j < end; ++j) {
-                    const double d = xi - x[j], e = yi - y[j], f = zi - z[j];
-                    hits += d * d + e * e + f * f < reach[j];
-                }
-                if (hits == 0) continue;
-                for (std::int64_t j = begin; j < end; ++j) {  // written in any case and kept or not: guessing a branch wrong costs more
-                    const double d = xi - x[j], e = yi - y[j], f = zi - z[j];
-                    pair[count] = {static_cast<std::int32_t>(i), static_cast<std::int32_t>(j)};
-                    count += d * d + e * e + f * f < reach[j];
-                }
-            }
-            found.extend(count);
-        }
+// Eight balls as columns.
+struct Balls {
+    Eight x, y, z, bound;
+};
+
+inline Balls balls_at(const float* x, const float* y, const float* z, const float* bound) {
+    return {load<Eight>(x), load<Eight>(y), load<Eight>(z), load<Eight>(bound)};
+}
+
+// Which of them touch a ball, bit by bit.
+inline unsigned touching(const Ball& ball, const Balls& balls) {
+    const Eight d = ball.x - balls.x, e = ball.y - balls.y, f = ball.z - balls.z, r = ball.radius + balls.bound;
+    return less(d * d + e * e + f * f, r * r);
+}
+
+inline bool touching(const Ball& a, const Ball& b) {
+    const float d = a.x - b.x, e = a.y - b.y, f = a.z - b.z, r = a.radius + b.radius;
+    return d * d + e * e + f * f < r * r;
+}
+
+inline Ball ball_of(const Robot& robot, const Placed& placed, std::int64_t slot, float skin) {
+    return {placed.x[slot], placed.y[slot], placed.z[slot], robot.bound[slot] + skin + placed.margin};
+}
+
+inline EightInts from_number(std::int64_t first) { return EightInts{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int32_t>(first); }
+
+// A list of pairs that is being written.
+struct Writer {
+    PairList& list;
+    std::int32_t *begin, *first, *second;
+
+    Writer(PairList& to, std::int64_t most) : list(to) {
+        begin = first = to.first.spare(static_cast<std::size_t>(most + lanes));
+        second = to.second.spare(static_cast<std::size_t>(most + lanes));
+    }
+    ~Writer() {
+        list.first.extend(static_cast<std::size_t>(first - begin));
+        list.second.extend(static_cast<std::size_t>(first - begin));
+    }
+    void add(std::int64_t one, EightInts others, unsigned which) {
+        const EightInts all = EightInts{} + static_cast<std::int32_t>(one);
+        std::memcpy(first, &all, sizeof all);
+        std::int32_t* end = put(second, others, which);
+        first += end - second;
+        second = end;
+    }
+};
+
+// The pairs of some strips.
+void look_through(const Robot& robot, const Placed& placed, std::int64_t begin, std::int64_t end, float skin, PairList& list) {
+    Writer found(list, (end - begin) * lanes);
+    const float *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data(), *bound = robot.bound.data();
+    const float wider = placed.margin + skin;
+    const Strip* last = robot.strip.data() + end;
+    for (const Strip* strip = robot.strip.data() + begin; strip != last; ++strip) {
+        const std::int64_t i = strip->slot, k = strip->start;
+        const unsigned near = touching({x[i], y[i], z[i], bound[i] + wider}, balls_at(x + k, y + k, z + k, bound + k));
+        found.add(i, from_number(k), near & strip->tested);
     }
 }
 
-void scan(const Scene& scene, const Ball& ball, std::int64_t begin, std::int64_t end, Array<Near>& near) {
-    const double *x = scene.x.data(), *y = scene.y.data(), *z = scene.z.data(), *bound = scene.bound.data();
-    std::int64_t hits = 0;
-    for (std::int64_t k = begin; k < end; ++k) {
-        const double d = ball.x - x[k], e = ball.y - y[k], f = ball.z - z[k], r = ball.radius + bound[k];
-        hits += d * d + e * e + f * f < r * r;
+void own(const Robot& robot, const Placed& placed, float skin, Pairs& pairs) {
+    for (const ClusterPair& two : robot.cluster_pair) {
+        Ball a = placed.ball[two.first];
+        a.radius += skin;
+        if (two.first != two.second && !touching(a, placed.ball[two.second])) continue;
+        look_through(robot, placed, two.thick, two.others, skin, pairs.thick);
+        look_through(robot, placed, two.others, two.end, skin, pairs.others);
     }
-    if (hits == 0) return;
-    Near* next = near.spare(static_cast<std::size_t>(end - begin));
-    std::size_t count = 0;
-    for (std::int64_t k = begin; k < end; ++k) {
-        const double d = ball.x - x[k], e = ball.y - y[k], f = ball.z - z[k], r = ball.radius + bound[k];
-        next[count] = {x[k], y[k], z[k], bound[k], static_cast<std::int32_t>(k)};
-        count += d * d + e * e + f * f < r * r;
+}
+
+// The bits of the lanes from `k` to before `end`.
+inline unsigned before(std::int64_t k, std::int64_t end) { return end - k < lanes ? (1u << (end - k)) - 1u : 0xffu; }
+
+// Add the objects from `begin` to before `end` that touch a ball.
+void scan(const Scene& scene, const Ball& ball, std::int64_t begin, std::int64_t end, Near& near) {
+    for (std::int64_t k = begin; k < end; k += lanes) {
+        const unsigned which = touching(ball, balls_at(&scene.x[k], &scene.y[k], &scene.z[k], &scene.bound[k])) & before(k, end);
+        put(&near.second[near.count], from_number(k), which);
+        near.count += std::popcount(which);
     }
-    near.extend(count);
+}
+
+void fill_columns(const Scene& scene, Near& near) {
+    const auto slots = static_cast<std::int32_t>(scene.robot->slots());
+    for (std::int64_t k = 0; k < near.count; ++k) {
+        const std::int32_t object = near.second[k];
+        near.x[k] = scene.x[object];
+        near.y[k] = scene.y[object];
+        near.z[k] = scene.z[object];
+        near.bound[k] = scene.bound[object];
+        near.second[k] = slots + object;
+    }
 }
 
 // Gather the objects that touch a ball: the large ones, then cell by cell.
-void gather(const Scene& scene, const Ball& ball, Array<Near>& near) {
+void gather(const Scene& scene, const Ball& ball, Near& near) {
     const Grid& grid = scene.grid;
-    near.clear();
+    near.count = 0;
     scan(scene, ball, 0, grid.large, near);
     const double along = ball.radius + grid.widest;
     const Span i = span(ball.x - grid.corner[0], along, grid.per_metre, grid.cells[0]);
@@ -80,38 +118,71 @@ void gather(const Scene& scene, const Ball& ball, Array<Near>& near) {
             scan(scene, ball, cell[i.first], cell[i.end], near);
         }
     }
+    fill_columns(scene, near);
+}
+
+void fit(Near& near, const Scene& scene) {
+    for (Array<float>* column : {&near.x, &near.y, &near.z, &near.bound}) column->resize(scene.x.size());
+    near.second.resize(scene.x.size());
+}
+
+// Put the pairs with objects each where they belong.
+void sort_out(const Scene& scene, const PairList& found, Pairs& pairs) {
+    const Robot& robot = *scene.robot;
+    const auto slots = static_cast<std::int32_t>(robot.slots());
+    const std::size_t count = found.size();
+    std::int32_t *thick_first = pairs.thick.first.spare(count), *thick_second = pairs.thick.second.spare(count);
+    std::int32_t *other_first = pairs.others.first.spare(count), *other_second = pairs.others.second.spare(count);
+    std::size_t both = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+        thick_first[both] = other_first[k - both] = found.first[k];
+        thick_second[both] = other_second[k - both] = found.second[k];
+        both += robot.thick[found.first[k]] && scene.thick[found.second[k] - slots];
+    }
+    pairs.thick.first.extend(both);
+    pairs.thick.second.extend(both);
+    pairs.others.first.extend(count - both);
+    pairs.others.second.extend(count - both);
 }
 
 // The pairs of a shape and a free object; what is near a cluster is gathered once for all of its shapes.
-void with_world(const Scene& scene, const Placed& placed, double skin, Array<Near>& near, Array<Pair>& found) {
+void with_world(const Scene& scene, const Placed& placed, float skin, Pairs& pairs) {
     const Robot& robot = *scene.robot;
-    const auto shapes = static_cast<std::int32_t>(robot.shapes());
+    Near& near = pairs.near;
+    fit(near, scene);
+    pairs.with_world.clear();
     for (std::size_t c = 0; c < robot.cluster.size(); ++c) {
-        Ball ball = placed.ball[c];
-        ball.radius += skin;
-        gather(scene, ball, near);
-        if (near.size() == 0) continue;
-        for (std::int64_t i = robot.cluster[c].first; i < robot.cluster[c].end; ++i) {
+        Ball around = placed.ball[c];
+        around.radius += skin;
+        gather(scene, around, near);
+        if (near.count == 0) continue;
+        const Cluster cluster = robot.cluster[c];
+        Writer found(pairs.with_world, (cluster.end - cluster.first) * near.count);
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) {
             if (!robot.shape[i].meets_world) continue;
-            const double xi = placed.x[i], yi = placed.y[i], zi = placed.z[i], bound = placed.outline[i].bound + skin;
-            Pair* pair = found.spare(near.size());
-            std::size_t count = 0;
-            for (const Near& one : near) {
-                const double d = xi - one.x, e = yi - one.y, f = zi - one.z, r = bound + one.bound;
-                pair[count] = {static_cast<std::int32_t>(i), shapes + one.object};
-                count += d * d + e * e + f * f < r * r;
+            const Ball ball = ball_of(robot, placed, i, skin);
+            for (std::int64_t k = 0; k < near.count; k += lanes) {
+                const unsigned which = touching(ball, balls_at(&near.x[k], &near.y[k], &near.z[k], &near.bound[k])) & before(k, near.count);
+                found.add(i, load<EightInts>(&near.second[k]), which);
             }
-            found.extend(count);
         }
     }
+    sort_out(scene, pairs.with_world, pairs);
 }
 
 }  // namespace pairs
 
+void PairList::clear() {
+    first.clear();
+    second.clear();
+}
+
 void find_pairs(const Scene& scene, const Placed& placed, double skin, Pairs& pairs) {
-    pairs.list.clear();
-    pairs::own(*scene.robot, placed, skin, pairs.list);
-    if (scene.objects() > 0) pairs::with_world(scene, placed, skin, pairs.near, pairs.list);
+    const float wide = skin > 0.0 ? roomy(skin) : 0.0f;
+    pairs.thick.clear();
+    pairs.others.clear();
+    pairs::own(*scene.robot, placed, wide, pairs);
+    if (scene.objects() > 0) pairs::with_world(scene, placed, wide, pairs);
 }
 
 }  // namespace mobee

@@ -8,27 +8,39 @@
 
 namespace mobee {
 
-// A shape, and a shape or, from the number of shapes on, a free object.
+// A slot of the robot, and another or, from the number of slots on, a free object.
 struct Pair {
     std::int32_t first = 0, second = 0;
 };
 
-// What is near one cluster.
+// Pairs that are being listed: for each the first and the second.
+struct PairList {
+    Array<std::int32_t> first, second;
+
+    std::size_t size() const { return first.size(); }
+    void clear();
+};
+
+// The free objects near one cluster, as columns.
 struct Near {
-    double x, y, z, bound;
-    std::int32_t object;
+    Array<float> x, y, z, bound;
+    Array<std::int32_t> second;  // each of them as the second of a pair
+    std::int64_t count = 0;
 };
 
 // The pairs of one pose, and what finding them needs; kept from pose to pose, for fresh memory costs more than the search.
 struct Pairs {
-    Array<Pair> list;
-    Array<Near> near;
+    PairList thick;       // two volumes about their cores, see `Outline`
+    PairList others;      // a box or a hull with whatever
+    Array<Pair> left;     // by the sieve
+    PairList with_world;  // what touches an object, before it is put where it belongs
+    Near near;
 };
 
-// Put the pairs in the list whose balls are nearer than the skin [m].
+// Find the pairs whose balls are nearer than the skin [m].
 void find_pairs(const Scene& scene, const Placed& placed, double skin, Pairs& pairs);
 
-// Keep those of the pairs that may overlap, in their order: most of those whose balls do have nothing to do with each other.
-void sieve(const Scene& scene, Placed& placed, Array<Pair>& pairs);
+// Leave those of the pairs that may overlap: most of those whose balls do have nothing to do with each other.
+void sieve(const Scene& scene, Placed& placed, Pairs& pairs);
 
 }  // namespace mobee

@@ -1,92 +1,123 @@
 #include "placed.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "interface.hpp"
+#include "lanes.hpp"
 
 namespace mobee {
-
-Outline outline_of(const Volume& volume) {
-    return {four(volume.center), four(volume.core), volume.radius, volume.bound, volume.squared, volume.inverse, volume.kind};
-}
 
 void Placed::fit(const Robot& robot) {
     if (serial == robot.serial) return;
     links.fit(robot);
-    const std::size_t shapes = robot.shape.size();
-    outline.resize(shapes);
-    volume.resize(shapes);
-    whole.resize(shapes);
-    for (Array<double>* column : {&x, &y, &z}) column->resize(shapes);
+    const std::size_t slots = robot.shape.size();
+    outline = Array<Outline>(robot.outline.data(), slots);
+    volume.resize(slots);
+    box.resize(slots);
+    whole.resize(slots);
+    for (Array<float>* column : {&x, &y, &z}) {
+        column->resize(slots);
+        std::fill(column->begin(), column->end(), 0.0f);
+    }
     ball.resize(robot.cluster.size());
-    for (std::size_t i = 0; i < shapes; ++i) {
+    for (std::size_t i = 0; i < slots; ++i) {
         volume[i] = robot.shape[i].volume;
-        outline[i] = outline_of(volume[i]);
+        box[i].half = box_of(volume[i]).half;
         whole[i] = false;
     }
     serial = robot.serial;
 }
 
-void place_shape(const Robot& robot, std::int64_t i, Placed& placed) {
-    const Shape& shape = robot.shape[i];
-    const Frame& frame = placed.links.frame[shape.link];
-    Outline& outline = placed.outline[i];
-    outline.center = moved(frame, shape.volume.center);
-    outline.core = turned(frame, shape.volume.core);
-    placed.x[i] = outline.center[0];
-    placed.y[i] = outline.center[1];
-    placed.z[i] = outline.center[2];
-    placed.whole[i] = false;
+namespace placing {
+
+constexpr double farthest = 1e15;  // m: beyond it squares would leave single precision
+
+// The centres as columns, and by how much they may be rounded.
+void fill_columns(const Robot& robot, Placed& placed) {
+    Four far{};
+    for (const Cluster cluster : robot.cluster) {
+        for (std::int64_t i = cluster.first; i < cluster.end; i += 4) {  // four slots at once, those behind the last shape too
+            Four a = placed.outline[i].center, b = placed.outline[i + 1].center, c = placed.outline[i + 2].center, d = placed.outline[i + 3].center;
+            transpose(a, b, c, d);
+            far = most_of(most_of(absolute_of(a), absolute_of(b)), most_of(absolute_of(c), far));
+            store_single(&placed.x[i], a);
+            store_single(&placed.y[i], b);
+            store_single(&placed.z[i], c);
+        }
+    }
+    const double most_far = most(most(far[0], far[1]), most(far[2], far[3]));
+    placed.margin = roomy(0.0, most_far);
+    if (most_far < farthest) return;
+    placed.margin = std::numeric_limits<float>::infinity();  // every pair is near
+    for (Array<float>* column : {&placed.x, &placed.y, &placed.z}) std::fill(column->begin(), column->end(), 0.0f);
+}
+
+}  // namespace placing
+
+void place_shape(const Robot& robot, std::int64_t slot, Placed& placed) {
+    const Frame& f = placed.links.frame[robot.link[slot]];
+    const Four own = robot.outline[slot].center, core = robot.outline[slot].core;
+    const Four center = own[0] * f.x + own[1] * f.y + own[2] * f.z + f.shift;
+    placed.outline[slot].center = with_fourth(center, own);
+    if (core[3] > 0.0) placed.outline[slot].core = with_fourth(core[0] * f.x + core[1] * f.y + core[2] * f.z, core);
+    placed.whole[slot] = false;
 }
 
 void place(const Robot& robot, Placed& placed) {
     place_links(robot, nullptr, placed.links);
-    for (std::int64_t i = 0; i < robot.shapes(); ++i) place_shape(robot, i, placed);
+    for (const Cluster cluster : robot.cluster)
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) place_shape(robot, i, placed);
 }
 
 void bound_clusters(const Robot& robot, Placed& placed) {
-    const double *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data();
+    placing::fill_columns(robot, placed);
     for (std::size_t c = 0; c < robot.cluster.size(); ++c) {
         const Cluster cluster = robot.cluster[c];
-        Ball ball;
-        for (std::int64_t i = cluster.first; i < cluster.end; ++i) ball.x += x[i], ball.y += y[i], ball.z += z[i];
-        const double share = 1.0 / static_cast<double>(cluster.end - cluster.first);
-        ball.x *= share;
-        ball.y *= share;
-        ball.z *= share;
-        for (std::int64_t i = cluster.first; i < cluster.end; ++i) {
-            const double d = x[i] - ball.x, e = y[i] - ball.y, f = z[i] - ball.z;
-            ball.radius = most(ball.radius, std::sqrt(d * d + e * e + f * f) + placed.outline[i].bound);
+        Four sum{};
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) sum += placed.outline[i].center;
+        sum *= 1.0 / static_cast<double>(cluster.end - cluster.first);
+        Ball ball{static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2]), 0.0f};
+        Eight radius{};
+        for (std::int64_t k = cluster.first; k < cluster.end; k += lanes) {
+            const Eight d = load<Eight>(&placed.x[k]) - ball.x, e = load<Eight>(&placed.y[k]) - ball.y, f = load<Eight>(&placed.z[k]) - ball.z;
+            const Eight here = root_of(d * d + e * e + f * f) + load<Eight>(&robot.bound[k]);
+            radius = here > radius ? here : radius;
         }
-        ball.radius = roomy(ball.radius);
+        for (int k = 0; k < lanes; ++k) ball.radius = radius[k] > ball.radius ? radius[k] : ball.radius;
+        ball.radius = roomy(ball.radius) + placed.margin;
         placed.ball[c] = ball;
     }
 }
 
-const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t i) {
-    Volume& volume = placed.volume[i];
-    if (placed.whole[i]) return volume;
-    const Volume& own = robot.shape[i].volume;
-    const Frame& frame = placed.links.frame[robot.shape[i].link];
-    volume.center = three(placed.outline[i].center);
-    volume.core = three(placed.outline[i].core);
-    for (int column = 0; column < 3; ++column) {
-        const Vec3 axis = turn(frame, own.rotation.column(column));
-        volume.rotation.m[column] = axis.x;
-        volume.rotation.m[3 + column] = axis.y;
-        volume.rotation.m[6 + column] = axis.z;
-    }
-    placed.whole[i] = true;
+const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t slot) {
+    Volume& volume = placed.volume[slot];
+    if (placed.whole[slot]) return volume;
+    const Volume& own = robot.shape[slot].volume;
+    const Frame& frame = placed.links.frame[robot.shape[slot].link];
+    Four x = turned(frame, own.rotation.column(0)), y = turned(frame, own.rotation.column(1)), z = turned(frame, own.rotation.column(2)), w{};
+    transpose(x, y, z, w);
+    Box& box = placed.box[slot];
+    box.row[0] = x;
+    box.row[1] = y;
+    box.row[2] = z;
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) volume.rotation.m[3 * row + column] = box.row[row][column];
+    volume.center = three(placed.outline[slot].center);
+    volume.core = three(placed.outline[slot].core);
+    placed.whole[slot] = true;
     return volume;
 }
 
-// For tests: all shapes (shapes,) at q (motors,), in the order of clusters.
+// For tests: all shapes at q (motors,), in the order of clusters.
 MOBEE_CALL void mobee_place(const Robot* robot, const double* q, Volume* out) {
     Placed placed;
     placed.fit(*robot);
     joint_angles(*robot, q, placed.links.angles.data());
     place(*robot, placed);
-    for (std::int64_t i = 0; i < robot->shapes(); ++i) out[i] = placed_volume(*robot, placed, i);
+    for (const Cluster cluster : robot->cluster)
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) *out++ = placed_volume(*robot, placed, i);
 }
 
 }  // namespace mobee

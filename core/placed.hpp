@@ -8,29 +8,18 @@
 
 namespace mobee {
 
-// What is read of a volume before anything is known of its neighbours: a segment, a point if it has no core, and how far the volume
-// reaches from it.
-struct Outline {
-    Four center, core;
-    double radius = 0.0, bound = 0.0, squared = 0.0, inverse = 0.0;  // see `Volume`
-    Kind kind = Kind::sphere;
-};
-
-Outline outline_of(const Volume& volume);
-
 struct Ball {
-    double x = 0.0, y = 0.0, z = 0.0, radius = 0.0;
+    float x = 0.0f, y = 0.0f, z = 0.0f, radius = 0.0f;
 };
-
-// A radius of the broad phase: larger by more than rounding, so that it hides nothing that the narrow phase would find.
-inline double roomy(double radius) { return radius * (1.0 + 1e-9) + 1e-9; }
 
 struct Placed {
     Links links;
-    Array<Outline> outline;  // (shapes,)
-    Array<double> x, y, z;   // (shapes,): the centres once more, as columns
+    Array<Outline> outline;  // (slots,)
+    Array<float> x, y, z;    // (slots,): the centres once more, as columns
+    float margin = 0.0f;     // m: more than single precision rounds here
     Array<Ball> ball;        // (clusters,): each holds the shapes of one
-    Array<Volume> volume;    // (shapes,): those that are `whole` have been placed; see `placed_volume`
+    Array<Volume> volume;    // (slots,): those that are `whole` have been placed, see `placed_volume`
+    Array<Box> box;          // (slots,): like `volume`
     Array<bool> whole;
     std::int64_t serial = 0;  // of the robot that it fits
 
@@ -48,6 +37,6 @@ void place_shape(const Robot& robot, std::int64_t shape, Placed& placed);
 void bound_clusters(const Robot& robot, Placed& placed);
 
 // A shape, placed wholly when it is first asked for: few of them come near another.
-const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t shape);
+const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t slot);
 
 }  // namespace mobee

@@ -1,9 +1,10 @@
 #include "robot.hpp"
 
 #include <atomic>
+#include <limits>
 
 #include "interface.hpp"
-#include "placed.hpp"
+#include "lanes.hpp"
 
 namespace mobee {
 
@@ -57,7 +58,7 @@ void set_joints(Robot& robot, const RobotTables& from) {
 
 // For every joint how far it is from the one before, for every shape how far its points are from the joint of its link: between the
 // points of their axes that are nearest to the joint before, the base's is its origin.
-void set_levers(Robot& robot, const RobotTables& from) {
+void set_levers(Robot& robot) {
     Array<Vec3> at(robot.links);
     robot.span.resize(robot.joints);
     for (std::int64_t j = 0; j < robot.joints; ++j) {
@@ -66,8 +67,7 @@ void set_levers(Robot& robot, const RobotTables& from) {
         at[j + 1] = joint.point + dot(before - joint.point, joint.axis) * joint.axis;
         robot.span[j] = length(at[j + 1] - before);
     }
-    for (std::int64_t i = 0; i < from.shapes; ++i) {
-        Shape& shape = robot.shape[i];
+    for (Shape& shape : robot.shape) {
         const Volume& volume = shape.volume;
         const bool rounded = volume.kind <= Kind::capsule;
         shape.lever = length(volume.center - at[shape.link]) + volume.bound - (rounded ? volume.radius : 0.0);
@@ -89,33 +89,61 @@ void set_shapes(Robot& robot, const RobotTables& from) {
     robot.corner = Array<Vec3>(from.corner, from.corners);
     robot.edge_start = Array<std::int32_t>(from.edge_start, from.corners + 1);
     robot.edge = Array<std::int32_t>(from.edge, from.edges);
-    robot.shape.resize(from.shapes);
-    for (std::int64_t i = 0; i < from.shapes; ++i) {
-        Shape& shape = robot.shape[i];
-        shape.volume = volume_of(from.volume[i], robot);
-        shape.link = from.link[i];
-        shape.name = from.name[i];
-        shape.field = from.field[i] != 0;
-        shape.meets_world = from.meets_world[i] != 0;
+    std::int64_t slots = 0;
+    for (std::int64_t c = 0; c < from.clusters; ++c) {
+        const std::int64_t count = from.cluster[c + 1] - from.cluster[c];
+        robot.cluster.push({slots, slots + count});
+        slots += (count + lanes - 1) / lanes * lanes;
+    }
+    robot.shape.resize(slots);
+    robot.outline.resize(slots);
+    robot.link.resize(slots);
+    robot.bound.resize(slots);
+    for (float& bound : robot.bound) bound = -std::numeric_limits<float>::max();
+    robot.thick.resize(slots);
+    for (std::int64_t c = 0; c < from.clusters; ++c) {
+        for (std::int64_t k = 0; k < from.cluster[c + 1] - from.cluster[c]; ++k) {
+            const std::int64_t slot = robot.cluster[c].first + k, i = from.cluster[c] + k;
+            Shape& shape = robot.shape[slot];
+            shape.volume = volume_of(from.volume[i], robot);
+            shape.link = from.link[i];
+            shape.name = from.name[i];
+            shape.field = from.field[i] != 0;
+            shape.meets_world = from.meets_world[i] != 0;
+            robot.outline[slot] = outline_of(shape.volume);
+            robot.link[slot] = shape.link;
+            robot.bound[slot] = roomy(shape.volume.bound);
+            robot.thick[slot] = is_thick(shape.volume.kind);
+        }
+    }
+}
+
+// Add the strips of two clusters with pairs of which both are thick, or of all others.
+void add_strips(Robot& robot, const RobotTables& from, std::int64_t a, std::int64_t b, bool thick) {
+    const Cluster rows = robot.cluster[a], columns = robot.cluster[b];
+    for (std::int64_t i = rows.first; i < rows.end; ++i) {
+        const unsigned char* tested = from.tested + (from.cluster[a] + i - rows.first) * from.shapes + from.cluster[b];
+        for (std::int64_t start = columns.first; start < columns.end; start += lanes) {
+            Strip strip{static_cast<std::int32_t>(i), static_cast<std::int32_t>(start), 0};
+            for (std::int64_t j = start; j < columns.end && j < start + lanes; ++j) {
+                const bool wanted = (robot.thick[i] && robot.thick[j]) == thick && (a != b || i < j);
+                if (wanted && tested[j - columns.first] != 0) strip.tested |= 1u << (j - start);
+            }
+            if (strip.tested != 0) robot.strip.push(strip);
+        }
     }
 }
 
 void set_pairs(Robot& robot, const RobotTables& from) {
-    const std::int64_t shapes = from.shapes;
-    robot.reach.resize(shapes * shapes);
-    for (std::int64_t i = 0; i < shapes; ++i) {
-        for (std::int64_t j = 0; j < shapes; ++j) {
-            const double near = roomy(robot.shape[i].volume.bound + robot.shape[j].volume.bound);
-            robot.reach[i * shapes + j] = from.tested[i * shapes + j] != 0 ? near * near : -1.0;
-        }
-    }
-    for (std::int64_t c = 0; c < from.clusters; ++c) robot.cluster.push({from.cluster[c], from.cluster[c + 1]});
+    const auto strips = [&] { return static_cast<std::int64_t>(robot.strip.size()); };
     for (std::int64_t a = 0; a < from.clusters; ++a) {
         for (std::int64_t b = a; b < from.clusters; ++b) {
-            bool tested = false;
-            for (std::int64_t i = robot.cluster[a].first; i < robot.cluster[a].end; ++i)
-                for (std::int64_t j = robot.cluster[b].first; j < robot.cluster[b].end; ++j) tested |= robot.reach[i * shapes + j] > 0.0;
-            if (tested) robot.cluster_pair.push({a, b});
+            ClusterPair pair{a, b, strips(), 0, 0};
+            add_strips(robot, from, a, b, true);
+            pair.others = strips();
+            add_strips(robot, from, a, b, false);
+            pair.end = strips();
+            if (pair.end > pair.thick) robot.cluster_pair.push(pair);
         }
     }
 }
@@ -154,6 +182,23 @@ Volume volume_of(const VolumeRow& row, const Robot& owner) {
     return volume;
 }
 
+Outline outline_of(const Volume& volume) {
+    const Vec3 c = volume.center, u = volume.core;
+    return {Four{c.x, c.y, c.z, volume.radius}, Four{u.x, u.y, u.z, volume.inverse}};
+}
+
+Box box_of(const Volume& volume) {
+    Vec3 half = volume.half;
+    if (volume.kind == Kind::convex) {
+        for (std::int32_t k = 0; k < volume.hull.count; ++k) {
+            const Vec3 corner = volume.hull.corners[k];
+            half = {most(half.x, std::fabs(corner.x)), most(half.y, std::fabs(corner.y)), most(half.z, std::fabs(corner.z))};
+        }
+    }
+    const double* m = volume.rotation.m;
+    return {{Four{m[0], m[1], m[2], 0.0}, Four{m[3], m[4], m[5], 0.0}, Four{m[6], m[7], m[8], 0.0}}, four(half)};
+}
+
 MOBEE_CALL Robot* mobee_robot_new(const RobotTables* from) {
     Robot* robot = make<Robot>();
     robot->serial = robots::next_serial();
@@ -164,7 +209,7 @@ MOBEE_CALL Robot* mobee_robot_new(const RobotTables* from) {
     robot->own_shapes = from->own_shapes;
     robots::set_joints(*robot, *from);
     robots::set_shapes(*robot, *from);
-    robots::set_levers(*robot, *from);
+    robots::set_levers(*robot);
     robots::set_common(*robot);
     robots::set_pairs(*robot, *from);
     return robot;

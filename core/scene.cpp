@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "interface.hpp"
+#include "lanes.hpp"
 
 namespace mobee {
 
@@ -44,7 +45,7 @@ Small small_ones(const WorldTables& from) {
         const VolumeRow& row = from.volume[i];
         if (!is_free(from.role[i]) || row.bound > small.usual) continue;
         ++small.count;
-        small.widest = most(small.widest, roomy(row.bound));
+        small.widest = most(small.widest, row.bound);
         for (int axis = 0; axis < 3; ++axis) {
             small.low[axis] = least(small.low[axis], row.position[axis]);
             small.high[axis] = most(small.high[axis], row.position[axis]);
@@ -79,14 +80,20 @@ std::int64_t cell_of(const Grid& grid, Vec3 center) {
     return number;
 }
 
+// In single precision, and no farther than what its squares can say; nothing near is as far.
+float single(double place) { return static_cast<float>(clamp(place, -1e15, 1e15)); }
+
 void put(Scene& scene, const WorldTables& from, std::int64_t which, std::int64_t place) {
     const Volume volume = volume_of(from.volume[which], *scene.robot);
     scene.volume[place] = volume;
     scene.outline[place] = outline_of(volume);
-    scene.x[place] = volume.center.x;
-    scene.y[place] = volume.center.y;
-    scene.z[place] = volume.center.z;
-    scene.bound[place] = roomy(volume.bound);
+    scene.box[place] = box_of(volume);
+    scene.thick[place] = is_thick(volume.kind);
+    const Vec3 c = volume.center;
+    scene.x[place] = single(c.x);
+    scene.y[place] = single(c.y);
+    scene.z[place] = single(c.z);
+    scene.bound[place] = roomy(volume.bound, most(most(std::fabs(single(c.x)), std::fabs(single(c.y))), std::fabs(single(c.z))));
     scene.name[place] = which;
     scene.target[place] = from.role[which] == target;
 }
@@ -108,7 +115,9 @@ void sort_objects(Scene& scene, const WorldTables& from, double usual) {
     for (std::size_t c = 1; c < grid.starts.size(); ++c) grid.starts[c] += grid.starts[c - 1];
     scene.volume.resize(number);
     scene.outline.resize(number);
-    for (Array<double>* column : {&scene.x, &scene.y, &scene.z, &scene.bound}) column->resize(number);
+    scene.box.resize(number);
+    scene.thick.resize(number);
+    for (Array<float>* column : {&scene.x, &scene.y, &scene.z, &scene.bound}) column->resize(number + lanes);
     scene.name.resize(number);
     scene.target.resize(number);
     Array<std::int64_t> next(grid.starts.data(), grid.starts.size());
@@ -166,7 +175,7 @@ MOBEE_CALL void mobee_scene_objects(const Scene* scene, std::int64_t* starts, st
     for (std::int64_t k = 0; k < scene->objects(); ++k) {
         objects[2 * k] = scene->name[k];
         objects[2 * k + 1] = scene->target[k];
-        centers[k] = {scene->x[k], scene->y[k], scene->z[k]};
+        centers[k] = scene->volume[k].center;
     }
 }
 

@@ -34,7 +34,9 @@ struct Scene {
     Grid grid;
     Array<Volume> volume;         // (objects,), in the order of the grid
     Array<Outline> outline;       // (objects,)
-    Array<double> x, y, z, bound;  // (objects,): their balls, as columns
+    Array<Box> box;               // (objects,)
+    Array<bool> thick;            // (objects,): no boxes, see `Outline`
+    Array<float> x, y, z, bound;  // (objects + lanes,): their balls, as columns; what is behind them means nothing
     Array<std::int64_t> name;     // (objects,): which of the world's objects each is
     Array<bool> target;           // (objects,)
     Array<std::int64_t> carried;  // which of the world's objects the robot carries

@@ -1,8 +1,10 @@
 // Drops most pairs whose balls overlap though the volumes do not.
 //
 // A pair is only dropped when a separating direction or the exact distance says so by a margin; what is left, the narrow phase decides.
+#include <bit>
 #include <cmath>
 
+#include "lanes.hpp"
 #include "pairs.hpp"
 
 namespace mobee {
@@ -12,89 +14,119 @@ namespace sieves {
 constexpr double margin = 1e-9;  // m: far above rounding, far below what costs time
 constexpr double tiny = 1e-30;
 
-inline double squared(Vec3 v) { return dot(v, v); }
-inline Vec3 absolute(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
+// The outlines of slots and, behind them, of objects.
+struct Outlines {
+    const Outline *of_slots, *of_objects;
+    std::int32_t slots;
 
-// Squared distance of the point w from the segment -v .. v.
-inline double point_segment(Vec3 w, Vec3 v, double inverse) {
-    const double t = unit(dot(v, w) * inverse);
-    return squared(w - t * v);
+    const Outline& operator[](std::int32_t k) const { return k < slots ? of_slots[k] : of_objects[k - slots]; }
+};
+
+inline Outlines outlines_of(const Scene& scene, const Placed& placed) {
+    return {placed.outline.data(), scene.outline.data(), static_cast<std::int32_t>(scene.robot->slots())};
 }
 
-// Squared distance of the segments w - u .. w + u and -v .. v; parallel ones too, for t and s follow each other.
-inline double segment_segment(Vec3 w, const Outline& one, const Outline& two) {
-    const Vec3 u = three(one.core), v = three(two.core);
-    const double b = dot(u, v), c = dot(u, w), f = dot(v, w);
-    double s = unit((b * f - c * two.squared) / most(one.squared * two.squared - b * b, tiny));
-    const double t = unit((b * s + f) * two.inverse);
-    s = unit((b * t - c) * one.inverse);
-    return squared(w + s * u - t * v);
-}
+// Four segments, each beside another: from the middle of the second to that of the first, both halves, and 1 over their squares; and how
+// far the two volumes reach together.
+struct FourPairs {
+    Four wx, wy, wz, reach;
+    Four ux, uy, uz, per_a;
+    Four vx, vy, vz, per_e;
+};
 
-// Squared distance of a point from a box about the origin.
-inline double point_box(Vec3 p, Vec3 half) {
-    const Vec3 q = absolute(p);
-    return squared({most(q.x - half.x, 0.0), most(q.y - half.y, 0.0), most(q.z - half.z, 0.0)});
-}
-
-// False if the segment c - k .. c + k is farther than `reach` from a box about the origin: shown by the box's own axes, or by the
-// direction between two points found by going to and fro twice.
-inline bool segment_near_box(Vec3 c, Vec3 k, double inverse, Vec3 half, double reach) {
-    const Vec3 in = absolute(c), along = absolute(k);
-    const Vec3 end{most(in.x - along.x, 0.0), most(in.y - along.y, 0.0), most(in.z - along.z, 0.0)};
-    if (point_box(end, half) > reach * reach) return false;
-    double s = unit(-dot(c, k) * inverse);
-    Vec3 n;
-    for (int round = 0; round < 2; ++round) {
-        const Vec3 p = c + s * k;
-        const Vec3 q{clamp(p.x, -half.x, half.x), clamp(p.y, -half.y, half.y), clamp(p.z, -half.z, half.z)};
-        s = unit(dot(q - c, k) * inverse);
-        n = c + s * k - q;
+inline FourPairs four_pairs(const Outlines& outlines, const std::int32_t* first, const std::int32_t* second) {
+    constexpr Four turn{-1.0, -1.0, -1.0, 1.0};
+    Four w[4], u[4], v[4];
+    for (int k = 0; k < 4; ++k) {
+        const Outline &one = outlines.of_slots[first[k]], &two = outlines[second[k]];
+        w[k] = one.center + turn * two.center;
+        u[k] = one.core;
+        v[k] = two.core;
     }
-    const double gap = dot(n, c) - std::fabs(dot(n, k)) - dot(absolute(n), half);
-    return gap <= 0.0 || gap * gap < reach * reach * squared(n);
+    transpose(w[0], w[1], w[2], w[3]);
+    transpose(u[0], u[1], u[2], u[3]);
+    transpose(v[0], v[1], v[2], v[3]);
+    return {w[0], w[1], w[2], w[3], u[0], u[1], u[2], u[3], v[0], v[1], v[2], v[3]};
+}
+
+// Which of them are nearer than they reach.  Of parallel segments, too: t and s follow each other.
+inline unsigned near_each_other(const FourPairs& p) {
+    const Four b = p.ux * p.vx + p.uy * p.vy + p.uz * p.vz;
+    const Four c = (p.ux * p.wx + p.uy * p.wy + p.uz * p.wz) * p.per_a, f = (p.vx * p.wx + p.vy * p.wy + p.vz * p.wz) * p.per_e;
+    const Four b_a = b * p.per_a, b_e = b * p.per_e;
+    Four s = unit_of((b_a * f - c) / most_of(1.0 - b_a * b_e, Four{} + tiny));
+    const Four t = unit_of(b_e * s + f);
+    s = unit_of(b_a * t - c);
+    const Four x = p.wx + s * p.ux - t * p.vx, y = p.wy + s * p.uy - t * p.vy, z = p.wz + s * p.uz - t * p.vz;
+    const Four reach = p.reach + margin;
+    return less(x * x + y * y + z * z, reach * reach);
+}
+
+void thick_ones(const Scene& scene, const Placed& placed, PairList& pairs, Array<Pair>& left) {
+    const std::size_t count = pairs.size();
+    std::int32_t *first = pairs.first.data(), *second = pairs.second.data();
+    for (std::size_t k = count; k % 4 != 0; ++k) first[k] = second[k] = 0;  // there is room for them
+    Pair* to = left.spare(count);
+    const Pair* begin = to;
+    const Outlines outlines = outlines_of(scene, placed);
+    for (std::size_t k = 0; k < count; k += 4) {
+        unsigned near = near_each_other(four_pairs(outlines, first + k, second + k));
+        if (count - k < 4) near &= (1u << (count - k)) - 1u;
+        for (; near != 0; near &= near - 1) {
+            const std::size_t which = k + static_cast<std::size_t>(std::countr_zero(near));
+            *to++ = {first[which], second[which]};
+        }
+    }
+    left.extend(static_cast<std::size_t>(to - begin));
+}
+
+inline Four into(const Box& box, Four v) { return v[0] * box.row[0] + v[1] * box.row[1] + v[2] * box.row[2]; }
+
+// Whether the segment c - k .. c + k is nearer than `reach` to a box about the origin, as its own axes say.
+inline bool segment_near_box(Four c, Four k, Four half, double reach) {
+    const Four none{};
+    const Four beyond = most_of(most_of(absolute_of(c) - absolute_of(k), none) - half, none);
+    return sum_of_three(beyond * beyond) < reach * reach;
 }
 
 // Whether two boxes overlap along the line of their centres.
-inline bool boxes_near(Vec3 w, const Volume& one, const Volume& two) {
-    const Vec3 c = into(two.rotation, w), d = into(one.rotation, w);
-    return squared(w) - margin < dot(one.half, absolute(d)) + dot(two.half, absolute(c));
+inline bool boxes_near(Four w, const Box& one, const Box& two) {
+    const Four along = one.half * absolute_of(into(one, w)) + two.half * absolute_of(into(two, w));
+    return sum_of_three(w * w) - margin < sum_of_three(along);
+}
+
+void others(const Scene& scene, Placed& placed, const PairList& pairs, Array<Pair>& left) {
+    const Robot& robot = *scene.robot;
+    const auto slots = static_cast<std::int32_t>(robot.slots());
+    const auto box_at = [&](std::int32_t slot) -> const Box& {
+        if (slot >= slots) return scene.box[slot - slots];
+        placed_volume(robot, placed, slot);
+        return placed.box[slot];
+    };
+    const auto thick_at = [&](std::int32_t slot) { return is_thick(slot < slots ? robot.shape[slot].volume.kind : scene.volume[slot - slots].kind); };
+    const Outlines outlines = outlines_of(scene, placed);
+    Pair* to = left.spare(pairs.size());
+    const Pair* begin = to;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+        std::int32_t a = pairs.first[k], b = pairs.second[k];
+        if (thick_at(b)) std::swap(a, b);
+        const Outline &one = outlines[a], &two = outlines[b];
+        const Box& box = box_at(b);
+        const Four w = with_fourth(one.center - two.center, Four{});
+        const bool near = thick_at(a) ? segment_near_box(into(box, w), into(box, one.core), box.half, one.center[3] + margin)
+                                      : boxes_near(w, box_at(a), box);
+        *to = {pairs.first[k], pairs.second[k]};
+        to += near;
+    }
+    left.extend(static_cast<std::size_t>(to - begin));
 }
 
 }  // namespace sieves
 
-void sieve(const Scene& scene, Placed& placed, Array<Pair>& list) {
-    const Robot& robot = *scene.robot;
-    const auto shapes = static_cast<std::int32_t>(robot.shapes());
-    std::size_t kept = 0;
-    for (const Pair pair : list) {
-        list[kept] = pair;
-        std::int32_t a = pair.first, b = pair.second;
-        const Outline* one = &placed.outline[a];
-        const Outline* two = b < shapes ? &placed.outline[b] : &scene.outline[b - shapes];
-        if (one->kind > two->kind) {
-            std::swap(one, two);
-            std::swap(a, b);
-        }
-        const Vec3 w = three(one->center - two->center);
-        const double reach = one->radius + two->radius + sieves::margin;
-        const auto volume = [&](std::int32_t i) -> const Volume& {
-            return i < shapes ? placed_volume(robot, placed, i) : scene.volume[i - shapes];
-        };
-        bool near = true;
-        if (two->kind <= Kind::capsule) {
-            near = (one->kind == Kind::sphere ? sieves::point_segment(w, three(two->core), two->inverse)
-                                              : sieves::segment_segment(w, *one, *two)) < reach * reach;
-        } else if (two->kind == Kind::box) {
-            const Volume& box = volume(b);
-            const Vec3 c = into(box.rotation, w);
-            if (one->kind == Kind::sphere) near = sieves::point_box(c, box.half) < reach * reach;
-            if (one->kind == Kind::capsule) near = sieves::segment_near_box(c, into(box.rotation, three(one->core)), one->inverse, box.half, reach);
-            if (one->kind == Kind::box) near = sieves::boxes_near(w, volume(a), box);
-        }
-        kept += near;
-    }
-    list.shorten(kept);
+void sieve(const Scene& scene, Placed& placed, Pairs& pairs) {
+    pairs.left.clear();
+    sieves::thick_ones(scene, placed, pairs.thick, pairs.left);
+    sieves::others(scene, placed, pairs.others, pairs.left);
 }
 
 }  // namespace mobee

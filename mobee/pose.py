@@ -21,7 +21,7 @@ class Finder(Protocol):
     """What finds contacts."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
+        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape."""
 
 
 class Engine(Protocol):
@@ -34,7 +34,7 @@ class Engine(Protocol):
         """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
+        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape."""
 
 
 class Pose:
@@ -42,6 +42,8 @@ class Pose:
 
     `q`: (..., n) rad.  What is asked for is computed when it is first asked for, and kept.
     """
+
+    __slots__ = ("_contacts", "_engine", "_felt", "_reaching", "_snapshot", "_threads", "_transforms", "q", "robot")
 
     # Kept by hand: functools.cached_property takes one lock for all poses before Python 3.12, and no evaluation may wait for another.
 
@@ -87,7 +89,8 @@ class Pose:
     @property
     def table(self) -> ContactTable:
         """Every overlap of the tested pairs in every pose, as columns."""
-        return self._feel()[0]
+        felt = self._felt
+        return (self._feel() if felt is None else felt)[0]
 
     @property
     def projection(self) -> Array:
@@ -95,12 +98,13 @@ class Pose:
 
         Both sides of a self contact get opposite vectors, and all motors down to the base feel it.
         """
-        return self._feel()[1].reshape(self.q.shape)
+        felt = self._felt
+        return (self._feel() if felt is None else felt)[1]
 
     @property
     def projection_of_part(self) -> Array:
         """The projection, cut where a part ends, as in the original program: an arm's contact does not reach the torso."""
-        return self._engine.contacts(self._flat, self._snapshot, self._reaching, True, self._threads)[1].reshape(self.q.shape)
+        return self._found(True)[1]
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -139,13 +143,19 @@ class Pose:
 
     def feel(self, finder: Finder) -> None:
         """Have the contacts found now, and by other means than the model's own."""
-        self._felt = finder.contacts(self._flat, self._snapshot, self._reaching)
+        table, torque = finder.contacts(self._flat, self._snapshot, self._reaching)
+        self._felt = table, torque.reshape(self.q.shape)
 
     @property
     def _flat(self) -> Array:
         return self.q.reshape(-1, self.q.shape[-1])
 
     def _feel(self) -> tuple[ContactTable, Array]:
-        if self._felt is None:
-            self._felt = self._engine.contacts(self._flat, self._snapshot, self._reaching, False, self._threads)
-        return self._felt
+        felt = self._felt = self._found(False)
+        return felt
+
+    def _found(self, cut: bool) -> tuple[ContactTable, Array]:
+        if self.q.ndim == 1:
+            return self._engine.contacts(self.q, self._snapshot, self._reaching, cut)
+        table, torque = self._engine.contacts(self._flat, self._snapshot, self._reaching, cut, self._threads)
+        return table, torque.reshape(self.q.shape)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
+NO_NUMBERS, NO_REALS = np.empty((0, NUMBERS), dtype=np.int64), np.empty((0, REALS))
 FEW = 128  # contacts that an evaluation of one pose writes where Python reads them; more are asked for
 
 
@@ -35,6 +36,27 @@ class Handle:
 
     def __del__(self) -> None:
         self._free(self.at)
+
+
+class _Memory:
+    """An array that the core has made and given away."""
+
+    def __init__(self, at: int, shape: tuple[int, ...], kind: str) -> None:
+        self.__array_interface__ = {"shape": shape, "typestr": kind, "data": (at, False), "version": 3}
+        self._at = at
+
+    def __del__(self) -> None:
+        _free(self._at)
+
+
+def _rows(take: Callable[[int, int], None], at: int, count: int) -> tuple[Ints, Array]:
+    """The contacts that an object of the core has found, (count, NUMBERS) and (count, REALS)."""
+    if count == 0:
+        return NO_NUMBERS, NO_REALS
+    arrays = (ADDRESS * 2)()
+    take(at, ctypes.addressof(arrays))
+    numbers, reals = _Memory(arrays[0] or 0, (count, NUMBERS), "<i8"), _Memory(arrays[1] or 0, (count, REALS), "<f8")
+    return np.asarray(numbers), np.asarray(reals)
 
 
 class _RobotTables(ctypes.Structure):
@@ -73,14 +95,16 @@ _scene_new = function("scene_new", ADDRESS, ADDRESS, result=ADDRESS)
 _scene_free = function("scene_free", ADDRESS)
 _room_new = function("room_new", result=ADDRESS)
 _room_free = function("room_free", ADDRESS)
-_room_rows = function("room_rows", ADDRESS, ADDRESS, ADDRESS)
+_room_rows = function("room_rows", ADDRESS, ADDRESS)
+_free = function("free", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
-_link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
+_evaluate_one = function("evaluate_one", ADDRESS, ADDRESS, BYTES, result=INTEGER)
+_link_poses = function("link_poses", ADDRESS, ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
 _neighbours_free = function("neighbours_free", ADDRESS)
 _neighbours_enter = function("neighbours_enter", ADDRESS, ADDRESS, ADDRESS)
-_neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS, ADDRESS)
+_neighbours_rows = function("neighbours_rows", ADDRESS, ADDRESS)
 _neighbours_state = function("neighbours_state", ADDRESS, ADDRESS)
 _follow = function("follow", ADDRESS, BYTES, INTEGER, ADDRESS, result=INTEGER)
 _sweep = function("sweep", ADDRESS, ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, result=INTEGER)
@@ -104,13 +128,6 @@ def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: i
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 
 
-def link_poses(of: Handle, q: Array, links: int) -> Array:
-    """Every link in the poses q (B, n), (B, L, 4, 4)."""
-    out = np.empty((len(q), links, 4, 4))
-    _link_poses(of.at, q.tobytes(), len(q), address(out))
-    return out
-
-
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
     """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
     out = np.empty((len(q), 6, q.shape[1]))
@@ -121,45 +138,45 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 class Room:
     """What evaluations work in, one at a time; kept for the next one, for fresh memory costs more than the arithmetic of a pose."""
 
+    __slots__ = ("_asked", "_at", "_handle", "_numbers", "_one", "_one_at", "_reals", "_scene", "_torque")
+
     def __init__(self, motors: int) -> None:
         self._handle = Handle(_room_new(), _room_free)
         self._at = self._handle.at
-        self._q, self._torque = np.empty((1, motors)), np.empty((1, motors))
+        self._torque = np.empty(motors)
         self._numbers, self._reals = np.empty((FEW, NUMBERS), dtype=np.int64), np.empty((FEW, REALS))
         self._one = _Request(
-            0, address(self._q), address(self._torque), address(self._numbers), address(self._reals), 1, FEW, 0, 1, (INTEGER * 4)()
+            torque=address(self._torque), numbers=address(self._numbers), reals=address(self._reals), poses=1, few=FEW, threads=1
         )
         self._one_at = ctypes.addressof(self._one)
         self._scene: Handle | None = None
-        self._hands: list[int] = []
+        self._asked: tuple[object, ...] = ()  # what the last evaluation of one pose was asked
 
-    def evaluate(self, scene: Handle, q: Array, hands: list[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
+    def link_poses(self, of: Handle, q: Array, links: int) -> Array:
+        """Every link in the poses q (B, n), (B, L, 4, 4)."""
+        out = np.empty((len(q), links, 4, 4))
+        _link_poses(self._at, of.at, q.tobytes(), len(q), address(out))
+        return out
+
+    def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
         """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""
-        if len(q) == 1:
-            return self._evaluate_one(scene, q, hands, cut)
         torque = np.empty(q.shape)
-        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), -1, cut, threads, (INTEGER * 4)(*hands))
+        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), 0, cut, threads, (INTEGER * 4)(*hands))
         count = _evaluate(self._at, ctypes.addressof(request))
-        return *self._rows(count), torque
+        return *_rows(_room_rows, self._at, count), torque
 
-    def _evaluate_one(self, scene: Handle, q: Array, hands: list[int], cut: bool) -> tuple[Ints, Array, Array]:
-        request = self._one
-        if self._scene is not scene:
-            request.scene = scene.at
-            self._scene = scene
-        if self._hands != hands:
-            request.hands[:] = hands
-            self._hands = hands
-        request.cut = cut
-        self._q[:] = q
-        count = _evaluate(self._at, self._one_at)
-        numbers, reals = (self._numbers[:count].copy(), self._reals[:count].copy()) if count <= FEW else self._rows(count)
-        return numbers, reals, self._torque.copy()
-
-    def _rows(self, count: int) -> tuple[Ints, Array]:
-        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
-        _room_rows(self._at, address(numbers), address(reals))
-        return numbers, reals
+    def evaluate_one(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool) -> tuple[Ints, Array, Array]:
+        """The same for one pose q (n,), with what they do to the motors (n,)."""
+        if self._scene is not scene or self._asked != (hands, cut):
+            request = self._one
+            request.scene, request.cut, request.hands[:] = scene.at, cut, hands
+            self._scene, self._asked = scene, (hands, cut)
+        count = _evaluate_one(self._at, self._one_at, q.tobytes())
+        if count == 0:
+            return NO_NUMBERS, NO_REALS, self._torque.copy()
+        if count > FEW:
+            return *_rows(_room_rows, self._at, count), self._torque.copy()
+        return self._numbers[:count].copy(), self._reals[:count].copy(), self._torque.copy()
 
 
 class Following:
@@ -173,7 +190,7 @@ class Following:
         self.at = self._handle.at
         self._scene: Handle | None = None
 
-    def enter(self, scene: Handle, hands: list[int]) -> None:
+    def enter(self, scene: Handle, hands: Sequence[int]) -> None:
         """Be among another world, or let others reach."""
         self._scene = scene  # before the core lets go of the last one: nobody else uses this
         numbers = (INTEGER * 4)(*hands)
@@ -183,9 +200,7 @@ class Following:
         """As `Room.evaluate`, of poses q (B, n) one after the other."""
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
-        numbers, reals = np.empty((count, NUMBERS), dtype=np.int64), np.empty((count, REALS))
-        _neighbours_rows(self.at, address(numbers), address(reals))
-        return numbers, reals, torque
+        return *_rows(_neighbours_rows, self.at, count), torque
 
     def sweep(self, q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
         """Whether nothing touches between the poses q (V, n) of each edge (E, 2), (E,), and how many poses were looked at.

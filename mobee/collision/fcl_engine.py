@@ -49,11 +49,11 @@ class FclEngine:
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n).
+        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape.
 
         `reaching`: who spares the targets; `cut`: a motor feels only what happens to links of its own part.  `threads`: fcl knows but one.
         """
-        transforms = link_transforms(self.robot, q)
+        transforms = link_transforms(self.robot, q.reshape(-1, q.shape[-1]))
         pairs = self._tested(snapshot, reaching)
         tables = [_contact_table(self.robot, one, snapshot, pairs) for one in transforms]
         for pose, table in enumerate(tables):

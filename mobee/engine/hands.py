@@ -7,6 +7,7 @@ they would keep it from everything.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 MOST = 2
 
@@ -23,9 +24,10 @@ Hands = tuple[Hand, ...]
 NOBODY: Hands = ()
 
 
-def hand_numbers(reaching: Hands) -> list[int]:
+@lru_cache(maxsize=64)
+def hand_numbers(reaching: Hands) -> tuple[int, ...]:
     """`Hands` of core/scene.hpp: the two links of each, -1 where there is none."""
     found = [number for hand in reaching for number in (hand.link, hand.fields)]
     if len(found) > 2 * MOST:
         raise ValueError(f"{len(reaching)} hands reach at once; at most {MOST} may")
-    return found + [-1] * (2 * MOST - len(found))
+    return (*found, *[-1] * (2 * MOST - len(found)))
