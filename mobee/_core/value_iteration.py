@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,21 +31,16 @@ class TransitionTable(ctypes.Structure):
 
     def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
         super().__init__(address(probabilities), address(outcomes), None if used is None else address(used), *outcomes.shape)
-        self.shape = outcomes.shape
+        self.rows = outcomes.shape[:2]
         self.at = ctypes.addressof(self)
         self._kept: Any = probabilities, outcomes, used
 
 
-_solve = function("value_iteration", ADDRESS, ADDRESS, ADDRESS, ADDRESS, REAL, REAL, INTEGER, INTEGER, result=INTEGER)
+solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
+    "value_iteration", ADDRESS, ADDRESS, ADDRESS, ADDRESS, REAL, REAL, INTEGER, INTEGER, result=INTEGER
+)
+"""Sweep until no value changes by the tolerance; returns the number of sweeps over all actions, or what is wrong.
 
-
-def solve(
-    table: TransitionTable, reward: Array, values: Array, found: Array, discount: float, tolerance: float, relative: bool, evaluate: bool
-) -> int:
-    """Sweep until no value changes by the tolerance; `values` (S,) change in place, `found` (S, A) is filled.
-
-    `reward`: (S, A).  `relative`: the tolerance is in units of the largest reward; `evaluate`: modified policy iteration.  Returns the
-    number of sweeps over all actions, or what is wrong.
-    """
-    sweeps: int = _solve(table.at, address(reward), address(values), address(found), discount, tolerance, relative, evaluate)
-    return sweeps
+Of the addresses of a table, a reward (S, A), values (S,), which change in place, and action values (S, A), which are filled; the
+discount and the tolerance; whether this is in units of the largest reward, and whether it is modified policy iteration.
+"""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -80,14 +81,14 @@ def value_iteration(
     Raises:
         InvalidValue: with what is valid.
     """
-    core = _core()
+    core, address = _core()
     if isinstance(model, Tabled):
-        table = model.table
-        reward = _checked_reward(reward, table.shape, discount)
+        table = model._table or model.table
+        reward = _checked_reward(reward, table.rows, discount)
     else:
         probabilities, outcomes, reward = tables(model, reward, discount)
         table = core.TransitionTable(probabilities, outcomes)
-    states = table.shape[0]
+    states = len(reward)
     if not tolerance > 0.0:
         raise InvalidValue(f"tolerance={tolerance!r}: valid is a number above 0.")
     values = np.zeros(states) if start is None else np.array(start, dtype=np.float64)
@@ -95,8 +96,9 @@ def value_iteration(
         raise InvalidValue(f"start has shape {values.shape}: give one value for each of the {states} states.")
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
-    action_values = np.empty(reward.shape)
-    done = core.solve(table, reward, values, action_values, float(discount), float(tolerance), bool(relative), method == "modified")
+    action_values, evaluate = np.empty(reward.shape), method == "modified"
+    at = table.at, address(reward), address(values), address(action_values)
+    done = core.solve(*at, discount, tolerance, bool(relative), evaluate)
     if done > 0:
         return values, action_values
     if done == core.BAD_REWARD:
@@ -115,21 +117,21 @@ def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, 
     outcomes = np.asarray(model.outcomes, dtype=np.int64, order="C")
     if outcomes.ndim != 3 or probabilities.shape != outcomes.shape:
         raise InvalidValue(f"outcomes of shape {outcomes.shape}, probabilities of {probabilities.shape}: valid is (S, A, B) for both.")
-    return probabilities, outcomes, _checked_reward(reward, outcomes.shape, discount)
+    return probabilities, outcomes, _checked_reward(reward, outcomes.shape[:2], discount)
 
 
-def _checked_reward(reward: Array, shape: tuple[int, ...], discount: float) -> Array:
+def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Array:
     if not 0.0 <= discount < 1.0:
         raise InvalidValue(f"discount={discount!r}: valid is 0 <= discount < 1.")
     reward = np.asarray(reward, np.float64, "C")
-    if reward.shape != shape[:2]:
-        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {shape[:2]}.")
+    if reward.shape != rows:
+        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {rows}.")
     return reward
 
 
 @cache
-def _core() -> ModuleType:
-    """Loaded when it is first needed."""
-    from mobee._core import value_iteration
+def _core() -> tuple[ModuleType, Callable[[Array], int]]:
+    """Loaded when it is first needed, with where arrays are."""
+    from mobee._core import address, value_iteration
 
-    return value_iteration
+    return value_iteration, address

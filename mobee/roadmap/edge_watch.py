@@ -20,11 +20,11 @@ _MARGIN = 1e-6  # m
 class EdgeWatch:
     """Which edges (E, 2) between poses q (V, n) rad are free, `free` (E,), in the world of the last `update`.
 
-    `step`, `marker`: as of `check_edges`.
+    `step`, `marker`, `threads`: as of `check_edges`.
     """
 
-    def __init__(self, model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> None:
-        self._model = model
+    def __init__(self, model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> None:
+        self._model, self._threads = model, threads
         self._q, self._edges, self._step, self._marker = q, edges, step, marker
         solid = solid_model(model)
         robot = solid.robot
@@ -35,7 +35,7 @@ class EdgeWatch:
         first, second = self._middles[:, edges[:, 0]], self._middles[:, edges[:, 1]]
         self._half_ways = 0.5 * _LONGER * (lengths(half - first) + lengths(second - half)) + _MARGIN
         self._seen, self._reaching = model.world.snapshot, model.reaching
-        self.free: Flags = check_edges(model, q, edges, step, marker)
+        self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
         """Check again what may be free no more, or again, in the world as it is now; returns the indices of those edges."""
@@ -50,7 +50,7 @@ class EdgeWatch:
             for one in changed:
                 near |= self.near(one)
         again = np.flatnonzero(near)
-        self.free[again] = check_edges(self._model, self._q, self._edges[again], self._step, self._marker)
+        self.free[again] = check_edges(self._model, self._q, self._edges[again], self._step, self._marker, self._threads)
         return again
 
     def near(self, thing: WorldObject) -> Flags:
