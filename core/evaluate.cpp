@@ -57,7 +57,7 @@ void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& w
         place(robot, placed);
         bound_clusters(robot, placed);
         find_pairs(scene, placed, 0.0, worker.pairs);
-        sieve(scene, placed, worker.pairs);
+        sieve(scene, placed, 0.0, worker.pairs);
         find_contacts(scene, request.hands, placed, worker.pairs.left, worker.contacts.found);
         if (worker.contacts.found.size() == 0) continue;
         sort_contacts(scene, worker.contacts);

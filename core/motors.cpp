@@ -103,20 +103,40 @@ std::uint64_t mixed(std::uint64_t x) {
     return x ^ (x >> 31);
 }
 
+constexpr std::int64_t at_once = 32;  // couples of motors
+
 // What all motors share at a tick.
 std::uint64_t tick_key(std::uint64_t seed, std::int64_t tick) { return mixed(mixed(seed) ^ static_cast<std::uint64_t>(tick)); }
+
+// Motors 2 number and 2 number + 1, and which of them live.
+struct Couple {
+    std::int64_t number = 0;
+    bool even = false, odd = false;
+};
 
 struct Normals {
     double even = 0.0, odd = 0.0;
 };
 
-// The standard normals of motors 2 pair and 2 pair + 1 (Box and Muller).
-Normals normal_pair(std::uint64_t key, std::int64_t pair) {
+// The standard normals of some couples (Box and Muller).  One loop for each function: the processor then works on several at once.
+void draw(std::uint64_t key, const Couple* couples, std::int64_t count, Normals* drawn) {
     constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
-    const std::uint64_t one = mixed(key ^ mixed(static_cast<std::uint64_t>(pair))), two = mixed(one);
-    const double radius = std::sqrt(-2.0 * std::log((static_cast<double>(one >> 11) + 1.0) * unit));
-    const double angle = turn * (static_cast<double>(two >> 11) * unit);
-    return {radius * std::cos(angle), radius * std::sin(angle)};
+    double radius[at_once], angle[at_once];
+    for (std::int64_t k = 0; k < count; ++k) {
+        const std::uint64_t one = mixed(key ^ mixed(static_cast<std::uint64_t>(couples[k].number))), two = mixed(one);
+        radius[k] = (static_cast<double>(one >> 11) + 1.0) * unit;
+        angle[k] = turn * (static_cast<double>(two >> 11) * unit);
+    }
+    for (std::int64_t k = 0; k < count; ++k) radius[k] = std::sqrt(-2.0 * std::log(radius[k]));
+    for (std::int64_t k = 0; k < count; ++k) {
+        if (couples[k].even && couples[k].odd) {
+            drawn[k] = {radius[k] * std::cos(angle[k]), radius[k] * std::sin(angle[k])};
+        } else if (couples[k].even) {
+            drawn[k].even = radius[k] * std::cos(angle[k]);
+        } else {
+            drawn[k].odd = radius[k] * std::sin(angle[k]);
+        }
+    }
 }
 
 // References that never ask motors for more than their velocity and acceleration, and never for what cannot be braked.
@@ -185,14 +205,26 @@ void move(Motors& motors, std::int64_t substeps, double dt) {
 
 void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
     const std::uint64_t key = motors::tick_key(seed, tick);
-    std::int64_t last = -1;
-    motors::Normals drawn;
-    for (const std::int64_t i : motors.living) {
-        if (i / 2 != last) {
-            last = i / 2;
-            drawn = motors::normal_pair(key, last);
+    const View<const std::int64_t> living = motors.living;
+    motors::Couple couples[motors::at_once];
+    motors::Normals drawn[motors::at_once];
+    for (std::int64_t first = 0, end = 0; first < living.size; first = end) {
+        std::int64_t count = 0;
+        for (; end < living.size; ++end) {
+            const std::int64_t number = living[end] / 2;
+            if (count == 0 || couples[count - 1].number != number) {
+                if (count == motors::at_once) break;
+                couples[count++] = {number, false, false};
+            }
+            (living[end] % 2 ? couples[count - 1].odd : couples[count - 1].even) = true;
         }
-        q[i] = motors.state[i].q + noise[i] * (i % 2 ? drawn.odd : drawn.even);
+        motors::draw(key, couples, count, drawn);
+        const motors::Normals* of = drawn;
+        for (std::int64_t k = first; k < end; ++k) {
+            const std::int64_t i = living[k];
+            if (k > first && living[k - 1] / 2 != i / 2) ++of;
+            q[i] = motors.state[i].q + noise[i] * (i % 2 ? of->odd : of->even);
+        }
     }
 }
 

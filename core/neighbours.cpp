@@ -121,18 +121,15 @@ void make_list(Neighbours& near) {
     near.contacts.found.clear();
     Touch touch;
     Contact contact;
-    for (const PairList* pairs : {&near.pairs.thick, &near.pairs.others}) {
-        for (std::size_t k = 0; k < pairs->size(); ++k) {
-            const Pair pair{pairs->first[k], pairs->second[k]};
-            const double depth = overlap_of(*near.scene, near.placed, pair, touch);
-            if (-depth >= near.skin) continue;
-            Neighbour one{pair, -depth - margin, -1};
-            if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
-                one.kept = static_cast<std::int64_t>(near.contacts.found.size());
-                near.contacts.found.push(contact);
-            }
-            near.list.push(one);
+    for (const Pair pair : near.pairs.left) {
+        const double depth = overlap_of(*near.scene, near.placed, pair, touch);
+        if (-depth >= near.skin) continue;
+        Neighbour one{pair, -depth - margin, -1};
+        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
+            one.kept = static_cast<std::int64_t>(near.contacts.found.size());
+            near.contacts.found.push(contact);
         }
+        near.list.push(one);
     }
     near.kept.clear();
     for (const Contact& one : near.contacts.found) near.kept.push(one);
@@ -142,12 +139,13 @@ void make_list(Neighbours& near) {
 void start_anew(Neighbours& near, bool build) {
     const Scene& scene = *near.scene;
     bound_clusters(*scene.robot, near.placed);
-    find_pairs(scene, near.placed, build ? near.skin : 0.0, near.pairs);
+    const double skin = build ? near.skin : 0.0;
+    find_pairs(scene, near.placed, skin, near.pairs);
+    sieve(scene, near.placed, skin, near.pairs);
     remember(near.placed, near.motion);
     if (build) {
         make_list(near);
     } else {
-        sieve(scene, near.placed, near.pairs);
         find_contacts(scene, near.hands, near.placed, near.pairs.left, near.contacts.found);
     }
     near.state = build ? Remembered::list : Remembered::pose;

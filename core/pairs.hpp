@@ -40,7 +40,7 @@ struct Pairs {
 // Find the pairs whose balls are nearer than the skin [m].
 void find_pairs(const Scene& scene, const Placed& placed, double skin, Pairs& pairs);
 
-// Leave those of the pairs that may overlap: most of those whose balls do have nothing to do with each other.
-void sieve(const Scene& scene, Placed& placed, Pairs& pairs);
+// Leave those of the pairs that may be nearer than the skin: most of those whose balls are have nothing to do with each other.
+void sieve(const Scene& scene, Placed& placed, double skin, Pairs& pairs);
 
 }  // namespace mobee

@@ -49,8 +49,8 @@ inline FourPairs four_pairs(const Outlines& outlines, const std::int32_t* first,
     return {w[0], w[1], w[2], w[3], u[0], u[1], u[2], u[3], v[0], v[1], v[2], v[3]};
 }
 
-// Which of them are nearer than they reach.  Of parallel segments, too: t and s follow each other.
-inline unsigned near_each_other(const FourPairs& p) {
+// Which of them are nearer than they reach and the skin more.  Of parallel segments, too: t and s follow each other.
+inline unsigned near_each_other(const FourPairs& p, double skin) {
     const Four b = p.ux * p.vx + p.uy * p.vy + p.uz * p.vz;
     const Four c = (p.ux * p.wx + p.uy * p.wy + p.uz * p.wz) * p.per_a, f = (p.vx * p.wx + p.vy * p.wy + p.vz * p.wz) * p.per_e;
     const Four b_a = b * p.per_a, b_e = b * p.per_e;
@@ -58,11 +58,11 @@ inline unsigned near_each_other(const FourPairs& p) {
     const Four t = unit_of(b_e * s + f);
     s = unit_of(b_a * t - c);
     const Four x = p.wx + s * p.ux - t * p.vx, y = p.wy + s * p.uy - t * p.vy, z = p.wz + s * p.uz - t * p.vz;
-    const Four reach = p.reach + margin;
+    const Four reach = p.reach + (skin + margin);
     return less(x * x + y * y + z * z, reach * reach);
 }
 
-void thick_ones(const Scene& scene, const Placed& placed, PairList& pairs, Array<Pair>& left) {
+void thick_ones(const Scene& scene, const Placed& placed, double skin, PairList& pairs, Array<Pair>& left) {
     const std::size_t count = pairs.size();
     std::int32_t *first = pairs.first.data(), *second = pairs.second.data();
     for (std::size_t k = count; k % 4 != 0; ++k) first[k] = second[k] = 0;  // there is room for them
@@ -70,7 +70,7 @@ void thick_ones(const Scene& scene, const Placed& placed, PairList& pairs, Array
     const Pair* begin = to;
     const Outlines outlines = outlines_of(scene, placed);
     for (std::size_t k = 0; k < count; k += 4) {
-        unsigned near = near_each_other(four_pairs(outlines, first + k, second + k));
+        unsigned near = near_each_other(four_pairs(outlines, first + k, second + k), skin);
         if (count - k < 4) near &= (1u << (count - k)) - 1u;
         for (; near != 0; near &= near - 1) {
             const std::size_t which = k + static_cast<std::size_t>(std::countr_zero(near));
@@ -89,13 +89,14 @@ inline bool segment_near_box(Four c, Four k, Four half, double reach) {
     return sum_of_three(beyond * beyond) < reach * reach;
 }
 
-// Whether two boxes overlap along the line of their centres.
-inline bool boxes_near(Four w, const Box& one, const Box& two) {
+// Whether two boxes are nearer than the skin along the line of their centres.
+inline bool boxes_near(Four w, const Box& one, const Box& two, double skin) {
     const Four along = one.half * absolute_of(into(one, w)) + two.half * absolute_of(into(two, w));
-    return sum_of_three(w * w) - margin < sum_of_three(along);
+    const double square = sum_of_three(w * w);
+    return square - margin < sum_of_three(along) + skin * std::sqrt(square);
 }
 
-void others(const Scene& scene, Placed& placed, const PairList& pairs, Array<Pair>& left) {
+void others(const Scene& scene, Placed& placed, double skin, const PairList& pairs, Array<Pair>& left) {
     const Robot& robot = *scene.robot;
     const auto slots = static_cast<std::int32_t>(robot.slots());
     const auto box_at = [&](std::int32_t slot) -> const Box& {
@@ -113,8 +114,8 @@ void others(const Scene& scene, Placed& placed, const PairList& pairs, Array<Pai
         const Outline &one = outlines[a], &two = outlines[b];
         const Box& box = box_at(b);
         const Four w = with_fourth(one.center - two.center, Four{});
-        const bool near = thick_at(a) ? segment_near_box(into(box, w), into(box, one.core), box.half, one.center[3] + margin)
-                                      : boxes_near(w, box_at(a), box);
+        const bool near = thick_at(a) ? segment_near_box(into(box, w), into(box, one.core), box.half, one.center[3] + margin + skin)
+                                      : boxes_near(w, box_at(a), box, skin);
         *to = {pairs.first[k], pairs.second[k]};
         to += near;
     }
@@ -123,10 +124,10 @@ void others(const Scene& scene, Placed& placed, const PairList& pairs, Array<Pai
 
 }  // namespace sieves
 
-void sieve(const Scene& scene, Placed& placed, Pairs& pairs) {
+void sieve(const Scene& scene, Placed& placed, double skin, Pairs& pairs) {
     pairs.left.clear();
-    sieves::thick_ones(scene, placed, pairs.thick, pairs.left);
-    sieves::others(scene, placed, pairs.others, pairs.left);
+    sieves::thick_ones(scene, placed, skin, pairs.thick, pairs.left);
+    sieves::others(scene, placed, skin, pairs.others, pairs.left);
 }
 
 }  // namespace mobee

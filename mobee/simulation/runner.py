@@ -20,7 +20,7 @@ from mobee.robot.robot import Array
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 
-SKIN = 0.04  # m
+SKIN = 0.08  # m
 
 
 class Runner:
