@@ -38,13 +38,24 @@ class Newest:
         self._handle(sample)
 
 
+class Timer:
+    """What is to be done at some time, unless it is cancelled before."""
+
+    def __init__(self, handle: Handler) -> None:
+        self.handle: Handler | None = handle
+
+    def cancel(self) -> None:
+        """Have nothing done, and nobody woken for it; main thread only."""
+        self.handle = None
+
+
 class Inbox:
     """What is to be done, in order of arrival, and timers."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Handler] = SimpleQueue()
         self._later: deque[Handler] = deque()
-        self._timers: list[tuple[float, int, Handler]] = []
+        self._timers: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
         self.dropped = 0  # what came while the inbox was crowded
 
@@ -68,9 +79,11 @@ class Inbox:
         self._later.append(handler)
         return True
 
-    def at(self, when: float, handler: Handler) -> None:
+    def at(self, when: float, handler: Handler) -> Timer:
         """Have it run at a time of the monotonic clock; main thread only."""
-        heapq.heappush(self._timers, (when, next(self._order), handler))
+        timer = Timer(handler)
+        heapq.heappush(self._timers, (when, next(self._order), timer))
+        return timer
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
         """Handle what comes until that time of the monotonic clock, or until it was `enough`.
@@ -82,8 +95,9 @@ class Inbox:
             now = time.monotonic()
             if now > last:
                 return
-            if self._timers and self._timers[0][0] <= now:
-                heapq.heappop(self._timers)[2]()
+            if self._timers and (self._timers[0][0] <= now or self._timers[0][2].handle is None):
+                if handle := heapq.heappop(self._timers)[2].handle:
+                    handle()
                 continue
             wake = min(until, self._timers[0][0]) if self._timers else until
             try:

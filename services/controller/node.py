@@ -22,7 +22,7 @@ from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Array, Robot
 from services.common.delivery import LATEST
 from services.common.fingerprint import robot_hash
-from services.common.inbox import CROWDED_WITH_STOPS
+from services.common.inbox import CROWDED_WITH_STOPS, Timer
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.controller.action import Action
@@ -59,6 +59,7 @@ class ControllerNode:
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._units = fine_units(robot)
         self._tick: Tick | None = None  # that still waits for its forces
+        self._patience: Timer | None = None  # how long, in free mode
         self._last_k = -1
         self._last: tuple[Tick, dict[str, Order], Array] | None = None  # step that commanded: its orders, and the law's state before
         self._telling = Telling(service.bus, robot, self._law, self._actions)
@@ -90,7 +91,7 @@ class ControllerNode:
             self._go_without_model()
         else:
             k = tick.k
-            self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
+            self._patience = self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
         terms = {name: np.array(row) for name, row in forces.terms.items()}
@@ -130,6 +131,9 @@ class ControllerNode:
 
     def _step(self) -> None:
         tick, self._tick = self._tick, None
+        if self._patience is not None:
+            self._patience.cancel()  # or half a tick later it wakes the process for nothing
+            self._patience = None
         if tick is None:
             return
         self._q = np.array(tick.q)

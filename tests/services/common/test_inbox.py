@@ -38,6 +38,28 @@ def test_a_timer_beyond_the_time_waits_for_the_next_spin() -> None:
     assert seen == [1]
 
 
+def test_a_timer_that_was_cancelled_does_nothing_and_wakes_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox, seen, start = Inbox(), [], now()
+    cancelled = [inbox.at(start + after, lambda: seen.append("cancelled")) for after in (0.01, 0.02)]
+    inbox.at(start + 0.03, lambda: seen.append("due"))
+    for timer in cancelled:
+        timer.cancel()
+    waits: list[float] = []
+    take = inbox._queue.get
+
+    class Queue:
+        def get(self, timeout: float) -> object:
+            waits.append(timeout)
+            return take(timeout=timeout)
+
+        get_nowait = inbox._queue.get_nowait
+
+    monkeypatch.setattr(inbox, "_queue", Queue())
+    inbox.spin(start + 10.0, lambda: bool(seen))
+    assert seen == ["due"]
+    assert len(waits) == 1
+
+
 def test_spin_ends_as_soon_as_it_was_enough_and_leaves_the_rest() -> None:
     inbox, seen = Inbox(), []
     for i in range(10):
