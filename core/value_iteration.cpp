@@ -39,10 +39,8 @@ struct Problem {
     double discount;
     Array<std::int64_t> chosen;  // (states,): the best row s A + a of each state, -1 without any
     Array<double> fresh;         // (states,): values that are not valid yet
-
-    // Only of problems that one sweep does not solve: the branches of a row are end[row] to end[row + 1], none if it is no action.
-    Array<std::int64_t> end;
-    Array<Branch> branch;
+    Array<std::int64_t> end;     // (rows + 1,): the branches of a row are end[row] to end[row + 1], none if it is no action
+    Array<Branch> branch;        // what leads somewhere, row by row
 };
 
 struct Sweep {
@@ -69,25 +67,31 @@ inline void take(const Best& best, std::int64_t state, bool of_states, const dou
     if (of_states) sweep.change = most(by, sweep.change);
 }
 
-// The first sweep: reads the tables where they are, and looks whether they are right.  Returns 0, or what is wrong.
+// The first sweep: reads the tables, looks whether they are right, and keeps the bins that are not empty.  Returns 0, or what is wrong.
 std::int64_t begin(Problem& problem, bool of_states, double* values, double* found, Sweep& sweep, double& largest_reward) {
     const TransitionTable& table = problem.table;
     const std::int64_t states = table.states, actions = table.actions, bins = table.bins;
+    problem.end.reserve(states * actions + 1);
+    problem.branch.reserve(states * actions * bins);
+    std::int64_t* end = problem.end.data();
+    Branch* branch = problem.branch.data();
+    std::int64_t used = end[0] = 0;
     for (std::int64_t s = 0; s < states; ++s) {
         Best best;
         for (std::int64_t row = s * actions; row < (s + 1) * actions; ++row) {
             const double *probability = table.probability + row * bins, reward = problem.reward[row];
             const std::int64_t *outcome = table.outcome + row * bins, there = reward == -infinity ? 0 : bins_of(table, row);
             double value = 0.0;
-            bool acts = false;
             for (std::int64_t b = 0; b < there; ++b) {
                 if (probability[b] == 0.0) continue;
-                if (outcome[b] < 0 || outcome[b] >= states) return bad_outcome;
-                value += problem.discount * probability[b] * values[outcome[b]];
-                acts = true;
+                const std::int64_t to = outcome[b];
+                if (to < 0 || to >= states) return bad_outcome;
+                branch[used] = {problem.discount * probability[b], to};
+                value += branch[used++].weight * values[to];
             }
-            found[row] = acts ? value + reward : -infinity;
-            if (!acts) continue;
+            end[row + 1] = used;
+            found[row] = used > end[row] ? value + reward : -infinity;
+            if (used == end[row]) continue;
             if (!std::isfinite(reward)) return bad_reward;
             largest_reward = most(std::fabs(reward), largest_reward);
             if (!of_states) sweep.change = most(std::fabs(found[row] - values[s]), sweep.change);
@@ -96,25 +100,6 @@ std::int64_t begin(Problem& problem, bool of_states, double* values, double* fou
         take(best, s, of_states, values, problem, sweep);
     }
     return 0;
-}
-
-// Keep the bins that are not empty, one after the other.
-void pack(Problem& problem) {
-    const TransitionTable& table = problem.table;
-    const std::int64_t rows = table.states * table.actions;
-    problem.end.reserve(rows + 1);
-    problem.branch.reserve(rows * table.bins);
-    Branch* branch = problem.branch.data();
-    std::int64_t used = 0;
-    problem.end[0] = 0;
-    for (std::int64_t row = 0; row < rows; ++row) {
-        const double* probability = table.probability + row * table.bins;
-        const std::int64_t* outcome = table.outcome + row * table.bins;
-        const std::int64_t there = problem.reward[row] == -infinity ? 0 : bins_of(table, row);
-        for (std::int64_t b = 0; b < there; ++b)
-            if (probability[b] != 0.0) branch[used++] = {problem.discount * probability[b], outcome[b]};
-        problem.end[row + 1] = used;
-    }
 }
 
 inline double onward(const Problem& problem, std::int64_t row, const double* values) {
@@ -182,7 +167,6 @@ std::int64_t solve(const TransitionTable& table, const double* reward, const Wan
         // A change that has outlived what the discount leaves of it is rounding too: a cycle of more than four last bits.
         const double patience = 1.0 + std::floor(static_cast<double>(sweeps) * (1.0 - wanted.discount) / soon);
         if (done.change < limit || done.change <= patience * rounding * done.largest) return sweeps;
-        if (sweeps == 1) pack(problem);
         if (wanted.evaluate && sweeps <= most_evaluated) evaluate(problem, 0.5 * (1.0 - wanted.discount) * limit, values);
         done = improve(problem, wanted.evaluate, values, found);
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import Any
+from ctypes import addressof
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +17,27 @@ Ints = NDArray[np.int64]
 BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of sweeps
 
 
-class TransitionTable(ctypes.Structure):
-    """`TransitionTable` of core/transitions.hpp; keeps the arrays alive that it points to.
-
-    `probabilities` and `outcomes`: (S, A, B).  `used` (S, A): how many bins of each state-action may have a probability, the first
-    ones; None: all may.  All are C-contiguous.
-    """
+class Table(ctypes.Structure):
+    """`TransitionTable` of core/transitions.hpp.  Who makes one keeps the arrays alive."""
 
     _fields_ = (
-        *((name, ADDRESS) for name in ("_probability", "_outcome", "_used")),
+        *((name, ADDRESS) for name in ("probability", "outcome", "used")),
         *((name, INTEGER) for name in ("states", "actions", "bins")),
     )
 
+
+class TransitionTable:
+    """A `Table` that keeps its arrays alive: probabilities and outcomes (S, A, B), C-contiguous.
+
+    `used` (S, A): how many bins of each state-action may have a probability, the first ones; None: all may.
+    """
+
     def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
-        super().__init__(address(probabilities), address(outcomes), None if used is None else address(used), *outcomes.shape)
+        self._arrays = probabilities, outcomes, used
+        at = None if used is None else address(used)
+        self._table = Table(address(probabilities), address(outcomes), at, *outcomes.shape)
+        self.at = addressof(self._table)
         self.rows = outcomes.shape[:2]
-        self.at = ctypes.addressof(self)
-        self._kept: Any = probabilities, outcomes, used
 
 
 solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
@@ -44,3 +48,5 @@ solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
 Of the addresses of a table, a reward (S, A), values (S,), which change in place, and action values (S, A), which are filled; the
 discount and the tolerance; whether this is in units of the largest reward, and whether it is modified policy iteration.
 """
+
+__all__ = ["BAD_OUTCOME", "BAD_REWARD", "BAD_START", "Table", "TransitionTable", "addressof", "solve"]

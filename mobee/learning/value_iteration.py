@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.robot import Array, Ints
@@ -83,11 +84,12 @@ def value_iteration(
     """
     core, address = _core()
     if isinstance(model, Tabled):
-        table = model._table or model.table
-        reward = _checked_reward(reward, table.rows, discount)
+        known = model._table or model.table
+        reward, table = _checked_reward(reward, known.rows, discount), known.at
     else:
         probabilities, outcomes, reward = tables(model, reward, discount)
-        table = core.TransitionTable(probabilities, outcomes)
+        given = core.Table(address(probabilities), address(outcomes), None, *outcomes.shape)
+        table = core.addressof(given)
     states = len(reward)
     if not tolerance > 0.0:
         raise InvalidValue(f"tolerance={tolerance!r}: valid is a number above 0.")
@@ -97,8 +99,8 @@ def value_iteration(
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
     action_values, evaluate = np.empty(reward.shape), method == "modified"
-    at = table.at, address(reward), address(values), address(action_values)
-    done = core.solve(*at, discount, tolerance, bool(relative), evaluate)
+    at = address(reward), address(values), address(action_values)
+    done = core.solve(table, *at, discount, tolerance, bool(relative), evaluate)
     if done > 0:
         return values, action_values
     if done == core.BAD_REWARD:
@@ -130,7 +132,7 @@ def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Ar
 
 
 @cache
-def _core() -> tuple[ModuleType, Callable[[Array], int]]:
+def _core() -> tuple[ModuleType, Callable[[NDArray[Any]], int]]:
     """Loaded when it is first needed, with where arrays are."""
     from mobee._core import address, value_iteration
 
