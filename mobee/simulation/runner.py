@@ -53,7 +53,7 @@ class Runner:
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
-        self._parts, self._record, self._reaches_at = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), 0
+        self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
         self.address = ctypes.addressof(self._struct)
         """Where the core finds the plant."""
@@ -77,10 +77,9 @@ class Runner:
             struct.record = address(self._record)
         elif len(self._record):
             self._record, struct.record = self._record[:0], None
-        reaches = controller.reaches
-        if reaches.address != self._reaches_at or reaches:
-            struct.reaches = View(reaches.address, len(reaches))
-            self._reaches_at = reaches.address
+        listed = controller.reaches.address, len(controller.reaches)
+        if listed != self._listed:
+            struct.reaches, self._listed = View(*listed), listed
         struct.near = self._near(solids) if controller.contact_forces or solids else None
         struct.ticks, struct.most = ticks, most
 
