@@ -74,8 +74,11 @@ double box_box(const Volume& a, const Volume& b, Touch& touch) {
     for (int axis = 1; axis < 15; ++axis)
         if (overlaps[axis] < overlaps[which] - tie) which = axis;
     const Vec3 n = box_box_axes::direction(a, b, which);
-    touch = box_box_axes::contact(a, b, sign(dot(n, a.center - b.center)) * n, overlaps[which]);
-    return overlaps[which];
+    const double shift = dot(n, b.center - a.center), side = away(shift);
+    // Against the shift it would be shorter, but where the centres are one, rounding shall not choose.
+    const double depth = side * shift > 0.0 ? overlaps[which] + 2.0 * side * shift : overlaps[which];
+    touch = box_box_axes::contact(a, b, side * n, depth);
+    return depth;
 }
 
 }  // namespace mobee::narrow

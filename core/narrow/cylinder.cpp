@@ -74,10 +74,10 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
         const Vec3 q = p - dot(p, c) * c;
         if (dot(q, q) < nearest) corner = q, nearest = dot(q, q);
     }
-    const double size = std::sqrt(nearest);
+    corner = corner - dot(corner, c) * c;  // again, for where it is near the axis
+    const double size = length(corner);
     if (size <= touching) return;
-    Vec3 n = over(-corner, size);
-    n = n - dot(n, c) * c;  // again, for where the corner is near the axis
+    const Vec3 n = over(-corner, size);
     const double reach = swept.reach(n);
     if (reach < best.reach - tie) best = {reach, n};
 }
@@ -86,7 +86,8 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
 void prefer_around(Way& best, const Swept& swept, int i) {
     const int j = after(i), k = before(i);
     const Vec3 c = swept.axis;
-    const Disc disc = {swept.radius, swept.height, {c[j], c[k]}, c[i] * c[i], 0.0};
+    const Point axis = {c[j], c[k]};
+    const Disc disc = {swept.radius, axis, swept.height * axis, c[i] * c[i], 0.0};
     Exit exit = {best.reach, {}};
     improve_around(disc, {swept.shift[j], swept.shift[k]}, {swept.half[j], swept.half[k]}, exit);
     if (!(exit.reach < best.reach)) return;
@@ -98,10 +99,11 @@ void prefer_around(Way& best, const Swept& swept, int i) {
 
 // A segment c + s h, |s| <= 1, and a cylinder about the z axis: how far apart they are at s, and half the slope of the square.
 struct Apart {
+    double s;
     Vec3 way;  // from the cylinder
     double distance, slope, rise;
 
-    Apart(Vec3 c, Vec3 h, double radius, double height, double s) {
+    Apart(Vec3 c, Vec3 h, double radius, double height, double at) : s(at) {
         const Vec3 p = c + s * h;
         const double side = std::sqrt(p.x * p.x + p.y * p.y), beyond = most(side - radius, 0.0), share = beyond > 0.0 ? beyond / side : 0.0;
         way = {share * p.x, share * p.y, p.z - clamp(p.z, -height, height)};
@@ -112,22 +114,22 @@ struct Apart {
         if (beyond <= 0.0) rise = way.z != 0.0 ? h.z * h.z : 0.0;
     }
     // No point of the segment is nearer than this: beyond the plane across the way, which touches the cylinder.
-    double bound(double s) const { return distance > 0.0 ? distance - std::fabs(slope) / distance * (slope > 0.0 ? 1.0 + s : 1.0 - s) : 0.0; }
+    double bound() const { return distance > 0.0 ? distance - std::fabs(slope) / distance * (slope > 0.0 ? 1.0 + s : 1.0 - s) : 0.0; }
 };
 
 // The closest that the two come; once that is known to be more than `limit`, a lower bound that is more, too.
 Apart closest_to_cylinder(Vec3 c, Vec3 h, const Volume& round, double inverse, double limit, double& bound) {
-    double low = -1.0, high = 1.0, s = unit(-dot(c, h) * inverse);
-    Apart here(c, h, round.half.x, round.half.y, s);
+    double low = -1.0, high = 1.0;
+    Apart here(c, h, round.half.x, round.half.y, unit(-dot(c, h) * inverse));
     for (int step = 0; step < 60; ++step) {
-        bound = here.bound(s);
+        const double s = here.s;
+        bound = here.bound();
         if ((bound >= limit && bound > 0.0) || here.distance <= touching) break;
         (here.slope > 0.0 ? high : low) = s;
         double next = here.rise > 0.0 ? s - here.slope / here.rise : here.slope > 0.0 ? -1.0 : 1.0;
         if (!(next > low && next < high)) next = next <= low && low == -1.0 ? -1.0 : next >= high && high == 1.0 ? 1.0 : (low + high) / 2.0;
         if (std::fabs(next - s) < 1e-15) break;
-        s = next;
-        here = Apart(c, h, round.half.x, round.half.y, s);
+        here = Apart(c, h, round.half.x, round.half.y, next);
     }
     return here;
 }
@@ -186,7 +188,9 @@ double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     if (apart.distance > touching) {
         if (apart.distance >= a.radius) return a.radius - apart.distance;
         const double depth = a.radius - apart.distance;
-        touch = touch_along(a, b, out_of(b.rotation, over(apart.way, apart.distance)), depth);
+        // Between its ends the way is square to the segment, which rounding spoils where that is long and the way short.
+        const Vec3 way = std::fabs(apart.s) < 1.0 - flat ? apart.way - apart.slope * a.inverse * h : apart.way;
+        touch = touch_along(a, b, out_of(b.rotation, over(way, length(way))), depth);
         return depth;
     }
     // The core meets the cylinder.

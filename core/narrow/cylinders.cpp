@@ -20,16 +20,21 @@ inline void prefer(Way& best, Vec3 n, double extent, double shift) {
     if (reach < best.reach - tie) best = {reach, away(shift) * n};
 }
 
+// A call, for as part of a sum g++ 12 may round product and sum as one, in spite of -ffp-contract=off.
+[[gnu::noinline]] Point times(double s, Point v) { return s * v; }
+
 // Square to the z axis, which is that of `around`; the other's axis and how far it is away are seen from there.
 bool prefer_square_to(Way& best, const Volume& around, const Volume& other, Vec3 axis, Vec3 shift) {
-    const Point across = {axis.x, axis.y}, away = {shift.x, shift.y};
+    const Point across = {axis.x, axis.y};
     Exit exit = {best.reach, {}};
     if (std::fabs(axis.z) > flat) {
-        improve_around({other.half.x, other.half.y, across, axis.z * axis.z, around.half.x}, away, {0.0, 0.0}, exit);
+        improve_around({other.half.x, across, other.half.y * across, axis.z * axis.z, around.half.x}, {shift.x, shift.y}, {0.0, 0.0}, exit);
     } else {
         // The other is seen from the side: a rectangle, along the axis and across it.
-        improve_around({0.0, 0.0, {0.0, 0.0}, 1.0, around.half.x}, {dot(away, across), cross(across, away)}, {other.half.y, other.half.x}, exit);
-        exit.n = exit.n.x * across + exit.n.y * Point{-across.y, across.x};
+        const Disc none = {0.0, {0.0, 0.0}, {0.0, 0.0}, 1.0, around.half.x};
+        const Point turned = times(shift.x, {across.x, -across.y}) + times(shift.y, {across.y, across.x});
+        improve_around(none, turned, {other.half.y, other.half.x}, exit);
+        exit.n = times(exit.n.x, across) + times(exit.n.y, {-across.y, across.x});
     }
     if (!(exit.reach < best.reach)) return false;
     best = {exit.reach, {exit.n.x, exit.n.y, 0.0}};

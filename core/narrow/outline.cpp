@@ -116,10 +116,11 @@ void improve_around(const Disc& seen, Point shift, Point half, Exit& best) {
     const double mirror = leans && seen.axis.x * seen.axis.y < -level ? -1.0 : 1.0;
     Disc disc = seen;
     disc.axis = {std::fabs(seen.axis.x), std::fabs(seen.axis.y)};
+    disc.end = {std::fabs(seen.end.x), std::fabs(seen.end.y)};
     shift.x *= mirror;
     const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x;
     const Point out_x = support(disc, {0.0, 0.0}, x).point, out_y = support(disc, {0.0, 0.0}, y).point;
-    const Point out_square = (disc.radius + disc.ball) * square, end = disc.height * disc.axis;
+    const Point out_square = (disc.radius + disc.ball) * square, end = disc.end;
     Exit found = best;
     improve_part(disc, shift, half + end, x, y, out_x, out_y, found);
     improve_part(disc, shift, Point{-half.x, half.y} + end, y, square, out_y, out_square, found);

@@ -10,10 +10,11 @@ namespace mobee::narrow {
 
 // A cylinder seen along e, in two axes across it.
 struct Disc {
-    double radius, height;  // half
-    Point axis;             // c
-    double lean;            // the square of e.c
-    double ball;            // radius of the circle that is added
+    double radius;
+    Point axis;   // c
+    Point end;    // half the cylinder's axis
+    double lean;  // the square of e.c
+    double ball;  // radius of the circle that is added
 };
 
 // The shortest way that is known.
