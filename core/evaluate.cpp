@@ -3,7 +3,6 @@
 
 #include "contacts.hpp"
 #include "interface.hpp"
-#include "lanes.hpp"
 #include "rows.hpp"
 
 namespace mobee {
@@ -133,24 +132,6 @@ MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
 MOBEE_CALL std::int64_t mobee_evaluate_one(Room* room, Request* request, const double* q) {
     request->q = q;
     return mobee_evaluate(room, request);
-}
-
-// Every link in the poses q (count, motors): (count, links, 4, 4).
-MOBEE_CALL void mobee_link_poses(Room* room, const Robot* robot, const double* q, std::int64_t count, double* out) {
-    if (room->workers.size() == 0) room->workers.push(make<Worker>());
-    Links& links = room->workers[0]->placed.links;
-    room->workers[0]->placed.fit(*robot);
-    for (std::int64_t b = 0; b < count; ++b) {
-        place_links_at(*robot, q + b * robot->motors, links);
-        for (const Frame& frame : links.frame) {
-            Four x = frame.x, y = frame.y, z = frame.z, shift = frame.shift;
-            shift[3] = 1.0;
-            transpose(x, y, z, shift);
-            const Four rows[4] = {x, y, z, shift};
-            std::memcpy(out, rows, sizeof rows);
-            out += 16;
-        }
-    }
 }
 
 }  // namespace mobee

@@ -133,6 +133,22 @@ MOBEE_CALL void mobee_sines_cosines(const double* angles, std::int64_t count, do
     sines_cosines(angles, count, sines, cosines);
 }
 
+// Every link in the poses q (count, motors): (count, links, 4, 4).
+MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64_t count, double* out) {
+    Links links;
+    links.fit(*robot);
+    for (std::int64_t b = 0; b < count; ++b) {
+        place_links_at(*robot, q + b * robot->motors, links);
+        for (const Frame& frame : links.frame) {
+            Four rows[4] = {frame.x, frame.y, frame.z, frame.shift};
+            rows[3][3] = 1.0;
+            transpose(rows[0], rows[1], rows[2], rows[3]);
+            std::memcpy(out, rows, sizeof rows);
+            out += 16;
+        }
+    }
+}
+
 // How a link's point, root frame at zero pose, moves with each motor in the poses q (count, motors): (count, 6, motors).
 MOBEE_CALL void mobee_jacobians(const Robot* robot, const double* q, std::int64_t count, std::int64_t link, const Vec3* point, double* out) {
     Links links;

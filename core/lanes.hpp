@@ -29,6 +29,7 @@ inline V load(const void* from) {
 // NaN of a gives b, as of `least` and `most`.
 inline Four least_of(Four a, Four b) { return a < b ? a : b; }
 inline Four most_of(Four a, Four b) { return a > b ? a : b; }
+inline Eight most_of(Eight a, Eight b) { return a > b ? a : b; }
 inline Four unit_of(Four value) { return least_of(most_of(value, Four{} - 1.0), Four{} + 1.0); }
 inline Four absolute_of(Four value) { return most_of(value, -value); }
 
@@ -95,6 +96,12 @@ inline std::int32_t* put(std::int32_t* to, EightInts from, unsigned which) {
 }
 
 inline void put(float* to, const float* from, unsigned which) { put(reinterpret_cast<std::int32_t*>(to), load<EightInts>(from), which); }
+
+inline float most_in(Eight v) {
+    v = most_of(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+    v = most_of(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
+    return v[0] > v[1] ? v[0] : v[1];
+}
 
 inline void store_single(float* to, Four value) {
     typedef float FourSingle __attribute__((vector_size(16)));

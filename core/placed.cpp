@@ -32,26 +32,35 @@ void Placed::fit(const Robot& robot) {
 
 namespace placing {
 
-constexpr double farthest = 1e15;  // m: beyond it squares would leave single precision
+constexpr float farthest = 1e15f;  // m: beyond it squares would leave single precision
 
-// The centres as columns, and by how much they may be rounded.
+// Four slots at once, those behind the last shape of a cluster too.
 void fill_columns(const Robot& robot, Placed& placed) {
-    Four far{};
+    const Outline* outline = placed.outline.data();
+    float *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data();
     for (const Cluster cluster : robot.cluster) {
-        for (std::int64_t i = cluster.first; i < cluster.end; i += 4) {  // four slots at once, those behind the last shape too
-            Four a = placed.outline[i].center, b = placed.outline[i + 1].center, c = placed.outline[i + 2].center, d = placed.outline[i + 3].center;
+        for (std::int64_t i = cluster.first; i < cluster.end; i += 4) {
+            Four a = outline[i].center, b = outline[i + 1].center, c = outline[i + 2].center, d = outline[i + 3].center;
             transpose(a, b, c, d);
-            far = most_of(most_of(absolute_of(a), absolute_of(b)), most_of(absolute_of(c), far));
-            store_single(&placed.x[i], a);
-            store_single(&placed.y[i], b);
-            store_single(&placed.z[i], c);
+            store_single(x + i, a);
+            store_single(y + i, b);
+            store_single(z + i, c);
         }
     }
-    const double most_far = most(most(far[0], far[1]), most(far[2], far[3]));
-    placed.margin = roomy(0.0, most_far);
-    if (most_far < farthest) return;
-    placed.margin = std::numeric_limits<float>::infinity();  // every pair is near
-    for (Array<float>* column : {&placed.x, &placed.y, &placed.z}) std::fill(column->begin(), column->end(), 0.0f);
+}
+
+Ball ball_about(const Robot& robot, const Placed& placed, Cluster cluster) {
+    Four sum{};
+    for (std::int64_t i = cluster.first; i < cluster.end; ++i) sum += placed.outline[i].center;
+    sum *= 1.0 / static_cast<double>(cluster.end - cluster.first);
+    Ball ball{static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2]), 0.0f};
+    Eight radius{};
+    for (std::int64_t k = cluster.first; k < cluster.end; k += lanes) {
+        const Eight d = load<Eight>(&placed.x[k]) - ball.x, e = load<Eight>(&placed.y[k]) - ball.y, f = load<Eight>(&placed.z[k]) - ball.z;
+        radius = most_of(root_of(d * d + e * e + f * f) + load<Eight>(&robot.bound[k]), radius);
+    }
+    ball.radius = roomy(most_in(radius));
+    return ball;
 }
 
 }  // namespace placing
@@ -73,22 +82,19 @@ void place(const Robot& robot, Placed& placed) {
 
 void bound_clusters(const Robot& robot, Placed& placed) {
     placing::fill_columns(robot, placed);
+    float far = 0.0f;
     for (std::size_t c = 0; c < robot.cluster.size(); ++c) {
-        const Cluster cluster = robot.cluster[c];
-        Four sum{};
-        for (std::int64_t i = cluster.first; i < cluster.end; ++i) sum += placed.outline[i].center;
-        sum *= 1.0 / static_cast<double>(cluster.end - cluster.first);
-        Ball ball{static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2]), 0.0f};
-        Eight radius{};
-        for (std::int64_t k = cluster.first; k < cluster.end; k += lanes) {
-            const Eight d = load<Eight>(&placed.x[k]) - ball.x, e = load<Eight>(&placed.y[k]) - ball.y, f = load<Eight>(&placed.z[k]) - ball.z;
-            const Eight here = root_of(d * d + e * e + f * f) + load<Eight>(&robot.bound[k]);
-            radius = here > radius ? here : radius;
-        }
-        for (int k = 0; k < lanes; ++k) ball.radius = radius[k] > ball.radius ? radius[k] : ball.radius;
-        ball.radius = roomy(ball.radius) + placed.margin;
-        placed.ball[c] = ball;
+        const Ball ball = placed.ball[c] = placing::ball_about(robot, placed, robot.cluster[c]);
+        const float here = std::fabs(ball.x) + std::fabs(ball.y) + std::fabs(ball.z) + ball.radius;
+        far = here < far ? far : here;  // NaN is the farthest
     }
+    placed.margin = roomy(0.0, far);
+    if (!(far < placing::farthest)) {
+        placed.margin = std::numeric_limits<float>::infinity();  // every pair is near
+        for (Array<float>* column : {&placed.x, &placed.y, &placed.z}) std::fill(column->begin(), column->end(), 0.0f);
+        for (Ball& ball : placed.ball) ball = Ball{};
+    }
+    for (Ball& ball : placed.ball) ball.radius += placed.margin;
 }
 
 const Volume& placed_volume(const Robot& robot, Placed& placed, std::int64_t slot) {

@@ -99,7 +99,7 @@ _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 _evaluate_one = function("evaluate_one", ADDRESS, ADDRESS, BYTES, result=INTEGER)
-_link_poses = function("link_poses", ADDRESS, ADDRESS, BYTES, INTEGER, ADDRESS)
+_link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
 _neighbours_free = function("neighbours_free", ADDRESS)
@@ -127,6 +127,13 @@ def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: i
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 
 
+def link_poses(of: Handle, q: Array, links: int) -> Array:
+    """Every link in the poses q (B, n), (B, L, 4, 4)."""
+    out = np.empty((len(q), links, 4, 4))
+    _link_poses(of.at, q.tobytes(), len(q), address(out))
+    return out
+
+
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
     """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
     out = np.empty((len(q), 6, q.shape[1]))
@@ -150,12 +157,6 @@ class Room:
         self._one_at = ctypes.addressof(self._one)
         self._scene: Handle | None = None
         self._asked: tuple[object, ...] = ()  # what the last evaluation of one pose was asked
-
-    def link_poses(self, of: Handle, q: Array, links: int) -> Array:
-        """Every link in the poses q (B, n), (B, L, 4, 4)."""
-        out = np.empty((len(q), links, 4, 4))
-        _link_poses(self._at, of.at, q.tobytes(), len(q), address(out))
-        return out
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
         """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""

@@ -48,10 +48,7 @@ class Engine:
 
     def transforms(self, q: Array) -> Array:
         """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
-        room = self._room()
-        found = room.link_poses(self._bare, q, len(self.robot.links))
-        self._rooms.append(room)
-        return found
+        return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
         """How the point (3,) of a link, root frame at zero pose, moves with each motor in the poses q (B, n): (B, 6, n)."""
@@ -66,19 +63,17 @@ class Engine:
         scene = self._scene
         if scene is None or scene.snapshot is not snapshot:
             scene = self.scene_of(snapshot)
-        room, hands = self._room(), hand_numbers(reaching) if reaching else _NOBODY
+        try:
+            room = self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            room = core.Room(len(self.robot.motor_table))
+        hands = hand_numbers(reaching) if reaching else _NOBODY
         if q.ndim == 1:
             numbers, reals, torque = room.evaluate_one(scene.handle, q, hands, cut)
         else:
             numbers, reals, torque = room.evaluate(scene.handle, q, hands, cut, threads)
         self._rooms.append(room)
         return ContactTable(self._shapes, snapshot.names, numbers, reals), torque
-
-    def _room(self) -> core.Room:
-        try:
-            return self._rooms.pop()  # as one step: other threads take rooms too
-        except IndexError:
-            return core.Room(len(self.robot.motor_table))
 
     def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
         """The table of what the core has written."""

@@ -117,6 +117,11 @@ def _check(robot: Robot) -> None:
             raise InvalidValue(
                 f"shape {shape.name!r} of {robot.name!r} is on link {shape.link}; it must be one of 0 to {len(robot.links) - 1}."
             )
+    for marker in robot.markers.values():
+        if not 0 <= marker.link < len(robot.links):
+            raise InvalidValue(
+                f"marker {marker.name!r} of {robot.name!r} is on link {marker.link}; it must be one of 0 to {len(robot.links) - 1}."
+            )
     if len(robot.links) != len(robot.joints) + 1:
         raise InvalidValue(
             f"{robot.name!r} has {len(robot.links)} links and {len(robot.joints)} joints; each joint moves a link but the first."
@@ -147,7 +152,7 @@ def _hull(vertices: Array) -> tuple[Array, list[list[int]]]:
 
     try:
         hull = ConvexHull(vertices)
-    except QhullError:
+    except (QhullError, ValueError):
         return none
     number = {int(corner): place for place, corner in enumerate(hull.vertices)}
     joined: list[set[int]] = [set() for _ in number]

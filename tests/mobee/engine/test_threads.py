@@ -6,9 +6,11 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 
 import mobee
 from mobee.engine.hands import NOBODY
+from mobee.errors import InvalidValue
 from tests.mobee.engine.random_scenes import loaded, posed, random_world
 
 THREADS = 8
@@ -31,7 +33,7 @@ def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.
     def evaluate(seed: int) -> list[mobee.Pose]:
         poses = []
         for index in np.random.default_rng(seed).integers(0, len(q), 300):
-            pose = model.evaluate(q[index] if seed % 2 else q[index : index + 3])
+            pose = model.evaluate(q[index]) if seed % 2 else model.evaluate(q[index : index + 3], threads=1 + seed % 3)
             assert len(pose.table) >= 0  # now, while the others evaluate and edit
             poses.append(pose)
         return poses
@@ -63,3 +65,40 @@ def test_threads_leave_at_most_a_room_each(rng: np.random.Generator) -> None:
         for _ in range(5):
             list(pool.map(lambda one: len(model.evaluate(one).table), q))
     assert len(model._engine._rooms) <= THREADS
+
+
+@pytest.mark.parametrize("objects", [0, 120])
+@pytest.mark.parametrize("poses", [0, 1, 2, 50])
+def test_any_number_of_threads_gives_the_same_bits(poses: int, objects: int, rng: np.random.Generator) -> None:
+    robot = loaded("icub")
+    model, q = mobee.Model(robot, random_world(rng, robot, objects, 0.6)), posed(rng, robot, poses)
+    model.world.add("held", mobee.sphere(0.1))
+    model.world.attach("held", robot.links[-1], ((0.0, 0.0, 0.0), np.eye(3)))
+    alone = model.evaluate(q)
+    assert len(alone.table) > 0 or poses * objects == 0
+    for threads in (2, 3, 7, 100):
+        shared = model.evaluate(q, threads=threads)
+        assert np.array_equal(shared.table.numbers, alone.table.numbers)
+        assert np.array_equal(shared.table.reals, alone.table.reals)
+        assert np.array_equal(shared.projection, alone.projection)
+        assert np.array_equal(shared.projection_of_part, alone.projection_of_part)
+
+
+def test_fewer_threads_than_one_are_refused() -> None:
+    robot = loaded("katana")
+    with pytest.raises(InvalidValue, match="threads 0"):
+        mobee.Model(robot).evaluate(robot.home, threads=0)
+
+
+def test_what_an_evaluation_has_given_stays_when_the_model_is_gone(rng: np.random.Generator) -> None:
+    """Its memory is the table's; later evaluations must not write there."""
+    robot = loaded("icub")
+    model, q = mobee.Model(robot, random_world(rng, robot, 150, 0.6)), posed(rng, robot, 200)
+    kept = [model.evaluate(q).table for _ in range(3)]
+    numbers, reals = kept[0].numbers.copy(), kept[0].reals.copy()
+    for shift in (0.1, 0.2):
+        assert len(model.evaluate(q + shift, threads=2).table) > 1000
+    del model
+    for table in kept:
+        assert np.array_equal(table.numbers, numbers)
+        assert np.array_equal(table.reals, reals)
