@@ -61,6 +61,12 @@ def mink(model: mobee.Model) -> Solve:
     return solve
 
 
+def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
+    """Whether a target was reached, after how many evaluations and ms of processor time."""
+    start = time.process_time()
+    return *solve(aim, seed), 1e3 * (time.process_time() - start)
+
+
 @dataclass(slots=True)
 class Tries:
     """What came of targets, in order: whether each was reached, its evaluations and its processor time, failures as they are."""
@@ -72,12 +78,7 @@ class Tries:
 
     def add(self, solve: Solve, aim: Target, seed: int, speeds: Calibration) -> None:
         """One target more."""
-
-        def timed() -> tuple[bool, int, float]:
-            start = time.process_time()
-            return *solve(aim, seed), 1e3 * (time.process_time() - start)
-
-        (reached, evaluations, ms), speed = speeds.around(timed)
+        (reached, evaluations, ms), speed = speeds.around(lambda: timed(solve, aim, seed))
         self.reached.append(reached)
         self.evaluations.append(evaluations)
         self.ms.append(ms)
