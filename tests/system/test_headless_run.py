@@ -17,7 +17,7 @@ def test_live_at_the_table(tmp_path: Path) -> None:
     print(summary_line(summary))
     for agent in AGENTS:
         counts = summary["agents"][agent]
-        assert counts["transitions"] + counts["timeouts"] >= 2, "an action that times out takes 20 of the 30 s"
+        assert counts["transitions"] + counts["timeouts"] >= 1, "an action takes at most 20 of the 30 s, a second may not end"
     check_that_nothing_touches(summary)
 
 
