@@ -224,7 +224,7 @@ def _on_two_threads(scene: Scene, rounds: int) -> dict[str, float] | None:
 
     def seconds(threads: int) -> float:
         start = time.perf_counter()
-        pose = model.evaluate(q, threads=threads)  # type: ignore[call-arg]
+        pose = model.evaluate(q, threads=threads)
         _ = pose.table, pose.projection
         return time.perf_counter() - start
 

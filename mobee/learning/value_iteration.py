@@ -48,6 +48,7 @@ class Tabled:
         return self._table
 
     def _tabled(self) -> TransitionTable:
+        """Each kind of table makes its own."""
         raise NotImplementedError
 
 
