@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from mobee.robot.robot import Array, Ints
 NO_ACTION = -1
 DISTANCE_DECIMALS = 9  # squared distances that agree to here are a tie, whatever the rounding of the fractions
 ROWS = 1000  # states whose candidates are in memory at a time
+FEW = 2000  # points up to which comparing all takes less time than importing SciPy's k-d tree, and 22 MB less memory
 
 
 def lattice_strides(sizes: Sequence[int]) -> Ints:
@@ -44,14 +46,23 @@ def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
     """
     rng = np.random.default_rng(tie_seed)
     goals = np.empty((len(points), count), dtype=np.intp)
-    search = tree(points)
+    for state, candidates in enumerate(_candidates(points, count)):
+        goals[state] = _drawn(state, candidates, points, count, rng)
+    return goals
+
+
+def _candidates(points: Array, count: int) -> Iterator[Ints]:
+    """For each point, ascending: at least those that are no farther than its nearest `count` others."""
+    if len(points) <= FEW:
+        for _ in points:
+            yield np.arange(len(points))
+        return
+    search = _tree(points)
     for first in range(0, len(points), ROWS):
         some = points[first : first + ROWS]
         reach = np.sqrt(search.query(some, count + 1)[0][:, -1] ** 2 + 10.0 ** (1 - DISTANCE_DECIMALS))
-        near = search.query_ball_point(some, reach, return_sorted=True)
-        for state, candidates in enumerate(near, start=first):
-            goals[state] = _drawn(state, np.array(candidates), points, count, rng)
-    return goals
+        for candidates in search.query_ball_point(some, reach, return_sorted=True):
+            yield np.array(candidates)
 
 
 def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.random.Generator) -> Ints:
@@ -64,13 +75,21 @@ def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.rand
     return np.sort(np.concatenate([certain, drawn]))
 
 
-def tree(points: Array) -> Any:
-    """A k-d tree of points, shape (S, d)."""
-    from scipy.spatial import KDTree  # 0.1 s, more than the rest of learning takes to import
+def nearest_finder(points: Array) -> Callable[[Array], int]:
+    """A function that takes a point, shape (d,), and returns the index of the nearest of `points`, shape (S, d)."""
+    return partial(_nearest_of_few, points) if len(points) <= FEW else partial(_nearest_in_tree, _tree(points))
+
+
+def _nearest_of_few(points: Array, point: Array) -> int:
+    off = points - point
+    return int(np.einsum("ij,ij->i", off, off).argmin())
+
+
+def _nearest_in_tree(search: Any, point: Array) -> int:
+    return int(search.query(point)[1])
+
+
+def _tree(points: Array) -> Any:
+    from scipy.spatial import KDTree
 
     return KDTree(points)
-
-
-def nearest(search: Any, point: Array) -> int:
-    """The index of the point of a tree that is nearest to one, shape (d,)."""
-    return int(search.query(point)[1])

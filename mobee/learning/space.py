@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from math import isfinite
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.errors import InvalidValue
-from mobee.learning.neighbours import NO_ACTION, nearest, tree
+from mobee.learning.neighbours import NO_ACTION, nearest_finder
 from mobee.real_array import real_array
 from mobee.robot.robot import Array, Ints, Part, Robot
 
@@ -131,11 +131,11 @@ class Space:
 
     def _cell(self, q: list[float]) -> int:
         """The state of a pose of the joints, one number each, in [rad]."""
-        return nearest(self._tree, (np.array(q) - self._low) / self._spans)
+        return self._nearest((np.array(q) - self._low) / self._spans)
 
     @cached_property
-    def _tree(self) -> Any:
-        return tree((self.samples - self._low) / self._spans)
+    def _nearest(self) -> Callable[[Array], int]:
+        return nearest_finder((self.samples - self._low) / self._spans)
 
     def _checked_state(self, state: int) -> int:
         if not 0 <= state < len(self._counts):
