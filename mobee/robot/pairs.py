@@ -95,7 +95,7 @@ def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPa
 def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
     """The pairs of links that these pairs of shapes belong to."""
     link = np.array([shape.link for shape in shapes], dtype=np.intp)
-    return {frozenset(pair) for some in pairs for pair in map(tuple, np.unique(link[some].reshape(-1, 2), axis=0).tolist())}
+    return {frozenset(pair) for some in pairs for pair in set(map(tuple, link[some].reshape(-1, 2).tolist()))}
 
 
 def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
