@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from mobee.robot.robot import Array
+from services.vision.regions import border, boxes, label, without_holes
 
 Picture = NDArray[np.uint8]
 
@@ -44,10 +44,10 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
     """
     height, width = picture.shape[:2]
     found = []
-    for border, area in _red_blobs(picture):
-        inner = (border > 0).all(axis=1) & (border < (width - 1, height - 1)).all(axis=1)
+    for edge, area in _red_blobs(picture):
+        inner = (edge > 0).all(axis=1) & (edge < (width - 1, height - 1)).all(axis=1)
         if area >= MIN_AREA and inner.sum() >= 12:
-            sighting = _fit(_rays(border[inner], intrinsics), float(intrinsics[0, 0]))
+            sighting = _fit(_rays(edge[inner], intrinsics), float(intrinsics[0, 0]))
             if sighting is not None:
                 found.append(sighting)
     return sorted(found, key=lambda s: -s.half_angle)
@@ -55,18 +55,18 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
 
 def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
     """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough, without its holes."""
-    regions, _ = ndimage.label(_red_pixels(picture), np.ones((3, 3)))
+    regions = label(_red_pixels(picture), diagonal=True)
     blobs = []
-    for number, where in enumerate(ndimage.find_objects(regions), start=1):
+    for number, where in enumerate(boxes(regions), start=1):
         if regions[where].size < MIN_AREA:
             continue
-        region = ndimage.binary_fill_holes(regions[where] == number)
+        region = without_holes(regions[where] == number)
         if region.sum() < MIN_AREA:
             continue
-        border = np.argwhere(region & ~ndimage.binary_erosion(region))
+        edge = np.argwhere(border(region))
         # Of the polygon through the centres of the border's pixels, by Pick's theorem.
-        area = float(region.sum() - 0.5 * len(border) - 1.0)
-        blobs.append(((border + (where[0].start, where[1].start))[:, ::-1].astype(np.float64), area))
+        area = float(region.sum() - 0.5 * len(edge) - 1.0)
+        blobs.append(((edge + (where[0].start, where[1].start))[:, ::-1].astype(np.float64), area))
     return blobs
 
 
