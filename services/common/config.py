@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
-import tyro
 from msgspec import Meta, Struct
 
 from mobee.errors import InvalidValue
@@ -67,6 +66,10 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
                 raise ConfigError("--config needs a file")
             default = read_toml(Path(arguments[at + 1]), cls)
             del arguments[at : at + 2]
+        if not arguments:
+            return default
+        import tyro  # 0.1 s, which a service that is given a file alone does not wait for
+
         parsed = tyro.cli(
             cls, default=default, args=arguments, prog=prog, description=f"{cls.__doc__}  --config FILE: a TOML file with any of these."
         )
