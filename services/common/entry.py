@@ -1,7 +1,8 @@
-"""How a service begins with its robot, and ends in one line when it was given something that it cannot use."""
+"""How a service begins: with its robot, when it may; and how it ends in one line when it was given something that it cannot use."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,14 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 from services.common.session import BusUnreachable
+
+HELD = "MOBEE_HELD"  # set: standard input is a pipe that the launcher closes when the service may join the others
+
+
+def wait_until_released() -> None:
+    """Wait until the services that this one needs are ready, where the launcher has started it before they are."""
+    if os.environ.pop(HELD, None) is not None:
+        os.read(sys.stdin.fileno(), 1)  # the end of the file: nobody writes
 
 
 def robot_of(config: ServiceConfig) -> Robot:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import secrets
@@ -24,6 +25,7 @@ from services.common.answering import Answering
 from services.common.answering import CallRefused as CallRefused
 from services.common.bus import Bus
 from services.common.config import ServiceConfig
+from services.common.entry import wait_until_released
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
 from services.common.session import LEASE, open_client, spare_threads
@@ -57,6 +59,8 @@ class Service(Listener):
         if config.mode == "lock":
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
+        if session is None:
+            wait_until_released()
         session = session or open_client(config.endpoint, namespace=config.namespace, lease=lease)
         with ExitStack() as failed:
             failed.enter_context(session)  # closed: an open callback would keep the interpreter from exiting
@@ -138,6 +142,7 @@ class Service(Listener):
         """Tell the world: after every subscriber and queryable is declared."""
         gc.collect()
         gc.freeze()  # what lives as long as the process is not looked at again: a full collection would stall a tick
+        _return_free_memory()
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)
@@ -212,6 +217,13 @@ class Service(Listener):
         self.log.info("asked by %s to end", request.who)
         self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply is out
         return Done(v=VERSION)
+
+
+def _return_free_memory() -> None:
+    """Return to the system what starting has used and freed, where the C library can: 23 MB where meshes were read."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc
+    if trim is not None:
+        trim(0)
 
 
 def _leave() -> None:

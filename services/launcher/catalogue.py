@@ -15,7 +15,7 @@ class Entry:
     module: str  # run with `python -m`
     config: str  # its configuration: module:class
     stage: int  # services are listed in this order, and stopped in the opposite one
-    after: tuple[str, ...] = ()  # who must be ready before it is started
+    after: tuple[str, ...] = ()  # who must be ready before it joins them
     nice: int = 0
     vital: bool = True  # when it is given up, the robot is stopped
     steps: bool = True  # lockstep: every tick waits for it

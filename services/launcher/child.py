@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from bus_schema.rpc import Stat
+from services.common.entry import HELD
 
 Phase = Literal["waiting", "starting", "ready", "failed", "fault", "ended"]
 
@@ -70,20 +71,26 @@ class Child:
     def spawn(self) -> None:
         """Start the process: in its own group, so that a terminal's Ctrl-C reaches the launcher alone.
 
-        In the same session, though: with autogroup scheduling, niceness counts only within one.
+        In the same session, though: with autogroup scheduling, niceness counts only within one.  The service imports what it
+        needs, reads its robot, and then waits for `release` before it joins the others.
         """
         with self.program.log.open("ab") as log:
             self.process = subprocess.Popen(
                 self.program.argv,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **_ONE_THREAD, "PYTHONUNBUFFERED": "1"},
+                env={**os.environ, **_ONE_THREAD, "PYTHONUNBUFFERED": "1", HELD: "1"},
                 process_group=0,
             )
         if self.program.nice:
             os.setpriority(os.PRIO_PROCESS, self.process.pid, self.program.nice)
         self.has_token, self.asking, self.unanswered, self.asked_at, self.answered_at, self.stat = False, False, 0, 0.0, 0.0, None
+
+    def release(self) -> None:
+        """Let the service join the others."""
+        assert self.process is not None and self.process.stdin is not None
+        self.process.stdin.close()
         self.enter("starting")
 
     def exit_code(self) -> int | None:
@@ -108,6 +115,8 @@ class Child:
         except ProcessLookupError:
             pass  # all of them are gone
         self.process.wait()
+        if self.process.stdin is not None:
+            self.process.stdin.close()
         self.process = None  # its number may now name another process
 
     def last_words(self) -> str:

@@ -42,7 +42,9 @@ class Supervisor:
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
-        """Start what waits for nobody; the rest follows while the service spins."""
+        """Start all; what waits for nobody joins at once, the rest follows while the service spins."""
+        for child in self.children.values():
+            child.spawn()
         self._look()
 
     def settled(self) -> bool:
@@ -88,10 +90,11 @@ class Supervisor:
         if child.phase == "waiting":
             before = (self.children[who] for who in child.program.after if who in self.children)
             if all(other.phase in ("ready", "ended") for other in before):
-                child.spawn()
+                child.release()
         elif child.phase == "failed" and now >= child.again_at:
             child.restarts += 1
             child.spawn()
+            child.release()
         elif child.phase in ("starting", "ready"):
             self._look_at_process(child, now)
 

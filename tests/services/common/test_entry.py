@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from services.common.entry import HELD
+from services.launcher.child import Child, Program
+
+PROGRAM = """
+from services.common.entry import wait_until_released
+print("imported", flush=True)
+wait_until_released()
+print("released", flush=True)
+"""
+LIMIT = 30.0  # s
+
+
+def test_a_service_that_was_started_early_waits_until_it_is_released(tmp_path: Path) -> None:
+    log = tmp_path / "one.log"
+    child = Child(Program("one", (sys.executable, "-c", PROGRAM), log))
+    child.spawn()
+    try:
+        end = time.monotonic() + LIMIT
+        while log.read_text() != "imported\n" and time.monotonic() < end:
+            time.sleep(0.01)
+        time.sleep(0.2)
+        assert log.read_text() == "imported\n"
+        assert child.running()
+        child.release()
+        assert child.process is not None
+        assert child.process.wait(LIMIT) == 0
+        assert log.read_text() == "imported\nreleased\n"
+    finally:
+        child.kill()
+
+
+def test_a_service_that_is_started_by_hand_waits_for_nobody() -> None:
+    environment = {name: value for name, value in os.environ.items() if name != HELD}
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, text=True
+    ) as process:
+        assert process.wait(LIMIT) == 0
