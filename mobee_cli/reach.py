@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mobee.errors import ActionInterrupted, MobeeError
-from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import reaching_parts
 from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of

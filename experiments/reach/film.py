@@ -28,7 +28,7 @@ from experiments.reach.telling import selected
 from experiments.reaching.scene import LEARNED, MARKER, PART
 from experiments.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
-from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget

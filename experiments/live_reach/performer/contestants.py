@@ -16,7 +16,7 @@ from experiments.live_reach.problems import TARGET_MOVES, Problem
 from experiments.live_reach.settings import AIM, APART, GOOD, MARKER, PART, RATE, REACHES, belief
 from experiments.reaching.course import Course
 from experiments.reaching.planner_peer import PlannerPeer
-from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.robot.robot import Array
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.reach.film import episodes, learn, main, table_plant
-from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.reach import TARGET
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from mobee.errors import MobeeError, UnknownName
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.reaching.load import load_reaches
+from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.predictors import PREDICTORS
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.transitions import TransitionModel
