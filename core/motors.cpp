@@ -238,6 +238,8 @@ MOBEE_CALL void mobee_motors_drive(mobee::Motors* motors, double dt) { mobee::dr
 
 MOBEE_CALL void mobee_motors_integrate(const mobee::Motors* motors, double dt) { mobee::integrate(*motors, dt); }
 
+MOBEE_CALL void mobee_motors_move(mobee::Motors* motors, std::int64_t substeps, double dt) { mobee::move(*motors, substeps, dt); }
+
 MOBEE_CALL void mobee_motors_adopt(const mobee::Motors* motors, const double* q, double dt) {
     for (const std::int64_t i : motors->living) mobee::motors::adopt(motors->numbers[i], motors->state[i], q[i], dt);
 }

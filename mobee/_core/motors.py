@@ -50,6 +50,7 @@ class Calls:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER, INTEGER)
         self.drive = function("motors_drive", ADDRESS, REAL)
         self.integrate = function("motors_integrate", ADDRESS, REAL)
+        self.move = function("motors_move", ADDRESS, INTEGER, REAL)
         self.adopt = function("motors_adopt", ADDRESS, ADDRESS, REAL)
         self.read = function("motors_read", ADDRESS, ctypes.c_uint64, INTEGER, ADDRESS, ADDRESS)
         self.to_velocity = function("braking_to_velocity", ADDRESS, ADDRESS, ADDRESS)

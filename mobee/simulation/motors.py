@@ -133,6 +133,11 @@ class Motors:
         """Kinematic joint side: go where `drive` asked, as far as the hard stops."""
         self._core.integrate(self.address, self._dt)
 
+    def move(self, substeps: int, dt: float) -> None:
+        """As so many times `drive` and `integrate`, by substeps of dt [s] under the same load."""
+        self.begin_substeps(dt)
+        self._core.move(self.address, substeps, dt)
+
     def adopt(self, q: Array) -> None:
         """Take the joint side (n,) rad at the end of the substep, as a physics engine says.
 

@@ -27,12 +27,13 @@ class KinematicBackend:
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s]."""
-        substeps = self._parameters.substeps(dt)
+        substeps, motors = self._parameters.substeps(dt), self.motors
+        if not motors.in_torque.any():
+            motors.move(substeps, dt / substeps)
+            return
         for _ in range(substeps):
-            if self.motors.in_torque.any():
-                self.motors.load = gravity_torque(self._robot, self.motors.q)
-            self.motors.drive(dt / substeps)
-            self.motors.integrate()
+            motors.load = gravity_torque(self._robot, motors.q)
+            motors.move(1, dt / substeps)
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
         """Put a world object somewhere, m; raises MobeeError."""

@@ -36,6 +36,16 @@ def test_ideal_motors_do_what_they_are_told_at_once() -> None:
     assert np.array_equal(m.encoders(1, 0.01), m.q)
 
 
+def test_many_substeps_in_one_call_are_as_many_calls() -> None:
+    at_once, one_by_one = motors(MotorParameters()), motors(MotorParameters())
+    for velocity in ([0.5, -0.2, 0.1], [-0.3, 0.4, 0.0], [9.0, -9.0, 9.0]):
+        for m in (at_once, one_by_one):
+            m.command(ALL, "velocity", np.array(velocity))
+        at_once.move(40, STEP)
+        run(one_by_one, 40 * STEP)
+        assert at_once.state.tobytes() == one_by_one.state.tobytes()
+
+
 def test_the_lag_is_a_first_order_response() -> None:
     m = motors(replace(IDEAL, lag=0.05))
     m.command(ALL, "velocity", np.full(3, 0.5))
