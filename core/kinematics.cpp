@@ -9,31 +9,7 @@ namespace mobee {
 
 namespace kinematics {
 
-constexpr double large = 1e5;  // rad: beyond it the reduction below loses digits
-constexpr double pi_2_high = 1.5707963267341256, pi_2_middle = 6.077100506303966e-11, pi_2_low = 2.0222662487959506e-21;
-constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52: added to a number, it leaves the nearest integer in the last bits
-
-// Reduction to a quarter turn (Cody and Waite), then Taylor to 1e-17.
-inline void sine_cosine(Four angle, Four& sine, Four& cosine) {
-    const Four shifted = angle * 0.6366197723675814 + rounder;
-    const Four quarter = shifted - rounder;
-    const Four x = ((angle - quarter * pi_2_high) - quarter * pi_2_middle) - quarter * pi_2_low;
-    const Four z = x * x;
-    Four s = z * (1.6059043836821613e-10 - z * 7.647163731819816e-13);
-    s = z * (-1.984126984126984e-04 + z * (2.7557319223985893e-06 - z * 2.505210838544172e-08 + z * s));
-    s = x + x * z * (-1.6666666666666666e-01 + z * 8.333333333333333e-03 + z * s);
-    Four c = z * (2.08767569878681e-09 - z * (1.1470745597729725e-11 - z * 4.779477332387385e-14));
-    c = z * (-1.3888888888888889e-03 + z * (2.48015873015873e-05 - z * 2.755731922398589e-07 + z * c));
-    c = z * (0.5 - z * (4.1666666666666664e-02 + c));
-    FourMarks turn;
-    std::memcpy(&turn, &shifted, sizeof turn);
-    turn &= 3;
-    const FourMarks odd = (turn & 1) == 1;
-    const Four big = odd ? 1.0 - c : s;
-    const Four small = odd ? s : 1.0 - c;
-    sine = turn >= 2 ? -big : big;
-    cosine = turn == 0 ? c : 1.0 - (((turn ^ (turn >> 1)) & 1) == 1 ? -small : small);
-}
+constexpr double large = 1e5;  // rad: beyond it `sine_cosine` loses digits
 
 void set_large_ones(const double* angles, std::int64_t count, double* sines, double* cosines) {
     for (std::int64_t j = 0; j < count; ++j) {
@@ -65,7 +41,7 @@ void joint_angles(const Robot& robot, const double* q, double* angles) {
 void sines_cosines(const double* angles, std::int64_t count, double* sines, double* cosines) {
     Four sine, cosine, largest{};
     const auto look_at = [&](Four angle) {
-        kinematics::sine_cosine(angle, sine, cosine);
+        sine_cosine(angle, sine, cosine);
         const Four size = angle < 0.0 ? -angle : angle;
         largest = size < largest ? largest : size;  // NaN, of angles that have overflown, is the largest
     };

@@ -103,6 +103,41 @@ inline float most_in(Eight v) {
     return v[0] > v[1] ? v[0] : v[1];
 }
 
+inline Four root_of(Four value) {
+#if defined(__AVX__)
+    return reinterpret_cast<Four>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(value)));
+#else
+    for (int k = 0; k < 4; ++k) value[k] = std::sqrt(value[k]);
+    return value;
+#endif
+}
+
+inline void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
+
+// Sines, and by how much cosines are less than 1, of angles up to 1e5: reduced to a quarter turn (Cody and Waite), then Taylor to 1e-17.
+inline void sine_cosine(Four angle, Four& sine, Four& cosine) {
+    constexpr double pi_2_high = 1.5707963267341256, pi_2_middle = 6.077100506303966e-11, pi_2_low = 2.0222662487959506e-21;
+    constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52: added to a number, it leaves the nearest integer in the last bits
+    const Four shifted = angle * 0.6366197723675814 + rounder;
+    const Four quarter = shifted - rounder;
+    const Four x = ((angle - quarter * pi_2_high) - quarter * pi_2_middle) - quarter * pi_2_low;
+    const Four z = x * x;
+    Four s = z * (1.6059043836821613e-10 - z * 7.647163731819816e-13);
+    s = z * (-1.984126984126984e-04 + z * (2.7557319223985893e-06 - z * 2.505210838544172e-08 + z * s));
+    s = x + x * z * (-1.6666666666666666e-01 + z * 8.333333333333333e-03 + z * s);
+    Four c = z * (2.08767569878681e-09 - z * (1.1470745597729725e-11 - z * 4.779477332387385e-14));
+    c = z * (-1.3888888888888889e-03 + z * (2.48015873015873e-05 - z * 2.755731922398589e-07 + z * c));
+    c = z * (0.5 - z * (4.1666666666666664e-02 + c));
+    FourMarks turn;
+    std::memcpy(&turn, &shifted, sizeof turn);
+    turn &= 3;
+    const FourMarks odd = (turn & 1) == 1;
+    const Four big = odd ? 1.0 - c : s;
+    const Four small = odd ? s : 1.0 - c;
+    sine = turn >= 2 ? -big : big;
+    cosine = turn == 0 ? c : 1.0 - (((turn ^ (turn >> 1)) & 1) == 1 ? -small : small);
+}
+
 inline void store_single(float* to, Four value) {
     typedef float FourSingle __attribute__((vector_size(16)));
     const FourSingle single = __builtin_convertvector(value, FourSingle);

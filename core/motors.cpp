@@ -5,6 +5,7 @@
 
 #include "interface.hpp"
 #include "law.hpp"
+#include "normals.hpp"
 
 namespace mobee {
 
@@ -95,50 +96,6 @@ inline void stop_hard(const MotorNumbers& numbers, MotorState& state, double dt)
     adopt(numbers, state, state.dragged, dt);
 }
 
-// Counters are mixed as by splitmix64 (Steele, Lea, Flood 2014): every bit of x changes each of the result with probability 1/2.
-std::uint64_t mixed(std::uint64_t x) {
-    x += 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return x ^ (x >> 31);
-}
-
-constexpr std::int64_t at_once = 32;  // couples of motors
-
-// What all motors share at a tick.
-std::uint64_t tick_key(std::uint64_t seed, std::int64_t tick) { return mixed(mixed(seed) ^ static_cast<std::uint64_t>(tick)); }
-
-// Motors 2 number and 2 number + 1, and which of them live.
-struct Couple {
-    std::int64_t number = 0;
-    bool even = false, odd = false;
-};
-
-struct Normals {
-    double even = 0.0, odd = 0.0;
-};
-
-// The standard normals of some couples (Box and Muller).  One loop for each function: the processor then works on several at once.
-void draw(std::uint64_t key, const Couple* couples, std::int64_t count, Normals* drawn) {
-    constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
-    double radius[at_once], angle[at_once];
-    for (std::int64_t k = 0; k < count; ++k) {
-        const std::uint64_t one = mixed(key ^ mixed(static_cast<std::uint64_t>(couples[k].number))), two = mixed(one);
-        radius[k] = (static_cast<double>(one >> 11) + 1.0) * unit;
-        angle[k] = turn * (static_cast<double>(two >> 11) * unit);
-    }
-    for (std::int64_t k = 0; k < count; ++k) radius[k] = std::sqrt(-2.0 * std::log(radius[k]));
-    for (std::int64_t k = 0; k < count; ++k) {
-        if (couples[k].even && couples[k].odd) {
-            drawn[k] = {radius[k] * std::cos(angle[k]), radius[k] * std::sin(angle[k])};
-        } else if (couples[k].even) {
-            drawn[k].even = radius[k] * std::cos(angle[k]);
-        } else {
-            drawn[k].odd = radius[k] * std::sin(angle[k]);
-        }
-    }
-}
-
 // References that never ask motors for more than their velocity and acceleration, and never for what cannot be braked.
 struct Braking {
     std::int64_t count = 0;
@@ -204,26 +161,17 @@ void move(Motors& motors, std::int64_t substeps, double dt) {
 }
 
 void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
-    const std::uint64_t key = motors::tick_key(seed, tick);
     const View<const std::int64_t> living = motors.living;
-    motors::Couple couples[motors::at_once];
-    motors::Normals drawn[motors::at_once];
+    Normals normals(seed, tick);
     for (std::int64_t first = 0, end = 0; first < living.size; first = end) {
-        std::int64_t count = 0;
-        for (; end < living.size; ++end) {
-            const std::int64_t number = living[end] / 2;
-            if (count == 0 || couples[count - 1].number != number) {
-                if (count == motors::at_once) break;
-                couples[count++] = {number, false, false};
-            }
-            (living[end] % 2 ? couples[count - 1].odd : couples[count - 1].even) = true;
-        }
-        motors::draw(key, couples, count, drawn);
-        const motors::Normals* of = drawn;
+        normals.count = 0;
+        for (; end < living.size && normals.takes(living[end] / 2); ++end) normals.take(living[end] / 2);
+        normals.draw();
+        std::int64_t couple = 0;
         for (std::int64_t k = first; k < end; ++k) {
             const std::int64_t i = living[k];
-            if (k > first && living[k - 1] / 2 != i / 2) ++of;
-            q[i] = motors.state[i].q + noise[i] * (i % 2 ? of->odd : of->even);
+            couple += normals.couples[couple] != i / 2;
+            q[i] = motors.state[i].q + noise[i] * (i % 2 ? normals.odd : normals.even)[couple];
         }
     }
 }

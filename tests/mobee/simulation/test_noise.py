@@ -20,7 +20,13 @@ def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
 
 @pytest.mark.parametrize(("seed", "k", "motor"), [(0, 0, 0), (7, 1, 1), (2**64 - 1, 10**9, 40)])
 def test_a_normal_is_box_muller_of_splitmix(seed: int, k: int, motor: int) -> None:
-    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(normal(seed, k, motor), rel=1e-12)
+    assert normals(seed, range(k, k + 1), np.array([motor]))[0, 0] == pytest.approx(normal(seed, k, motor), rel=1e-15, abs=2e-15)
+
+
+def test_many_normals_are_box_mullers_to_some_units_in_the_last_place() -> None:
+    """Of a radius of up to 8.6."""
+    expected = [[normal(5, k, motor) for motor in range(41)] for k in range(400)]
+    assert np.abs(normals(5, range(400), np.arange(41)) - expected).max() < 4e-15
 
 
 def test_it_is_a_pure_function_of_seed_tick_and_motor() -> None:
