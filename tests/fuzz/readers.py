@@ -8,8 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mobee.errors import RobotFileError
-from mobee.robot.robot import Robot
+from mobee.collision.world import World
+from mobee.errors import MobeeError, RobotFileError
+from mobee.model import Model
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Array, Robot
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.xml_world import read_world
 from mobee.robot.zero_position import read_robot
@@ -20,6 +23,8 @@ SHIPPED = FUZZ.parents[1] / "mobee" / "robot"
 CORPUS = FUZZ.parent / "corpus"
 DIVIDER = b"\n%%\n"  # between the files of one input
 URDF_FILES = ("given.urdf", "given.srdf", "given.stl", "given.obj", "given.dae")
+MOST_SHAPES = 200  # of a robot whose contacts are computed: more would take an input's time
+POSES = 3  # besides home
 OPTIONS = (UrdfOptions(), UrdfOptions(field=0.03), UrdfOptions(field=0.03, meshes="bounding"))  # taken in turn
 
 
@@ -30,12 +35,14 @@ def feed_xml(content: bytes, folder: Path) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            check_robot(read_robot(path))
+            robot = read_robot(path)
+            check_robot(robot)
+            check_poses(robot, World())
             return True
         except RobotFileError as error:
             check_message(error, folder)
         try:
-            read_world(path)
+            check_poses(load_robot("katana"), read_world(path))
             return True
         except RobotFileError as error:
             check_message(error, folder)
@@ -52,7 +59,9 @@ def feed_urdf(content: bytes, folder: Path) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            check_robot(read_urdf(folder / URDF_FILES[0], OPTIONS[len(content) % len(OPTIONS)]))
+            robot = read_urdf(folder / URDF_FILES[0], OPTIONS[len(content) % len(OPTIONS)])
+            check_robot(robot)
+            check_poses(robot, World())
         except RobotFileError as error:
             check_message(error, folder)
             return False
@@ -98,6 +107,38 @@ def check_robot(robot: Robot) -> None:
     broken = [what for what, holds in sound.items() if not holds]
     if broken:
         raise AssertionError(f"a robot was accepted although {', '.join(broken)}")
+
+
+def check_poses(robot: Robot, world: World) -> None:
+    """Raise AssertionError unless the contacts of a robot in a world are sound at home and in some poses, or are refused in one line."""
+    if len(robot.shapes) > MOST_SHAPES:
+        return
+    try:
+        model = Model(robot, world)
+        rng = np.random.default_rng(len(robot.shapes))
+        low, high = robot.limits.T
+        for q in (robot.home, *(low + rng.random((POSES, len(low))) * (high - low))):
+            check_contacts(model, q)
+    except MobeeError as error:
+        text = str(error)
+        if "\n" in text or len(text) > 4000:
+            raise AssertionError(f"a message of several lines, or endless: {text[:300]}") from None
+
+
+def check_contacts(model: Model, q: Array) -> None:
+    """Raise AssertionError unless all that the model says of a pose is finite, normals are unit vectors, and depths are not negative."""
+    pose = model.evaluate(q)
+    normals = pose.table.normal
+    sound = {
+        "a place is not finite": np.isfinite(pose.transforms).all(),
+        "a contact is not finite": np.isfinite(pose.table.reals).all(),
+        "a projection is not finite": np.isfinite(pose.projection).all(),
+        "a normal is no unit vector": (np.abs((normals**2).sum(axis=1) - 1.0) < 1e-9).all(),
+        "a depth is negative": (pose.table.depth >= 0.0).all(),
+    }
+    broken = [what for what, holds in sound.items() if not holds]
+    if broken:
+        raise AssertionError(f"of a robot and a world that were accepted, {', '.join(broken)} at {q.tolist()}")
 
 
 def tested_links(robot: Robot) -> set[frozenset[int]]:
