@@ -44,7 +44,8 @@ OnTriangle on_triangle(Vec3 p, Vec3 q, Vec3 r) {
         const Vec3 u = corner[to] - corner[from];
         const double along = -dot(u, corner[from]), whole = dot(u, u);
         const double w = along <= 0.0 ? 0.0 : along >= whole ? 1.0 : along / whole;
-        const Vec3 point = corner[from] + w * u;
+        Vec3 point = corner[from] + w * u;
+        if (along > 0.0 && along < whole) point = point - (dot(u, point) / whole) * u;  // square to the side also where it is far shorter
         if (dot(point, point) < nearest) {
             nearest = dot(point, point);
             found = {point, {false, false, false}};
