@@ -201,9 +201,16 @@ def _processor(level: str, zig: bool) -> list[str]:
 
 
 def _with_system(compiler: Compiler, flags: list[str], source: Path, library: Path) -> None:
-    """In one go.  The compiler's own libraries are named by its driver; --as-needed drops those of which nothing is used."""
-    linked = [f"-mmacosx-version-min={macos_version()}"] if sys.platform == "darwin" else ["-Wl,--as-needed"]
-    _run([*compiler.command, *flags, str(source), "-shared", *linked, "-o", str(library), "-lm"], compiler)
+    """Compile, then link.  The compiler's own libraries are named by its driver; --as-needed drops those of which nothing is used.
+
+    The sanitizers' are left out: they come with the process, see sanitize.py.
+    """
+    linked, compiled = (
+        [f"-mmacosx-version-min={macos_version()}"] if sys.platform == "darwin" else ["-Wl,--as-needed"],
+        source.with_suffix(".o"),
+    )
+    _run([*compiler.command, *flags, "-c", str(source), "-o", str(compiled)], compiler)
+    _run([*compiler.command, "-shared", "-pthread", str(compiled), *linked, "-o", str(library), "-lm"], compiler)
 
 
 def _with_zig(compiler: Compiler, flags: list[str], source: Path, library: Path) -> None:

@@ -1,16 +1,19 @@
 """Run a command with the core that stops at the first wrong address or undefined operation.
 
-    python core/sanitize.py COMMAND [ARGUMENT ...]
+    python core/sanitize.py [--fuzzer] COMMAND [ARGUMENT ...]
 
 It builds that core if need be and puts the sanitizers' libraries into the command's process, which Python itself was built without.
-What Python and its packages never free is not counted as a leak.
+What Python and its packages never free is not counted as a leak.  With --fuzzer the libraries are those of atheris: a fuzzer is blind
+to what it covers behind those of g++.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from build import BuildFailed, Compiler, build, compiler_for, is_current, knowledge
 
@@ -25,6 +28,9 @@ SETTINGS = {
 def main() -> None:
     """Become the command."""
     command = sys.argv[1:]
+    fuzzer = command[:1] == ["--fuzzer"]
+    if fuzzer:
+        command = command[1:]
     if not command:
         sys.exit(f"usage: {__doc__.splitlines()[2].strip()}")  # type: ignore[union-attr]
     try:
@@ -32,7 +38,7 @@ def main() -> None:
         compiler = compiler_for([level])
         if not is_current(level, folder, strict=False):
             list(build([level], compiler, folder, strict=False))
-        loaded = " ".join(_runtime(compiler, name) for name in RUNTIMES)
+        loaded = _fuzzer() if fuzzer else " ".join(_runtime(compiler, name) for name in RUNTIMES)
     except BuildFailed as failure:
         sys.exit(str(failure))
     environment = {**os.environ, **SETTINGS, "LD_PRELOAD": loaded, "MOBEE_CORE": level}
@@ -49,6 +55,14 @@ def _runtime(compiler: Compiler, name: str) -> str:
     if found == name:
         raise BuildFailed(f"core: g++ has no {name}: install it (Debian: apt install libasan8 libubsan1, of g++'s version)")
     return found
+
+
+def _fuzzer() -> str:
+    """Where atheris keeps the sanitizers that it is linked with."""
+    spec = importlib.util.find_spec("atheris")
+    if spec is None or spec.origin is None:
+        raise BuildFailed("core: --fuzzer needs atheris: pip install 'mobee[fuzz]'")
+    return str(Path(spec.origin).parents[1] / "asan_with_fuzzer.so")
 
 
 if __name__ == "__main__":

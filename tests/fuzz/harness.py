@@ -33,5 +33,6 @@ def fuzz(feed: Callable[[bytes, Path], bool], seeds: list[bytes], names: list[st
         def one(data: bytes) -> None:
             feed(data, work)
 
-        atheris.Setup([*sys.argv, f"-timeout={SECONDS}", "-max_len=8192", str(corpus)], one, custom_mutator=mutate)
+        program, *given = sys.argv
+        atheris.Setup([program, f"-timeout={SECONDS}", "-max_len=8192", *given, str(corpus)], one, custom_mutator=mutate)
         atheris.Fuzz()
