@@ -95,8 +95,6 @@ inline std::int32_t* put(std::int32_t* to, EightInts from, unsigned which) {
 #endif
 }
 
-inline void put(float* to, const float* from, unsigned which) { put(reinterpret_cast<std::int32_t*>(to), load<EightInts>(from), which); }
-
 inline float most_in(Eight v) {
     v = most_of(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
     v = most_of(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));

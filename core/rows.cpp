@@ -10,7 +10,7 @@ namespace mobee {
 
 namespace pieces {
 
-constexpr std::size_t large = 1 << 17, largest = 1 << 24;  // bytes of those that wait
+constexpr std::size_t large = 1 << 17, largest = 1 << 26;  // bytes of those that wait
 constexpr int most = 4;
 
 // In front of the memory that is used.
@@ -52,6 +52,7 @@ Piece* take(std::size_t bytes) {
 void* resized(void* old, std::size_t bytes) {
     using pieces::Piece;
     Piece* piece = pieces::of(old);
+    if (piece != nullptr && piece->bytes >= bytes) return old;
     Piece* kept = pieces::take(bytes);
     if (kept != nullptr) {
         if (piece != nullptr) std::memcpy(kept + 1, piece + 1, std::min(piece->bytes, kept->bytes));
