@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "interface.hpp"
+#include "threads.hpp"
 
 namespace mobee {
 
@@ -91,6 +92,16 @@ void write(const Plant& plant, std::int64_t contacts, double* row) {
     }
 }
 
+// What one of several threads does: it runs one plant after the other as long as there are any.
+struct Runner {
+    Plant* const* plants;
+    Blocks* blocks;
+
+    void run() {
+        for (std::int64_t begin, end; blocks->take(begin, end);) mobee::run(*plants[begin]);
+    }
+};
+
 }  // namespace plant
 
 void run(Plant& plant) {
@@ -119,6 +130,15 @@ void run(Plant& plant) {
 }  // namespace mobee
 
 MOBEE_CALL void mobee_plant_run(mobee::Plant* plant) { mobee::run(*plant); }
+
+// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads.
+MOBEE_CALL void mobee_plants_run(mobee::Plant* const* plants, std::int64_t count, std::int64_t threads) {
+    mobee::Blocks blocks(count, 1);
+    mobee::plant::Runner runner{plants, &blocks};
+    mobee::Array<mobee::plant::Runner*> runners;
+    for (std::int64_t k = 0; k < threads && k < count; ++k) runners.push(&runner);
+    if (runners.size() > 0) mobee::run_together(runners);
+}
 
 // How many bytes each structure that Python lays out takes, in the order of `STRUCTURES` in mobee/_core/plant.py.
 MOBEE_CALL void mobee_plant_sizes(std::int64_t* sizes) {
