@@ -272,6 +272,19 @@ void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, 
     }
 }
 
+void draw_noise(const Motors& motors, std::uint64_t seed, std::int64_t tick, double* drawn) {
+    const View<const std::int64_t> living = motors.living;
+    const NormalsOfTicks normals(seed, tick);
+    double of_couple[2][4];
+    std::int64_t drawn_last = -1;
+    for (std::int64_t k = 0; k < living.size; ++k) {
+        const std::int64_t couple = living[k] / 2;
+        if (couple != drawn_last) normals.draw(couple, of_couple[0], of_couple[1]);
+        drawn_last = couple;
+        std::copy_n(of_couple[living[k] % 2], 4, drawn + 4 * k);
+    }
+}
+
 }  // namespace mobee
 
 MOBEE_CALL void mobee_motors_enter(const mobee::Motors* motors, std::int64_t first, std::int64_t end, std::int64_t mode) {
