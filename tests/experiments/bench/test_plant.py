@@ -19,7 +19,7 @@ def result(speed: float, slower: float = 1.0) -> dict[str, Any]:
         "three_agents": Pace(1.0, 3900.0, 195_000, 1700),
     }
     measured = {name: Pace(slower * one.seconds, one.plant_seconds, one.ticks, one.ended) for name, one in paces.items()}
-    about = {"tick": 0.02, "core": 1, "rounds": 3, "speed": speed, "mujoco_us_per_tick": 100.0, "times_mujoco": 60.0}
+    about: dict[str, Any] = {"tick": 0.02, "core": 1, "rounds": 3, "speed": speed, "mujoco_us_per_tick": 100.0, "times_mujoco": 60.0}
     each = {"us_per_tick": 0.4, "ticks_per_second": 2.5e6}
     about |= {"batch": {"plants": 64, "alone": each, "together": each, "ratio": 1.0, "two_threads": None}}
     return about | {name: one.numbers | one.standard(speed) for name, one in measured.items()}
