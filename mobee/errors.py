@@ -56,3 +56,6 @@ class BatchInterrupted(ActionInterrupted):
             f"{len(lost)} of {len(self.results)} plants were interrupted, the first plants[{lost[0]}]: {self.results[lost[0]]} "
             "(`results` of this error holds what the others came to)"
         )
+
+    def __reduce__(self) -> tuple[type[BatchInterrupted], tuple[list[object]]]:  # so that it can come from another process
+        return BatchInterrupted, (self.results,)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -19,48 +19,50 @@ from mobee.threads import checked_threads
 T = TypeVar("T")
 
 
-def advance_together(plants: Sequence[OfflinePlant], threads: int = 1) -> list[list[tuple[str, Outcome]]]:
+def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[list[tuple[str, Outcome]]]:
     """Each plant's `advance()`, in their order; to the last bit the same as one after the other, for any number of threads.
 
     Raises InvalidValue before anything moves: for what is no OfflinePlant, a plant listed twice, one without an action under way, and
     plants in one world while one of them reaches or has a function to call (`every`).  Raises BatchInterrupted if a plant's state is
     lost or a function that it calls raises: the other plants go on to their ends, and its `results` hold how.
     """
-    _require_apart(plants)
-    for number, plant in enumerate(plants):
+    listed = _apart(plants)
+    for number, plant in enumerate(listed):
         if not plant.acting:
             raise InvalidValue(f"plants[{number}]: no part of it is acting; call its begin, or leave it out")
-    found = _finished([plant.advancing() for plant in plants], checked_threads(threads))
-    last_in = {id(plant.model.world): plant for plant in plants}
-    if len(last_in) < len(plants):  # they came to their ends in another order
+    found = _finished([plant.advancing() for plant in listed], checked_threads(threads))
+    last_in = {id(plant.model.world): plant for plant in listed}
+    if len(last_in) < len(listed):  # they came to their ends in another order
         for plant in last_in.values():
             plant.follow()
     return found
 
 
-def run_together(plants: Sequence[OfflinePlant], ticks: int, threads: int = 1) -> list[Trace]:
+def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -> list[Trace]:
     """Each plant's `run(ticks)`; otherwise as `advance_together`, but no action needs to be under way."""
-    _require_apart(plants)
+    listed = _apart(plants)
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:
         raise InvalidValue(f"ticks={ticks!r}: give a whole number, 0 or more.")
-    return _finished([plant.running(ticks) for plant in plants], checked_threads(threads))
+    return _finished([plant.running(ticks) for plant in listed], checked_threads(threads))
 
 
-def _require_apart(plants: Sequence[OfflinePlant]) -> None:
-    """Raise InvalidValue if something is no plant, or if what one plant does could change how another goes on."""
+def _apart(plants: Iterable[OfflinePlant]) -> list[OfflinePlant]:
+    """The plants; raises InvalidValue if something is none, or if what one plant does could change how another goes on."""
+    listed = list(plants)
     known: dict[int, int] = {}
-    for number, plant in enumerate(plants):
+    for number, plant in enumerate(listed):
         if not isinstance(plant, OfflinePlant):
             raise InvalidValue(f"plants[{number}] is {plant!r}; it must be an OfflinePlant.")
         if known.setdefault(id(plant), number) != number:
             raise InvalidValue(f"plants[{number}] is plants[{known[id(plant)]}] once more: list every plant once.")
-    sharing = Counter(id(plant.model.world) for plant in plants)
-    for number, plant in enumerate(plants):
+    sharing = Counter(id(plant.model.world) for plant in listed)
+    for number, plant in enumerate(listed):
         if plant.may_edit and sharing[id(plant.model.world)] > 1:
             raise InvalidValue(
                 f"plants[{number}] reaches or calls a function meanwhile (every), and other plants share its world, which that edits: "
                 "give each a Model of its own, with a World of its own."
             )
+    return listed
 
 
 def _finished(works: Sequence[Work[T]], threads: int) -> list[T]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -136,7 +137,7 @@ def test_a_shared_world_follows_the_last_plant() -> None:
 def test_nothing_is_done_by_no_plants() -> None:
     assert advance_together([]) == []
     assert run_together([], 10) == []
-    trace = run_together([OfflinePlant(Model(KATANA))], 0)[0]
+    trace = run_together(iter([OfflinePlant(Model(KATANA))]), 0)[0]
     assert len(trace) == 0
 
 
@@ -209,6 +210,9 @@ def test_a_plant_that_is_lost_takes_nothing_from_the_others(threads: int) -> Non
         assert together[number].hash == alone[number].hash
         assert together[number].acting == ()
     assert together[1].acting == (), "as after its own advance"
+    sent = pickle.loads(pickle.dumps(caught.value))
+    assert str(sent) == str(caught.value)
+    assert plain(sent.results[0]) == plain(results[0])
 
 
 def test_a_function_that_raises_takes_nothing_from_the_others() -> None:
