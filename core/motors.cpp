@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "interface.hpp"
+#include "lanes.hpp"
 #include "law.hpp"
 #include "normals.hpp"
 
@@ -144,18 +145,113 @@ void integrate(const Motors& motors, double dt) {
     for (const std::int64_t i : motors.living) motors::stop_hard(motors.numbers[i], motors.state[i], dt);
 }
 
-void move(Motors& motors, std::int64_t substeps, double dt) {
-    for (const std::int64_t i : motors.living) {
-        MotorState state = motors.state[i];
-        std::int64_t now = motors.newest;
-        for (std::int64_t k = 0; k < substeps; ++k) {
-            now = motors.next(now);
-            const double before = state.motor_velocity;
-            motors::turn(motors, i, state, now, dt);
-            if (k + 1 == substeps) motors::note_effort(state, before, dt);
-            motors::stop_hard(motors.numbers[i], state, dt);
+namespace motors {
+
+void move_one(const Motors& motors, std::int64_t i, std::int64_t substeps, double dt) {
+    MotorState state = motors.state[i];
+    std::int64_t now = motors.newest;
+    for (std::int64_t k = 0; k < substeps; ++k) {
+        now = motors.next(now);
+        const double before = state.motor_velocity;
+        turn(motors, i, state, now, dt);
+        if (k + 1 == substeps) note_effort(state, before, dt);
+        stop_hard(motors.numbers[i], state, dt);
+    }
+    motors.state[i] = state;
+}
+
+inline Four within(Four x, Four low, Four high) { return x < low ? low : x > high ? high : x; }
+inline Four shrunk(Four x, Four by) { return x > by ? x - by : x < -by ? x + by : x * 0.0; }
+
+// Four motors side by side in position or velocity mode: in each lane what `move_one` does, in its order, so that the bits are the same.
+struct FourMotors {
+    const Motors& motors;
+    std::int64_t index[4];  // where there are less than four the last one stands several times
+
+    FourMotors(const Motors& of, std::int64_t first) : motors(of) {
+        for (std::int64_t k = 0; k < 4; ++k) index[k] = of.living[std::min(first + k, of.living.size - 1)];
+    }
+
+    // Whether all of them are in these modes.
+    bool fit() const {
+        bool found = true;
+        for (const std::int64_t i : index) found &= motors.state[i].mode <= velocity_mode;
+        return found;
+    }
+
+    // Of each the four doubles from a member on, given as its place in the structure: a register for each member.
+    template <class T>
+    void fetch(const T* from, std::size_t place, Four& a, Four& b, Four& c, Four& d) const {
+        const auto at = [&](int k) { return load<Four>(reinterpret_cast<const char*>(from + index[k]) + place); };
+        a = at(0), b = at(1), c = at(2), d = at(3);
+        transpose(a, b, c, d);
+    }
+
+    void put(std::size_t place, Four a, Four b, Four c, Four d) const {
+        transpose(a, b, c, d);
+        const Four values[4] = {a, b, c, d};
+        for (int k = 0; k < 4; ++k) std::memcpy(reinterpret_cast<char*>(motors.state + index[k]) + place, &values[k], sizeof(Four));
+    }
+
+    // What leaves the delay line when `entering` enters it in the row `now`.
+    Four delayed(std::int64_t now, Four entering, const std::int64_t* delay) const {
+        Four leaving;
+        for (int k = 0; k < 4; ++k) motors.on_its_way(now, index[k]) = entering[k];
+        for (int k = 0; k < 4; ++k) {
+            const std::int64_t then = now - delay[k];
+            leaving[k] = motors.on_its_way(then >= 0 ? then : then + motors.rows, index[k]);
         }
-        motors.state[i] = state;
+        return leaving;
+    }
+
+    void move(std::int64_t substeps, double dt) const;
+};
+
+void FourMotors::move(std::int64_t substeps, double dt) const {
+    using Numbers = MotorNumbers;
+    using State = MotorState;
+    Four low, high, fastest, unused, share, play, friction, q, velocity, effort, motor_q, turning, dragged, rest, reference;
+    fetch(motors.numbers.data, offsetof(Numbers, low), low, high, fastest, unused);
+    fetch(motors.numbers.data, offsetof(Numbers, max_torque), unused, share, play, friction);
+    fetch(motors.state, offsetof(State, q), q, velocity, effort, motor_q);
+    fetch(motors.state, offsetof(State, motor_velocity), turning, dragged, rest, reference);
+    std::int64_t delay[4];
+    FourMarks servoed;
+    for (int k = 0; k < 4; ++k) {
+        delay[k] = motors.numbers[index[k]].delay;
+        servoed[k] = motors.state[index[k]].mode == position_mode ? -1 : 0;
+        motors.state[index[k]].left = 0.0;
+    }
+    const FourMarks rubs = friction > 0.0;
+    std::int64_t now = motors.newest;
+    for (std::int64_t substep = 0; substep < substeps; ++substep) {
+        now = motors.next(now);
+        const Four wanted = servoed ? servo_gain * (reference - motor_q) : reference;
+        const Four asked = delayed(now, within(wanted, -fastest, fastest), delay), before = turning;
+        turning = before + share * (asked - before);
+        turning = rubs ? shrunk(turning, share * friction) : turning;
+        motor_q += turning * dt;
+        if (substep + 1 == substeps) effort = motor_inertia * (turning - before) / dt + motor_friction * turning;
+        dragged = within(within(q, motor_q - play, motor_q + play), low, high);
+        velocity = (dragged - q) / dt;
+        q = dragged;
+        motor_q = within(motor_q, q - play, q + play);
+    }
+    put(offsetof(State, q), q, velocity, effort, motor_q);
+    put(offsetof(State, motor_velocity), turning, dragged, rest, reference);
+}
+
+}  // namespace motors
+
+void move(Motors& motors, std::int64_t substeps, double dt) {
+    for (std::int64_t first = 0; first < motors.living.size; first += 4) {
+        const motors::FourMotors four(motors, first);
+        if (four.fit()) {
+            four.move(substeps, dt);
+        } else {
+            for (std::int64_t k = first; k < std::min(first + 4, motors.living.size); ++k)
+                motors::move_one(motors, motors.living[k], substeps, dt);
+        }
     }
     motors.newest = (motors.newest + substeps) % motors.rows;
 }
@@ -173,6 +269,19 @@ void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, 
             couple += normals.couples[couple] != i / 2;
             q[i] = motors.state[i].q + noise[i] * (i % 2 ? normals.odd : normals.even)[couple];
         }
+    }
+}
+
+void draw_noise(const Motors& motors, std::uint64_t seed, std::int64_t tick, double* drawn) {
+    const View<const std::int64_t> living = motors.living;
+    const NormalsOfTicks normals(seed, tick);
+    double of_couple[2][4];
+    std::int64_t drawn_last = -1;
+    for (std::int64_t k = 0; k < living.size; ++k) {
+        const std::int64_t couple = living[k] / 2;
+        if (couple != drawn_last) normals.draw(couple, of_couple[0], of_couple[1]);
+        drawn_last = couple;
+        std::copy_n(of_couple[living[k] % 2], 4, drawn + 4 * k);
     }
 }
 

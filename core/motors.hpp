@@ -62,4 +62,7 @@ void move(Motors& motors, std::int64_t substeps, double dt);
 // of these standard deviations (n,).
 void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q);
 
+// The same noise of four ticks from `tick` on, in units of the standard deviations: (living, 4).
+void draw_noise(const Motors& motors, std::uint64_t seed, std::int64_t tick, double* drawn);
+
 }  // namespace mobee

@@ -40,25 +40,40 @@ inline Four logarithm(Four x) {
     return e * ln_2_high + (2.0 * s + (2.0 * s * series + e * ln_2_low));
 }
 
+std::uint64_t key_of(std::uint64_t seed, std::int64_t tick) { return mixed(mixed(seed) ^ static_cast<std::uint64_t>(tick)); }
+
+// Four couples, each of its tick's key and of its number.
+inline void draw(const std::uint64_t* key, const std::int64_t* couple, double* even, double* odd) {
+    constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
+    Four uniform, angle, sine, less;  // `less`: by how much the cosine is less than 1
+    for (std::int64_t j = 0; j < 4; ++j) {
+        const std::uint64_t first = mixed(key[j] ^ mixed(static_cast<std::uint64_t>(couple[j]))), second = mixed(first);
+        uniform[j] = (static_cast<double>(static_cast<std::int64_t>(first >> 11)) + 1.0) * unit;
+        angle[j] = turn * (static_cast<double>(static_cast<std::int64_t>(second >> 11)) * unit);
+    }
+    sine_cosine(angle, sine, less);
+    const Four radius = root_of(-2.0 * logarithm(uniform));
+    store(even, radius * (1.0 - less));
+    store(odd, radius * sine);
+}
+
 }  // namespace normals
 
-Normals::Normals(std::uint64_t seed, std::int64_t tick) : key_(normals::mixed(normals::mixed(seed) ^ static_cast<std::uint64_t>(tick))) {}
+Normals::Normals(std::uint64_t seed, std::int64_t tick) : key_(normals::key_of(seed, tick)) {}
 
 void Normals::draw() {
-    constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
-    for (std::int64_t k = 0; k < count; k += 4) {
-        Four uniform, angle, sine, less;  // `less`: by how much the cosine is less than 1
-        for (std::int64_t j = 0; j < 4; ++j) {
-            const std::uint64_t couple = k + j < count ? static_cast<std::uint64_t>(couples[k + j]) : 0;
-            const std::uint64_t first = normals::mixed(key_ ^ normals::mixed(couple)), second = normals::mixed(first);
-            uniform[j] = (static_cast<double>(static_cast<std::int64_t>(first >> 11)) + 1.0) * unit;
-            angle[j] = turn * (static_cast<double>(static_cast<std::int64_t>(second >> 11)) * unit);
-        }
-        sine_cosine(angle, sine, less);
-        const Four radius = root_of(-2.0 * normals::logarithm(uniform));
-        store(even + k, radius * (1.0 - less));
-        store(odd + k, radius * sine);
-    }
+    const std::uint64_t keys[] = {key_, key_, key_, key_};
+    for (std::int64_t k = count; k % 4 != 0; ++k) couples[k] = 0;  // of lanes that nobody asks for
+    for (std::int64_t k = 0; k < count; k += 4) normals::draw(keys, couples + k, even + k, odd + k);
+}
+
+NormalsOfTicks::NormalsOfTicks(std::uint64_t seed, std::int64_t tick) {
+    for (std::int64_t j = 0; j < 4; ++j) key_[j] = normals::key_of(seed, tick + j);
+}
+
+void NormalsOfTicks::draw(std::int64_t couple, double* even, double* odd) const {
+    const std::int64_t couples[] = {couple, couple, couple, couple};
+    normals::draw(key_, couples, even, odd);
 }
 
 }  // namespace mobee

@@ -29,4 +29,16 @@ private:
     std::uint64_t key_;
 };
 
+// The same of four ticks, one after the other.
+class NormalsOfTicks {
+public:
+    NormalsOfTicks(std::uint64_t seed, std::int64_t tick);
+
+    // Fill `even` and `odd`, a number for each tick.
+    void draw(std::int64_t couple, double* even, double* odd) const;
+
+private:
+    std::uint64_t key_[4];
+};
+
 }  // namespace mobee

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "interface.hpp"
+#include "threads.hpp"
 
 namespace mobee {
 
@@ -21,17 +22,41 @@ void tell(Plant& plant, std::int64_t tick) {
     }
 }
 
-// Read the encoders; false if they are not finite.
-bool measure(Plant& plant, std::int64_t tick) {
-    const Motors& motors = *plant.motors;
-    if (plant.noise != nullptr) read_encoders(motors, plant.seed, tick, plant.noise, plant.q);
-    double total = 0.0;
-    for (const std::int64_t i : motors.living) {
-        if (plant.noise == nullptr) plant.q[i] = motors.state[i].q;
-        total += std::fabs(plant.q[i]);
+// The encoders of a plant's ticks, one after the other.  Their noise is drawn for four ticks at once, which costs what one does.
+class Encoders {
+public:
+    explicit Encoders(Plant& plant) : plant_(plant), drawn_(plant.noise != nullptr && plant.most >= 4 ? 4 * plant.motors->living.size : 0) {}
+
+    // Read them; false if they are not finite.
+    bool read(std::int64_t tick) {
+        const Motors& motors = *plant_.motors;
+        if (drawn_.size() > 0) {
+            add_drawn(tick);
+        } else if (plant_.noise != nullptr) {
+            read_encoders(motors, plant_.seed, tick, plant_.noise, plant_.q);
+        } else {
+            for (const std::int64_t i : motors.living) plant_.q[i] = motors.state[i].q;
+        }
+        double total = 0.0;
+        for (const std::int64_t i : motors.living) total += std::fabs(plant_.q[i]);
+        return total < std::numeric_limits<double>::infinity();
     }
-    return total < std::numeric_limits<double>::infinity();
-}
+
+private:
+    void add_drawn(std::int64_t tick) {
+        const Motors& motors = *plant_.motors;
+        const std::int64_t of_four = read_++ % 4;
+        if (of_four == 0) draw_noise(motors, plant_.seed, tick, drawn_.data());
+        for (std::int64_t k = 0; k < motors.living.size; ++k) {
+            const std::int64_t i = motors.living[k];
+            plant_.q[i] = motors.state[i].q + plant_.noise[i] * drawn_[4 * k + of_four];
+        }
+    }
+
+    Plant& plant_;
+    Array<double> drawn_;  // (living, 4); empty where that does not pay
+    std::int64_t read_ = 0;
+};
 
 // Find the contacts of the pose and what they do to the motors; how many there are.
 std::int64_t feel_pose(Plant& plant) {
@@ -91,15 +116,26 @@ void write(const Plant& plant, std::int64_t contacts, double* row) {
     }
 }
 
+// What one of several threads does: it runs one plant after the other as long as there are any.
+struct Runner {
+    Plant* const* plants;
+    Blocks* blocks;
+
+    void run() {
+        for (std::int64_t begin, end; blocks->take(begin, end);) mobee::run(*plants[begin]);
+    }
+};
+
 }  // namespace plant
 
 void run(Plant& plant) {
     const std::int64_t width = 3 * plant.law->motors.size + record_depths;
     plant.end = all_ticks_done;
+    plant::Encoders encoders(plant);
     for (plant.done = 0; plant.done < plant.most; ++plant.done) {
         const std::int64_t tick = plant.ticks + plant.done + 1;
         plant::tell(plant, tick);
-        if (!plant::measure(plant, tick)) {
+        if (!encoders.read(tick)) {
             plant.end = state_lost;
             return;
         }
@@ -119,6 +155,15 @@ void run(Plant& plant) {
 }  // namespace mobee
 
 MOBEE_CALL void mobee_plant_run(mobee::Plant* plant) { mobee::run(*plant); }
+
+// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads.
+MOBEE_CALL void mobee_plants_run(mobee::Plant* const* plants, std::int64_t count, std::int64_t threads) {
+    mobee::Blocks blocks(count, 1);
+    mobee::plant::Runner runner{plants, &blocks};
+    mobee::Array<mobee::plant::Runner*> runners;
+    for (std::int64_t k = 0; k < threads && k < count; ++k) runners.push(&runner);
+    if (runners.size() > 0) mobee::run_together(runners);
+}
 
 // How many bytes each structure that Python lays out takes, in the order of `STRUCTURES` in mobee/_core/plant.py.
 MOBEE_CALL void mobee_plant_sizes(std::int64_t* sizes) {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
     from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
-    from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
+    from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent
     from mobee.learning.lattice import Lattice
     from mobee.learning.parallel import run
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from mobee.robot.join import join_robots
     from mobee.robot.load import load_robot, load_world
     from mobee.robot.robot import Robot
-    from mobee.simulation import MotorParameters, OfflinePlant, run_batch
+    from mobee.simulation import MotorParameters, OfflinePlant, advance_together, run_batch, run_together
 
 _MODULES = {
     "mobee.collision": "Contact Geometry World WorldObject box capsule cylinder sphere",
     "mobee.control": "Command Controller Forces Gains Reacher ReachPath Term constraint_forces reach_path",
-    "mobee.errors": "ActionInterrupted InvalidValue MobeeError RobotFileError UnknownName",
+    "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent",
     "mobee.learning.lattice": "Lattice",
     "mobee.learning.parallel": "run",
@@ -71,13 +71,14 @@ _MODULES = {
     "mobee.robot.join": "join_robots",
     "mobee.robot.load": "load_robot load_world",
     "mobee.robot.robot": "Robot",
-    "mobee.simulation": "MotorParameters OfflinePlant run_batch",
+    "mobee.simulation": "MotorParameters OfflinePlant advance_together run_batch run_together",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
     "ActionInterrupted",
     "AdaptiveRoadmap",
+    "BatchInterrupted",
     "Command",
     "Contact",
     "Controller",
@@ -118,6 +119,7 @@ __all__ = [
     "Walker",
     "World",
     "WorldObject",
+    "advance_together",
     "box",
     "build_roadmap",
     "capsule",
@@ -134,6 +136,7 @@ __all__ = [
     "roadmap_space",
     "run",
     "run_batch",
+    "run_together",
     "solve_ik",
     "sphere",
     "tasks",

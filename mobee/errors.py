@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class MobeeError(Exception):
@@ -41,3 +41,21 @@ class NotInstalled(MobeeError):
 
 class ActionInterrupted(MobeeError):
     """An action that ended without an outcome (hold, fault, or a new run): it is not an observation."""
+
+
+class BatchInterrupted(ActionInterrupted):
+    """Some of the plants that went on together did not end as they should; the others did.
+
+    `results`: in the order of the plants, what each came to, or the exception that ended it.  The first of these is the cause.
+    """
+
+    def __init__(self, results: Sequence[object]) -> None:
+        self.results = list(results)
+        lost = [number for number, result in enumerate(self.results) if isinstance(result, Exception)]
+        super().__init__(
+            f"{len(lost)} of {len(self.results)} plants were interrupted, the first plants[{lost[0]}]: {self.results[lost[0]]} "
+            "(`results` of this error holds what the others came to)"
+        )
+
+    def __reduce__(self) -> tuple[type[BatchInterrupted], tuple[list[object]]]:  # so that it can come from another process
+        return BatchInterrupted, (self.results,)

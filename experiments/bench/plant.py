@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import calibration, requirement
+from experiments.bench import calibration, plant_batch, requirement
 from experiments.bench.calibration import Calibration
 from experiments.bench.mujoco_peer import load_mujoco
 from experiments.bench.mujoco_stepper import us_per_tick
@@ -35,10 +35,11 @@ class Settings:
     transitions: int = 3000
     hashed: int = 50
     ticks: int = 5000  # of MuJoCo
+    batched: int = 20  # actions of each plant of a batch
     rounds: int = 3  # the median counts
 
 
-QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500, rounds=1)
+QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500, batched=2, rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
@@ -64,12 +65,15 @@ def measure(settings: Settings) -> dict[str, Any]:
     result: dict[str, Any] = {name: _median(rounds) for name, rounds in found.items()}
     result |= {"tick": DT, "core": core, "rounds": settings.rounds, "speed": speeds.median}
     result |= {"mujoco_us_per_tick": float(np.median(mujoco)), "times_mujoco": float(np.median(ratios))}
+    result["batch"] = plant_batch.measure(settings.batched, max(5, settings.rounds) if settings.rounds > 1 else 1)
     return result | verdict(result, hashes[0] == hashes[1])
 
 
 def verdict(result: Mapping[str, Any], same_hash: bool) -> dict[str, Any]:
     """Whether it is as fast as required, and repeats itself."""
     required = [judged(name, result[run][f"standard_{key}"], at_least=least, aim=aim) for name, run, key, least, aim in REQUIREMENTS]
+    batch = f"{result['batch']['plants']} plants in a batch, times one alone"
+    required.append(judged(batch, result["batch"]["ratio"], at_least=plant_batch.LEAST, aim=plant_batch.AIM))
     return {"requirements": required, "same_hash": same_hash, "passed": same_hash and requirement.all_passed(required)}
 
 
@@ -91,6 +95,7 @@ def report(result: dict[str, Any]) -> str:
         f"MuJoCo's stepper, one arm: {result['mujoco_us_per_tick']:.1f} us a tick, {result['times_mujoco']:.1f} times ours. It solves\n"
         "rigid-body dynamics and contact, which our motors do not have; it has no model,\nlaw or encoders."
     )
+    lines.append(plant_batch.told(result["batch"]))
     lines += [calibration.told(result["speed"]), *requirement.lines(result["requirements"])]
     return "\n".join([*lines, f"  same seed, same trajectory hash: {'yes' if result['same_hash'] else 'NO'}"])
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from mobee._core import ADDRESS, INTEGER, REAL, function, law, motors, reach
+from mobee._core import ADDRESS, BYTES, INTEGER, REAL, function, law, motors, reach
 from mobee._core.tables import INTERVAL, WHOLE, View
 
 PART = np.dtype([("motors", INTERVAL), ("under_way", WHOLE), ("verdict", WHOLE), ("begun", "f8"), ("next_look", "f8")])
@@ -41,6 +41,7 @@ class Calls:
 
     def __init__(self) -> None:
         self.run = function("plant_run", ADDRESS)
+        self.run_many = function("plants_run", BYTES, INTEGER, INTEGER)
         self.sizes = function("plant_sizes", ADDRESS)
 
 

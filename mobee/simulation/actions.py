@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,8 @@ class _Acting:
     row: int
     motors: tuple[str, ...]
     where: slice
-    low: Array
-    high: Array
+    low: list[float]
+    high: list[float]
     alive: bool
 
 
@@ -42,23 +43,24 @@ class Actions:
         self._under_way, self._verdict = self.parts["under_way"], self.parts["verdict"]
         for row, (name, part) in enumerate(robot.parts.items()):
             self.parts[row]["motors"] = part.start, part.start + len(part)
-            low, high = robot.limits[part.slice].T.copy()
+            low, high = robot.limits[part.slice].T.tolist()
             self._of[name] = _Acting(row, part.motors, part.slice, low, high, bool(alive[part.slice].any()))
 
     @property
     def under_way(self) -> tuple[str, ...]:
         """The parts that act, in their order."""
-        return tuple(name for name, acts in zip(self._names, self._under_way.tolist(), strict=True) if acts)
+        return tuple(compress(self._names, self._under_way.tolist()))
 
     def require_possible(self, part: str, target: Array) -> None:
         """Raise InvalidValue if no motor of a part lives, or if a target with a number for each of its motors is outside their limits."""
         of = self._of[part]
         if not of.alive:
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
-        if np.shape(target) != of.low.shape or ((target >= of.low) & (target <= of.high)).all():
+        if np.shape(target) != (len(of.motors),):
             return
-        i = int(np.flatnonzero(~((target >= of.low) & (target <= of.high)))[0])
-        raise InvalidValue(f"target {target[i]:.4g} rad for {of.motors[i]}: must be within {of.low[i]:.4g} to {of.high[i]:.4g} rad")
+        for at, low, high, motor in zip(target, of.low, of.high, of.motors, strict=True):
+            if not low <= at <= high:
+                raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
     def begin(self, part: str, asked: float, first_look: float) -> None:
         """Start a part's settle test, asked for at a time [s]; it is looked at `first_look` s later first."""

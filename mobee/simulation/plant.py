@@ -22,7 +22,7 @@ from mobee.simulation.described import described
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
 from mobee.simulation.reaches import ReachesUnderWay
-from mobee.simulation.runner import Runner
+from mobee.simulation.runner import Runner, Work, finished
 from mobee.simulation.touching import Touching
 from mobee.simulation.trace import Trace
 
@@ -118,6 +118,16 @@ class OfflinePlant:
         return self._pose
 
     @property
+    def acting(self) -> tuple[str, ...]:
+        """The parts whose actions are under way, in their order."""
+        return self._actions.under_way
+
+    @property
+    def may_edit(self) -> bool:
+        """Whether its ticks may edit the world or change who reaches in it: a reach is under way, or a function is called meanwhile."""
+        return bool(self._reaches.running) or self._callback is not None
+
+    @property
     def settings(self) -> dict[str, Any]:
         """All that decides how actions end, but for the seed, as plain JSON values; of the world as it is now."""
         active = [name for name, alive in zip(self.robot.motors, self._alive, strict=True) if alive]
@@ -174,6 +184,10 @@ class OfflinePlant:
         """How the part's last reach ended; raises InvalidValue before that."""
         return self._reaches.outcome(part)
 
+    def follow(self) -> None:
+        """Let the world follow the robot, as after each action: what is attached from now on is seen from the pose of the last tick."""
+        self.model.evaluate(self._q)
+
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
         """Call that function with the plant's time [s] after each so many ticks: it may edit the world.  None: no more."""
         if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
@@ -185,12 +199,17 @@ class OfflinePlant:
 
         Of a reach: how the part came to rest again (`reached` tells the rest).
         """
+        return finished(self.advancing())
+
+    def advancing(self) -> Work[list[tuple[str, Outcome]]]:
+        """`advance` for whoever runs several plants at once."""
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")
         done: list[str] = []
         while not done:
-            self._run(CHUNK)
+            yield self._prepare(CHUNK)
+            self._conclude()
             now = self._actions.under_way
             done = [part for part in acting if part not in now]
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
@@ -200,30 +219,33 @@ class OfflinePlant:
 
         Actions under way are judged, and those that end here are returned by no `advance`.
         """
-        self._run(1)
+        finished(self._ticking())
 
     def run(self, ticks: int) -> Trace:
         """That many ticks, whatever the actions under way are at, and what happened in each."""
+        return finished(self.running(ticks))
+
+    def running(self, ticks: int) -> Work[Trace]:
+        """`run` for whoever runs several plants at once."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
-            rows.append(self._run(min(left, CHUNK), traced=True))
+            yield self._prepare(min(left, CHUNK), traced=True)
+            rows.append(self._conclude())
             left -= len(rows[-1])
         return Trace.of(np.concatenate(rows))
 
-    def _run(self, most: int, traced: bool = False) -> Array:
-        """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2) if it is asked for."""
-        self._prepare(most, traced)
-        self._runner.run()
-        return self._conclude()
+    def _ticking(self) -> Work[None]:
+        yield self._prepare(1)
+        self._conclude()
 
-    def _prepare(self, most: int, traced: bool = False) -> None:
-        """Have the core's plant ready for up to that many ticks."""
+    def _prepare(self, most: int, traced: bool = False) -> int:
+        """Make ready up to that many ticks, fewer if an action ends; gives the address of what the core is to run."""
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
-        self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
+        return self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
 
     def _conclude(self) -> Array:
-        """Take in what the ticks left: the record, see `_run`."""
+        """Take in what the ticks left; the record (ticks, 3 n + 2), empty if none was asked for."""
         rows, done, lost = self._runner.results()
         if done:
             self._pose = None
@@ -258,5 +280,5 @@ class OfflinePlant:
             raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
 
     def _outcome(self, part: str) -> Outcome:
-        self.model.evaluate(self._q)  # the world follows it
+        self.follow()
         return self._actions.outcome(part, self._q, self.time - self.dt, self._touching.by(part, self._q))

@@ -5,13 +5,15 @@ Joints that none of them drives are gone, and their links one with what carries 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee.kinematics import link_transforms
+from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
 
 
@@ -21,8 +23,22 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
     Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding, and to the
     last bit if all are alive.  `keep_parts`: links of different parts stay apart, so that forces can be cut between them.  `apart`:
     links that stay apart from what carries them.  `solids` False: fields alone, for solids exert no forces.  Markers, masses and what
-    is carried are left out.
+    is carried are left out.  It is the same object as long as somebody keeps it, so that plants share what the core knows of it.
     """
+    known, key = _known(robot), (alive.tobytes(), keep_parts, solids, tuple(apart))
+    found = known.get(key)
+    if found is None:
+        found = known[key] = _stiffened(robot, alive, keep_parts, solids, apart)
+    return found
+
+
+@per_robot
+def _known(robot: Robot) -> WeakValueDictionary[Hashable, Robot]:
+    """What `stiffened` has made of a robot."""
+    return WeakValueDictionary()
+
+
+def _stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool, solids: bool, apart: Sequence[int]) -> Robot:
     kept = (robot.coupling[0][:, alive] != 0.0).any(axis=1)
     if keep_parts:
         kept |= _borders(robot)

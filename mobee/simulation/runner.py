@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Generator
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +24,24 @@ from mobee.simulation.rigid import stiffened
 
 SKIN = 0.08  # m
 
+T = TypeVar("T")
+Work = Generator[int, None, T]
+"""What a plant does, in pieces: the address of what the core is to run next, again and again; it goes on when that was run."""
+
+
+def finished(work: Work[T]) -> T:
+    """What a plant's work comes to, without others."""
+    run = core.calls().run
+    try:
+        while True:
+            run(next(work))
+    except StopIteration as end:
+        found: T = end.value
+        return found
+
 
 class Runner:
-    """The loop of one plant: its memory, the commands on their way, the encoders and forces of the last tick."""
+    """The ticks of one plant: its memory, the commands on their way, the encoders and forces of the last tick."""
 
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
         """`parts`: the actions, see `mobee._core.plant.PART`."""
@@ -55,12 +72,10 @@ class Runner:
         )  # fmt: skip
         self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
-        self.address = ctypes.addressof(self._struct)
-        """Where the core finds the plant."""
-        self._core = core.calls()
+        self._address = ctypes.addressof(self._struct)
 
-    def prepare(self, ticks: int, most: int, kept: bool, solids: bool) -> None:
-        """Have `run` go on for up to that many ticks after those there have been.
+    def prepare(self, ticks: int, most: int, kept: bool, solids: bool) -> int:
+        """Make ready up to that many ticks after those there have been; gives the address of what the core is to run.
 
         `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record.
         """
@@ -82,10 +97,7 @@ class Runner:
             struct.reaches, self._listed = View(*listed), listed
         struct.near = self._near(solids) if controller.contact_forces or solids else None
         struct.ticks, struct.most = ticks, most
-
-    def run(self) -> None:
-        """Run what was prepared."""
-        self._core.run(self.address)
+        return self._address
 
     def results(self) -> tuple[Array, int, bool]:
         """The record (ticks, 3 n + 2), how many ticks were run, whether the motors' state is not finite any more."""

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from experiments.bench.plant import REQUIREMENTS, report, verdict
-from experiments.bench.plant_workload import Pace, trajectory_hash
+from experiments.bench.plant_batch import Batch, measure, told
+from experiments.bench.plant_workload import Pace, robot, trajectory_hash
 
 
 def result(speed: float, slower: float = 1.0) -> dict[str, Any]:
@@ -18,7 +19,9 @@ def result(speed: float, slower: float = 1.0) -> dict[str, Any]:
         "three_agents": Pace(1.0, 3900.0, 195_000, 1700),
     }
     measured = {name: Pace(slower * one.seconds, one.plant_seconds, one.ticks, one.ended) for name, one in paces.items()}
-    about = {"tick": 0.02, "core": 1, "rounds": 3, "speed": speed, "mujoco_us_per_tick": 100.0, "times_mujoco": 60.0}
+    about: dict[str, Any] = {"tick": 0.02, "core": 1, "rounds": 3, "speed": speed, "mujoco_us_per_tick": 100.0, "times_mujoco": 60.0}
+    each = {"us_per_tick": 0.4, "ticks_per_second": 2.5e6}
+    about |= {"batch": {"plants": 64, "alone": each, "together": each, "ratio": 1.0, "two_threads": None}}
     return about | {name: one.numbers | one.standard(speed) for name, one in measured.items()}
 
 
@@ -27,12 +30,14 @@ def test_the_verdict_is_the_same_on_a_slower_machine(slower: float) -> None:
     found = result(1.0 / slower, slower)
     judged = verdict(found, same_hash=True)
     assert judged["passed"]
-    assert [one["found"] for one in judged["requirements"]] == pytest.approx([12_000.0, 1850.0, 8000.0, 1700.0])
+    assert [one["found"] for one in judged["requirements"]] == pytest.approx([12_000.0, 1850.0, 8000.0, 1700.0, 1.0])
     assert found["one_arm"]["times_real_time"] == pytest.approx(12_000.0 / slower)
 
 
 def test_what_is_slower_than_the_machine_falls_short_and_so_does_another_hash() -> None:
-    assert [one["passed"] for one in verdict(result(1.0, slower=3.0), same_hash=True)["requirements"]] == [False] * len(REQUIREMENTS)
+    assert [one["passed"] for one in verdict(result(1.0, slower=3.0), same_hash=True)["requirements"]] == [False] * len(REQUIREMENTS) + [
+        True
+    ]
     assert not verdict(result(1.0), same_hash=False)["passed"]
 
 
@@ -40,6 +45,17 @@ def test_the_report_fits_80_columns() -> None:
     found = result(0.5, slower=2.0)
     lines = report(found | verdict(found, same_hash=True)).splitlines()
     assert max(map(len, lines)) <= 80
+
+
+def test_a_batch_and_one_alone_do_the_same_and_are_timed() -> None:
+    body = robot()
+    one_by_one, at_once = Batch(body, 3), Batch(body, 3)
+    spent = one_by_one.alone(2), at_once.together(2, threads=2)
+    assert spent[0].ticks == spent[1].ticks > 0
+    assert [plant.time for plant in one_by_one.plants] == [plant.time for plant in at_once.plants]
+    found = measure(1, 1)
+    assert found["ratio"] == pytest.approx(found["together"]["ticks_per_second"] / found["alone"]["ticks_per_second"])
+    assert max(map(len, told(found).splitlines())) <= 80
 
 
 def test_the_same_seed_has_the_same_hash() -> None:

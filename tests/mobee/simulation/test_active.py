@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.robot.load import load_robot, load_world
 from mobee.simulation import MotorParameters, OfflinePlant
+from mobee.simulation.active import living
 from mobee.simulation.rigid import stiffened
 
 QUIET = MotorParameters(encoder_noise=0.0)
@@ -85,3 +89,16 @@ def test_a_part_that_is_not_active_cannot_act() -> None:
     plant = OfflinePlant(Model(load_robot("icub")), active=["left_arm"])
     with pytest.raises(InvalidValue, match="torso cannot act: none of its motors is active"):
         plant.act("torso", np.zeros(3))
+
+
+def test_plants_of_one_robot_share_what_it_is_reduced_to() -> None:
+    robot = load_robot("icub")
+    alive = living(robot, ["left_arm"])
+    one = stiffened(robot, alive, solids=False)
+    assert stiffened(robot, living(robot, ["left_arm"]), solids=False) is one
+    assert stiffened(robot, alive) is not one
+    assert stiffened(robot, living(robot, ["right_arm"]), solids=False) is not one
+    gone = weakref.ref(one)
+    del one
+    gc.collect()
+    assert gone() is None, "nobody keeps it"

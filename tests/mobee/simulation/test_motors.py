@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from mobee.control.modality import FRICTION, INERTIA
 from mobee.errors import InvalidValue
+from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
 
@@ -44,6 +46,34 @@ def test_many_substeps_in_one_call_are_as_many_calls() -> None:
         at_once.move(40, STEP)
         run(one_by_one, 40 * STEP)
         assert at_once.state.tobytes() == one_by_one.state.tobytes()
+
+
+@pytest.mark.parametrize("lively", [1.0, 0.6])
+def test_motors_side_by_side_do_what_each_does_alone(lively: float) -> None:
+    """Of any kind, in any mode and number, against their stops and with what is no number."""
+    robot, rng = load_robot("icub"), np.random.default_rng(5)
+    n = len(robot.motors)
+    any_kind: dict[str, Any] = {
+        name: rng.choice([0.0, *rng.uniform(0.0, most, 3)], n) for name, most in (("lag", 0.1), ("delay", 0.04), ("friction", 0.1))
+    }
+    kind, alive = MotorParameters(**any_kind, backlash=rng.uniform(0.0, 0.01, n).tolist()), rng.uniform(size=n) < lively
+    at_once, one_by_one = (Motors(robot, kind, 0, robot.home, alive) for _ in range(2))
+    for substeps in rng.integers(1, 30, 100):
+        mode, (first, end) = rng.choice(["position", "velocity", "velocity", "torque", "hold"]), sorted(rng.integers(0, n, 2))
+        reference = (
+            None
+            if mode == "hold"
+            else rng.choice([-20.0, -0.3, 0.0, 0.1, 0.5, 20.0, np.nan], end - first, p=[0.1, 0.2, 0.2, 0.2, 0.2, 0.09, 0.01])
+        )
+        for m in (at_once, one_by_one):
+            m.command(slice(first, end), mode, reference)
+        at_once.move(int(substeps), STEP)
+        for _ in range(substeps):
+            one_by_one.drive(STEP)
+            one_by_one.integrate()
+        for name in at_once.state.dtype.names or ():
+            mine, its = (np.nan_to_num(m.state[name], nan=1e9) for m in (at_once, one_by_one))
+            assert mine.tobytes() == its.tobytes(), name
 
 
 def test_the_lag_is_a_first_order_response() -> None:
