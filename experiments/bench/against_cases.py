@@ -23,6 +23,7 @@ Done = tuple[float, dict[str, float]]  # processor time [s], and what was done
 Work = Callable[[], Done]
 
 STRATEGIES = ("random", "greedy", "intrinsic")
+PLANTS = 64
 TRIES = 100  # of 6400 of a run of chapter 8
 LOCKSTEP = (100, 3100)  # ticks of two runs: their difference is without the start
 
@@ -49,6 +50,36 @@ def _one_arm() -> Work:
     def work() -> Done:
         pace = one_arm(arm_plant(), 300)
         return pace.seconds, {"ticks": pace.ticks, "actions": pace.ended}
+
+    return work
+
+
+def _many_plants() -> Work:
+    """As many actions of an arm: of one plant where there are no batches, of a batch elsewhere."""
+    import mobee
+    from experiments.bench.plant_workload import DT, LEFT, LEVELS, SEED, robot
+
+    body, together = robot(), getattr(mobee, "advance_together", None)
+    gains, count = mobee.Gains.published_2014(), PLANTS if together else 1
+    plants = [mobee.OfflinePlant(mobee.Model(body), SEED + k, gains, dt=DT, active=LEFT) for k in range(count)]
+    space = mobee.Lattice(body, LEFT, LEVELS)
+    states = np.random.default_rng(SEED).integers(len(space), size=10 * PLANTS)
+    goals = [space.target(int(state)) for state in states]
+
+    def act() -> None:
+        if together is None:
+            for goal in goals:
+                plants[0].act("left_arm", goal)
+            return
+        for first in range(0, len(goals), PLANTS):
+            for plant, goal in zip(plants, goals[first : first + PLANTS], strict=True):
+                plant.begin("left_arm", goal)
+            together(plants)
+
+    def work() -> Done:
+        before = sum(plant.time for plant in plants)
+        seconds = _seconds(act)
+        return seconds, {"plants": count, "ticks": round((sum(plant.time for plant in plants) - before) / DT)}
 
     return work
 
@@ -198,6 +229,7 @@ def _seconds(run: Callable[[], object]) -> float:
 
 CASES: dict[str, Callable[[], Work]] = {
     "one arm": _one_arm,
+    "64 plants": _many_plants,
     "reaching": _reaching,
     "three agents": _three_agents,
     "chapter 8": _chapter_8,

@@ -134,6 +134,7 @@ def test_a_folder_that_cannot_be_written_is_named(tree: Path) -> None:
     assert done.stderr.splitlines()[-1].startswith(f"core: cannot write {tree / 'file'}")
 
 
+@pytest.mark.skipif(os.environ.get("MOBEE_CORE") == "sanitized", reason="that core holds the names of all that it could have called")
 def test_the_library_needs_nothing_but_the_c_library() -> None:
     linked = Path(library()._name).read_bytes()
     assert [name for name in (b"libstdc++", b"libgcc_s", b"libc++", b"_Znw", b"__cxa_throw") if name in linked] == []
