@@ -13,8 +13,10 @@ from mobee._core.plant import PART
 from mobee._core.tables import Table
 from mobee.errors import InvalidValue
 from mobee.plant import Outcome
+from mobee.real_array import real_array
 from mobee.robot.robot import Array, Robot
 
+_FLOAT = np.dtype(np.float64)
 _SETTLED = VERDICTS.index("settled")
 
 
@@ -56,9 +58,10 @@ class Actions:
         of = self._of[part]
         if not of.alive:
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
-        if np.shape(target) != (len(of.motors),):
+        values = target if type(target) is np.ndarray and target.dtype is _FLOAT else real_array(f"target for {part}", target)
+        if values.shape != (len(of.motors),):
             return
-        for at, low, high, motor in zip(target, of.low, of.high, of.motors, strict=True):
+        for at, low, high, motor in zip(values.tolist(), of.low, of.high, of.motors, strict=True):
             if not low <= at <= high:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 

@@ -167,3 +167,15 @@ def test_bad_input_is_refused() -> None:
         arm_plant(motors="identified")
     with pytest.raises(InvalidValue, match="tick"):
         arm_plant(gains=Gains.published_2014(), dt=0.04)
+
+
+@pytest.mark.parametrize("target", [["a"] * 6, [1j] * 6, [1.0] * 4, [np.nan] * 6, [99] * 6, [[0.0] * 6]])
+def test_a_target_that_is_none_is_refused(target: Any) -> None:
+    robot = load_robot("katana")
+    plant = OfflinePlant(Model(robot))
+    part = next(iter(robot.parts))
+    with pytest.raises(InvalidValue):
+        plant.begin(part, target)
+    assert plant.acting == ()
+    plant.begin(part, robot.home[robot.parts[part].slice].tolist())
+    assert part in plant.acting
