@@ -26,10 +26,45 @@ inline V load(const void* from) {
     return value;
 }
 
+#if defined(__SSE2__) && !defined(__AVX__)
+// Two registers that stand for one twice as wide: compilers would compare such vectors number by number.
+struct Doubles {
+    __m128d low, high;
+};
+
+struct Singles {
+    __m128 low, high;
+};
+
+inline Doubles halves(Four value) { return load<Doubles>(&value); }
+inline Singles halves(Eight value) { return load<Singles>(&value); }
+#endif
+
 // NaN of a gives b, as of `least` and `most`.
+#if defined(__SSE2__) && !defined(__AVX__)
+inline Four least_of(Four a, Four b) {
+    const auto [a_low, a_high] = halves(a);
+    const auto [b_low, b_high] = halves(b);
+    const Doubles found{_mm_min_pd(a_low, b_low), _mm_min_pd(a_high, b_high)};
+    return load<Four>(&found);
+}
+inline Four most_of(Four a, Four b) {
+    const auto [a_low, a_high] = halves(a);
+    const auto [b_low, b_high] = halves(b);
+    const Doubles found{_mm_max_pd(a_low, b_low), _mm_max_pd(a_high, b_high)};
+    return load<Four>(&found);
+}
+inline Eight most_of(Eight a, Eight b) {
+    const auto [a_low, a_high] = halves(a);
+    const auto [b_low, b_high] = halves(b);
+    const Singles found{_mm_max_ps(a_low, b_low), _mm_max_ps(a_high, b_high)};
+    return load<Eight>(&found);
+}
+#else
 inline Four least_of(Four a, Four b) { return a < b ? a : b; }
 inline Four most_of(Four a, Four b) { return a > b ? a : b; }
 inline Eight most_of(Eight a, Eight b) { return a > b ? a : b; }
+#endif
 inline Four unit_of(Four value) { return least_of(most_of(value, Four{} - 1.0), Four{} + 1.0); }
 inline Four absolute_of(Four value) { return most_of(value, -value); }
 
@@ -37,6 +72,10 @@ inline Four absolute_of(Four value) { return most_of(value, -value); }
 inline unsigned less(Four a, Four b) {
 #if defined(__AVX__)
     return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(reinterpret_cast<__m256d>(a), reinterpret_cast<__m256d>(b), _CMP_LT_OQ)));
+#elif defined(__SSE2__)
+    const auto [a_low, a_high] = halves(a);
+    const auto [b_low, b_high] = halves(b);
+    return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(a_low, b_low)) | _mm_movemask_pd(_mm_cmplt_pd(a_high, b_high)) << 2);
 #else
     unsigned found = 0;
     for (int k = 0; k < 4; ++k) found |= static_cast<unsigned>(a[k] < b[k]) << k;
@@ -47,6 +86,10 @@ inline unsigned less(Four a, Four b) {
 inline unsigned less(Eight a, Eight b) {
 #if defined(__AVX__)
     return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b), _CMP_LT_OQ)));
+#elif defined(__SSE2__)
+    const auto [a_low, a_high] = halves(a);
+    const auto [b_low, b_high] = halves(b);
+    return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(a_low, b_low)) | _mm_movemask_ps(_mm_cmplt_ps(a_high, b_high)) << 4);
 #else
     unsigned found = 0;
     for (int k = 0; k < lanes; ++k) found |= static_cast<unsigned>(a[k] < b[k]) << k;
@@ -57,6 +100,10 @@ inline unsigned less(Eight a, Eight b) {
 inline Eight root_of(Eight value) {
 #if defined(__AVX__)
     return reinterpret_cast<Eight>(_mm256_sqrt_ps(reinterpret_cast<__m256>(value)));
+#elif defined(__SSE2__)
+    const auto [low, high] = halves(value);
+    const Singles found{_mm_sqrt_ps(low), _mm_sqrt_ps(high)};
+    return load<Eight>(&found);
 #else
     for (int k = 0; k < lanes; ++k) value[k] = std::sqrt(value[k]);
     return value;
@@ -104,6 +151,10 @@ inline float most_in(Eight v) {
 inline Four root_of(Four value) {
 #if defined(__AVX__)
     return reinterpret_cast<Four>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(value)));
+#elif defined(__SSE2__)
+    const auto [low, high] = halves(value);
+    const Doubles found{_mm_sqrt_pd(low), _mm_sqrt_pd(high)};
+    return load<Four>(&found);
 #else
     for (int k = 0; k < 4; ++k) value[k] = std::sqrt(value[k]);
     return value;
