@@ -208,8 +208,7 @@ class OfflinePlant:
             raise InvalidValue("no part is acting: call begin first")
         done: list[str] = []
         while not done:
-            yield self._prepare(CHUNK)
-            self._conclude()
+            yield from self._ticks_of(CHUNK)
             now = self._actions.under_way
             done = [part for part in acting if part not in now]
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
@@ -219,7 +218,7 @@ class OfflinePlant:
 
         Actions under way are judged, and those that end here are returned by no `advance`.
         """
-        finished(self._ticking())
+        finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
         """That many ticks, whatever the actions under way are at, and what happened in each."""
@@ -229,14 +228,18 @@ class OfflinePlant:
         """`run` for whoever runs several plants at once."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
-            yield self._prepare(min(left, CHUNK), traced=True)
-            rows.append(self._conclude())
+            rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))
             left -= len(rows[-1])
         return Trace.of(np.concatenate(rows))
 
-    def _ticking(self) -> Work[None]:
-        yield self._prepare(1)
-        self._conclude()
+    def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
+        """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2), empty if none is asked for."""
+        address = self._prepare(most, traced)
+        try:
+            yield address
+        finally:  # also what was run before a Ctrl-C
+            rows = self._conclude()
+        return rows
 
     def _prepare(self, most: int, traced: bool = False) -> int:
         """Make ready up to that many ticks, fewer if an action ends; gives the address of what the core is to run."""

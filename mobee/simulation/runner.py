@@ -38,6 +38,8 @@ def finished(work: Work[T]) -> T:
     except StopIteration as end:
         found: T = end.value
         return found
+    finally:
+        work.close()  # a Ctrl-C comes between two pieces: the plant takes in what was run
 
 
 class Runner:
@@ -96,7 +98,7 @@ class Runner:
         if listed != self._listed:
             struct.reaches, self._listed = View(*listed), listed
         struct.near = self._near(solids) if controller.contact_forces or solids else None
-        struct.ticks, struct.most = ticks, most
+        struct.ticks, struct.most, struct.done = ticks, most, 0
         return self._address
 
     def results(self) -> tuple[Array, int, bool]:

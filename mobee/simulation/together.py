@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from typing import TypeVar
 
 import numpy as np
@@ -69,7 +70,20 @@ def _finished(works: Sequence[Work[T]], threads: int) -> list[T]:
     """What each comes to; raises BatchInterrupted when all have come to an end."""
     results: dict[int, T] = {}
     lost: dict[int, Exception] = {}
-    waiting = dict(enumerate(works))
+    try:
+        _go_on(dict(enumerate(works)), results, lost, threads)
+    except BaseException:  # a Ctrl-C: each plant takes in what was run
+        with ExitStack() as stack:
+            for work in works:
+                stack.callback(work.close)
+        raise
+    if lost:
+        raise BatchInterrupted([lost.get(number, results.get(number)) for number in range(len(works))]) from lost[min(lost)]
+    return [results[number] for number in range(len(works))]
+
+
+def _go_on(waiting: dict[int, Work[T]], results: dict[int, T], lost: dict[int, Exception], threads: int) -> None:
+    """Until all have come to an end."""
     run = core.calls().run_many
     while waiting:
         ready: dict[int, int] = {}
@@ -82,6 +96,3 @@ def _finished(works: Sequence[Work[T]], threads: int) -> list[T]:
                 lost[number] = error
         run(np.array([*ready.values()], dtype=np.int64).tobytes(), len(ready), threads)
         waiting = {number: waiting[number] for number in ready}
-    if lost:
-        raise BatchInterrupted([lost.get(number, results.get(number)) for number in range(len(works))]) from lost[min(lost)]
-    return [results[number] for number in range(len(works))]

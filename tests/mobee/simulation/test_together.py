@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import signal
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -232,3 +234,24 @@ def test_a_function_that_raises_takes_nothing_from_the_others() -> None:
     together[0].every(1, None)
     run_together(together, 10)
     assert together[0].time == pytest.approx(0.17), "it can go on"
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_after_a_ctrl_c_plants_go_on_from_what_was_run(count: int) -> None:
+    def made() -> list[OfflinePlant]:
+        return [OfflinePlant(Model(KATANA), seed) for seed in range(count)]
+
+    interrupted, alone = made(), made()
+    main = threading.main_thread().ident
+    assert main is not None
+    threading.Timer(0.1, signal.pthread_kill, (main, signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        if count == 1:
+            interrupted[0].run(10**9)
+        else:
+            run_together(interrupted, 10**9, threads=2)
+    for stopped, other in zip(interrupted, alone, strict=True):
+        ticks = round(stopped.time / stopped.dt)
+        assert ticks > 0
+        other.run(ticks)
+        assert stopped.run(50).q.tobytes() == other.run(50).q.tobytes()
