@@ -64,6 +64,8 @@ void Motion::fit(const Robot& robot) {
 void Motion::make_groups(const Robot& robot) {
     group.clear();
     for (std::int64_t link = 0; link < robot.links; ++link) motion::group_link(robot, link, *this);
+    far.clear();
+    far.resize(group.size() + 1);
     motion::each_slot(robot, [&](std::int64_t i) {
         Group& one = group[group_of[i]];
         one.middle = one.middle + robot.shape[i].volume.center;
@@ -95,10 +97,8 @@ void remember(const Placed& placed, Motion& motion) {
     copy(placed.links.frame, motion.frame);
     for (std::size_t i = 0; i < placed.outline.size(); ++i) motion.center[i] = placed.outline[i].center;
     std::fill(motion.way.begin(), motion.way.end(), 0.0);
-    for (Group& one : motion.group) {
-        one.then = move(motion.frame[one.link], one.middle);
-        one.far = 0.0;
-    }
+    for (Group& one : motion.group) one.then = move(motion.frame[one.link], one.middle);
+    std::fill(motion.far.begin(), motion.far.end(), 0.0);
 }
 
 double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
@@ -110,10 +110,11 @@ double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
         motion.turned[link] = std::sqrt(0.5 * (squares[0] + squares[1] + squares[2]));  // 2 sin(angle / 2)
     }
     double farthest = 0.0;
-    for (Group& one : motion.group) {
+    for (std::size_t g = 0; g < motion.group.size(); ++g) {
+        const Group& one = motion.group[g];
         if (motion.moved[one.link])
-            one.far = length(move(links.frame[one.link], one.middle) - one.then) + motion.turned[one.link] * one.spread;
-        farthest = most(farthest, one.far);
+            motion.far[g] = length(move(links.frame[one.link], one.middle) - one.then) + motion.turned[one.link] * one.spread;
+        farthest = most(farthest, motion.far[g]);
     }
     return farthest;
 }

@@ -15,7 +15,6 @@ struct Group {
     Vec3 middle;              // at zero pose
     Vec3 then;                // where it was in the earlier pose
     double spread = 0.0;      // how far from the middle centres are, each with its arm [m]
-    double far = 0.0;         // see `measure_groups`
 };
 
 struct Motion {
@@ -34,6 +33,7 @@ struct Motion {
     Array<double> arm;                // (slots,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
     Array<Group> group;
     Array<std::int64_t> group_of;     // (slots,)
+    Array<double> far;                // (groups + 1,), see `measure_groups`; the last stands for what does not belong to the robot
     Array<double> turned;             // (links,): by which a point 1 m from a centre that turns with the link has moved [m]
     Array<double> way;                // (slots,), see `way_of`
     Array<double> bend, sway, chain;  // (links,), see `bend_links`
@@ -48,7 +48,7 @@ void find_moved(const Robot& robot, const double* angles, bool fresh, Motion& mo
 // Let the pose be the earlier one: from now on `way` counts from here.
 void remember(const Placed& placed, Motion& motion);
 
-// Fill how far any point of any shape of a group may be from where it was, `far` [m]; returns the most of all.
+// Fill `far`: how far any point of any shape of a group may be from where it was [m]; returns the most of all.
 double measure_groups(const Robot& robot, const Links& links, Motion& motion);
 
 // How far any point of a shape may be from where it was [m], after `measure_groups`; places the shape if its link has moved.

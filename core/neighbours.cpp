@@ -18,6 +18,7 @@ enum class Remembered : std::int64_t { nothing, pose, list, pose_to_renew };  //
 // A pair nearer than the skin when the list was made.
 struct Neighbour {
     Pair pair;
+    Pair groups;              // of the two
     double gap = 0.0;         // m between the two then
     std::int64_t kept = -1;   // which contact of then is theirs, -1: none
 };
@@ -70,10 +71,14 @@ double way_of_pair(Neighbours& near, Pair pair) {
 }
 
 // The same from their groups alone: no less, and it places nothing.
-double way_of_groups(const Neighbours& near, Pair pair) {
+double way_of_groups(const Motion& motion, Pair groups) { return motion.far[groups.first] + motion.far[groups.second]; }
+
+// The groups of two shapes, or of a shape and an object.
+Pair groups_of(const Neighbours& near, Pair pair) {
     const Motion& motion = near.motion;
-    const double way = motion.group[motion.group_of[pair.first]].far;
-    return pair.second < near.scene->robot->slots() ? way + motion.group[motion.group_of[pair.second]].far : way;
+    const bool own = pair.second < near.scene->robot->slots();
+    const auto group_of = [&](std::int32_t slot) { return static_cast<std::int32_t>(motion.group_of[slot]); };
+    return {group_of(pair.first), own ? group_of(pair.second) : static_cast<std::int32_t>(motion.group.size())};
 }
 
 // How far two shapes of the robot may have come nearer, as seen from the link that carries both.
@@ -90,7 +95,7 @@ void gather(Neighbours& near) {
     near.contacts.found.clear();
     bool bent = false;
     for (const Neighbour& one : near.list) {
-        if (way_of_groups(near, one.pair) < one.gap) continue;
+        if (way_of_groups(near.motion, one.groups) < one.gap) continue;
         const double between = way_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
@@ -124,7 +129,7 @@ void make_list(Neighbours& near) {
     for (const Pair pair : near.pairs.left) {
         const double depth = overlap_of(*near.scene, near.placed, pair, touch);
         if (-depth >= near.skin) continue;
-        Neighbour one{pair, -depth - margin, -1};
+        Neighbour one{pair, groups_of(near, pair), -depth - margin, -1};
         if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) {
             one.kept = static_cast<std::int64_t>(near.contacts.found.size());
             near.contacts.found.push(contact);

@@ -41,7 +41,8 @@ class Law:
         """Indices of the motors that are ever moved."""
         self.felt: Ints = np.flatnonzero(live)
         """Indices of the motors on which forces are computed."""
-        self.parts = np.array([(p.start, p.start + len(p)) for p in robot.parts.values() if live[p.slice].any()], dtype=INTERVAL)
+        felt = ([i for i in range(part.start, part.start + len(part)) if live[i]] for part in robot.parts.values())
+        self.parts = np.array([(of_part[0], of_part[-1] + 1) for of_part in felt if of_part], dtype=INTERVAL)
         clauses = [clause for clause in robot.clauses if clause.a[:, live].any()]
         self.clauses, self.rows, self.entries = _clauses(clauses, gains, motor_units(robot))
         self._struct = core.Law(

@@ -22,7 +22,7 @@ from mobee.robot.robot import Array
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 
-SKIN = 0.08  # m
+SKIN = 0.06  # m
 
 T = TypeVar("T")
 Work = Generator[int, None, T]
