@@ -25,7 +25,7 @@ class Entry:
 
 
 _PICTURES = 10  # nice value of whatever may come late
-_PLANS = 5  # of who plans: the control chain must not wait for a thought
+_PLANS = 9  # of who plans: the control chain must not wait for a thought, and no thought for a picture
 
 _ENTRIES = {
     "robot_sim": Entry(
