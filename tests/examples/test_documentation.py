@@ -65,8 +65,13 @@ def test_what_was_learned_offline_is_planned_with(tmp_path: Path) -> None:
 
 
 def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
-    (flow,) = blocks("docs/plant.md", tmp_path)
+    flow, _ = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
+
+
+def test_many_plants_go_on_together(tmp_path: Path) -> None:
+    _, many = blocks("docs/plant.md", tmp_path)
+    assert run(tmp_path, "-c", many).strip() == "[True, True, True] (100, 41)"
 
 
 def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
