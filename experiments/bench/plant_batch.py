@@ -16,7 +16,7 @@ from mobee import Gains, Lattice, Model, OfflinePlant, advance_together
 from mobee.robot.robot import Robot
 
 PLANTS = 64
-LEAST, AIM = 0.8, 1.5  # ticks a second of processor time of the batch, times those of one plant alone
+LEAST = 1.5  # ticks a second of processor time of the batch, times those of one plant alone
 
 
 @dataclass(frozen=True, slots=True)
