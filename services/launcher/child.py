@@ -85,7 +85,7 @@ class Child:
             )
         if self.program.nice:
             os.setpriority(os.PRIO_PROCESS, self.process.pid, self.program.nice)
-            if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes it waits until the control chain sleeps
+            if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes, it preempts no other process
                 os.sched_setscheduler(self.process.pid, os.SCHED_BATCH, os.sched_param(0))
         self.has_token, self.asking, self.unanswered, self.asked_at, self.answered_at, self.stat = False, False, 0, 0.0, 0.0, None
 
