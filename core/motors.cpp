@@ -256,32 +256,29 @@ void move(Motors& motors, std::int64_t substeps, double dt) {
     motors.newest = (motors.newest + substeps) % motors.rows;
 }
 
-void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
-    const View<const std::int64_t> living = motors.living;
-    Normals normals(seed, tick);
-    for (std::int64_t first = 0, end = 0; first < living.size; first = end) {
-        normals.count = 0;
-        for (; end < living.size && normals.takes(living[end] / 2); ++end) normals.take(living[end] / 2);
-        normals.draw();
-        std::int64_t couple = 0;
-        for (std::int64_t k = first; k < end; ++k) {
-            const std::int64_t i = living[k];
-            couple += normals.couples[couple] != i / 2;
-            q[i] = motors.state[i].q + noise[i] * (i % 2 ? normals.odd : normals.even)[couple];
-        }
-    }
-}
+namespace motors {
 
-void draw_noise(const Motors& motors, std::uint64_t seed, std::int64_t tick, double* drawn) {
-    const View<const std::int64_t> living = motors.living;
-    const NormalsOfTicks normals(seed, tick);
+void draw_noise(Motors& motors, std::int64_t first) {
+    const Normals normals(motors.seed, first);
     double of_couple[2][4];
     std::int64_t drawn_last = -1;
-    for (std::int64_t k = 0; k < living.size; ++k) {
-        const std::int64_t couple = living[k] / 2;
+    for (std::int64_t k = 0; k < motors.living.size; ++k) {
+        const std::int64_t couple = motors.living[k] / 2;
         if (couple != drawn_last) normals.draw(couple, of_couple[0], of_couple[1]);
         drawn_last = couple;
-        std::copy_n(of_couple[living[k] % 2], 4, drawn + 4 * k);
+        std::copy_n(of_couple[motors.living[k] % 2], 4, motors.drawn + 4 * k);
+    }
+    motors.drawn_from = first;
+}
+
+}  // namespace motors
+
+void read_encoders(Motors& motors, std::int64_t tick, const double* noise, double* q) {
+    const std::int64_t of_four = tick & 3;
+    if (motors.drawn_from != tick - of_four) motors::draw_noise(motors, tick - of_four);
+    for (std::int64_t k = 0; k < motors.living.size; ++k) {
+        const std::int64_t i = motors.living[k];
+        q[i] = motors.state[i].q + noise[i] * motors.drawn[4 * k + of_four];
     }
 }
 
@@ -301,8 +298,8 @@ MOBEE_CALL void mobee_motors_adopt(const mobee::Motors* motors, const double* q,
     for (const std::int64_t i : motors->living) mobee::motors::adopt(motors->numbers[i], motors->state[i], q[i], dt);
 }
 
-MOBEE_CALL void mobee_motors_read(const mobee::Motors* motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q) {
-    mobee::read_encoders(*motors, seed, tick, noise, q);
+MOBEE_CALL void mobee_motors_read(mobee::Motors* motors, std::int64_t tick, const double* noise, double* q) {
+    mobee::read_encoders(*motors, tick, noise, q);
 }
 
 // Approach the wanted velocities; before a position limit no more than can still be braked.

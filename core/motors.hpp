@@ -41,6 +41,9 @@ struct Motors {
     double* line = nullptr;  // (rows, n): what is on its way to the motors
     std::int64_t rows = 1;
     std::int64_t newest = 0;  // the row written last
+    std::uint64_t seed = 0;   // of the encoders' noise
+    double* drawn = nullptr;       // (living, 4): the noise of four ticks in units of its standard deviations, from
+    std::int64_t drawn_from = -1;  // this one on, a multiple of four
 
     std::int64_t next(std::int64_t row) const { return row + 1 < rows ? row + 1 : 0; }
     double& on_its_way(std::int64_t row, std::int64_t motor) const { return line[row * numbers.size + motor]; }
@@ -58,11 +61,8 @@ void integrate(const Motors& motors, double dt);
 // `drive` and `integrate`, that many times.
 void move(Motors& motors, std::int64_t substeps, double dt);
 
-// The encoders' noise is a pure function of seed, tick and motor.  Fill `q` (n,) of the living motors with the joint sides plus noise
-// of these standard deviations (n,).
-void read_encoders(const Motors& motors, std::uint64_t seed, std::int64_t tick, const double* noise, double* q);
-
-// The same noise of four ticks from `tick` on, in units of the standard deviations: (living, 4).
-void draw_noise(const Motors& motors, std::uint64_t seed, std::int64_t tick, double* drawn);
+// Fill `q` (n,) of the living motors with the joint sides plus noise of these standard deviations (n,); it is a pure function of seed,
+// tick and motor.
+void read_encoders(Motors& motors, std::int64_t tick, const double* noise, double* q);
 
 }  // namespace mobee

@@ -22,41 +22,18 @@ void tell(Plant& plant, std::int64_t tick) {
     }
 }
 
-// The encoders of a plant's ticks, one after the other.  Their noise is drawn for four ticks at once, which costs what one does.
-class Encoders {
-public:
-    explicit Encoders(Plant& plant) : plant_(plant), drawn_(plant.noise != nullptr && plant.most >= 4 ? 4 * plant.motors->living.size : 0) {}
-
-    // Read them; false if they are not finite.
-    bool read(std::int64_t tick) {
-        const Motors& motors = *plant_.motors;
-        if (drawn_.size() > 0) {
-            add_drawn(tick);
-        } else if (plant_.noise != nullptr) {
-            read_encoders(motors, plant_.seed, tick, plant_.noise, plant_.q);
-        } else {
-            for (const std::int64_t i : motors.living) plant_.q[i] = motors.state[i].q;
-        }
-        double total = 0.0;
-        for (const std::int64_t i : motors.living) total += std::fabs(plant_.q[i]);
-        return total < std::numeric_limits<double>::infinity();
+// Read the encoders; false if they are not finite.
+bool measure(Plant& plant, std::int64_t tick) {
+    Motors& motors = *plant.motors;
+    if (plant.noise != nullptr) {
+        read_encoders(motors, tick, plant.noise, plant.q);
+    } else {
+        for (const std::int64_t i : motors.living) plant.q[i] = motors.state[i].q;
     }
-
-private:
-    void add_drawn(std::int64_t tick) {
-        const Motors& motors = *plant_.motors;
-        const std::int64_t of_four = read_++ % 4;
-        if (of_four == 0) draw_noise(motors, plant_.seed, tick, drawn_.data());
-        for (std::int64_t k = 0; k < motors.living.size; ++k) {
-            const std::int64_t i = motors.living[k];
-            plant_.q[i] = motors.state[i].q + plant_.noise[i] * drawn_[4 * k + of_four];
-        }
-    }
-
-    Plant& plant_;
-    Array<double> drawn_;  // (living, 4); empty where that does not pay
-    std::int64_t read_ = 0;
-};
+    double total = 0.0;
+    for (const std::int64_t i : motors.living) total += std::fabs(plant.q[i]);
+    return total < std::numeric_limits<double>::infinity();
+}
 
 // Find the contacts of the pose and what they do to the motors; how many there are.
 std::int64_t feel_pose(Plant& plant) {
@@ -131,11 +108,10 @@ struct Runner {
 void run(Plant& plant) {
     const std::int64_t width = 3 * plant.law->motors.size + record_depths;
     plant.end = all_ticks_done;
-    plant::Encoders encoders(plant);
     for (plant.done = 0; plant.done < plant.most; ++plant.done) {
         const std::int64_t tick = plant.ticks + plant.done + 1;
         plant::tell(plant, tick);
-        if (!encoders.read(tick)) {
+        if (!plant::measure(plant, tick)) {
             plant.end = state_lost;
             return;
         }

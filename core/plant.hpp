@@ -39,7 +39,6 @@ struct Plant {
     std::int64_t command_age = 1;
     std::int64_t substeps = 1;
     double dt = 0.0;  // s, a tick
-    std::uint64_t seed = 0;
     const double* noise = nullptr;  // (n,), standard deviations of the encoders; none: they have no noise
     View<PartAction> parts;
     double* q = nullptr;       // (n,), the encoders of the last tick

@@ -31,6 +31,7 @@ class Motors(ctypes.Structure):
 
     _fields_ = (
         ("living", View), ("numbers", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
+        ("seed", ctypes.c_uint64), ("drawn", ADDRESS), ("drawn_from", INTEGER),
     )  # fmt: skip
 
 
@@ -52,7 +53,7 @@ class Calls:
         self.integrate = function("motors_integrate", ADDRESS, REAL)
         self.move = function("motors_move", ADDRESS, INTEGER, REAL)
         self.adopt = function("motors_adopt", ADDRESS, ADDRESS, REAL)
-        self.read = function("motors_read", ADDRESS, ctypes.c_uint64, INTEGER, ADDRESS, ADDRESS)
+        self.read = function("motors_read", ADDRESS, INTEGER, ADDRESS, ADDRESS)
         self.to_velocity = function("braking_to_velocity", ADDRESS, ADDRESS, ADDRESS)
         self.to_position = function("braking_to_position", ADDRESS, ADDRESS, ADDRESS)
         self.runs_out = function("braking_runs_out", ADDRESS, ADDRESS, ADDRESS, result=ctypes.c_bool)

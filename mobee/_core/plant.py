@@ -23,7 +23,7 @@ class Plant(ctypes.Structure):
         *((name, ADDRESS) for name in ("near", "law", "law_state", "attractor", "client", "forces")),
         ("rows", INTEGER), ("reaches", View),
         ("motors", ADDRESS), ("commands", ADDRESS), ("command_age", INTEGER), ("substeps", INTEGER), ("dt", REAL),
-        ("seed", ctypes.c_uint64), ("noise", ADDRESS), ("parts", View),
+        ("noise", ADDRESS), ("parts", View),
         *((name, ADDRESS) for name in ("q", "torque", "total", "record")),
         *((name, INTEGER) for name in ("ticks", "most", "done", "end")),
     )  # fmt: skip

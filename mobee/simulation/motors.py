@@ -52,7 +52,10 @@ class Motors:
         """What does not change while the substep is the same, see `mobee._core.motors.NUMBERS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
-        self.struct = core.Motors(view(self.living), view(self.numbers), address(self.state), address(self._line), 1, 0)
+        self._drawn = np.empty((len(self.living), 4))
+        self.struct = core.Motors(
+            view(self.living), view(self.numbers), address(self.state), address(self._line), 1, 0, self.seed, address(self._drawn), -1
+        )
         """The motors as the core reads them."""
         self.address = ctypes.addressof(self.struct)
         self._core = core.calls()
@@ -151,7 +154,7 @@ class Motors:
         The noise is a pure function of seed, tick and motor: asked twice, it is the same.
         """
         noisy = self.q
-        self._core.read(self.address, self.seed, k, self.noise(dt).tobytes(), address(noisy))
+        self._core.read(self.address, k, self.noise(dt).tobytes(), address(noisy))
         return noisy[where]
 
     def noise(self, dt: float) -> Array:

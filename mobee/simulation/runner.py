@@ -68,7 +68,7 @@ class Runner:
             law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
             client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
             commands=address(self._commands),
-            command_age=command_age, substeps=substeps, dt=dt, seed=motors.seed,
+            command_age=command_age, substeps=substeps, dt=dt,
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
