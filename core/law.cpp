@@ -125,19 +125,20 @@ double led(double reference, double q, double velocity, double dt, const MotorGa
     return std::min(std::max(waits ? reference : reference + velocity * dt, motor.low), motor.high);
 }
 
-// Whether the motion is looked at, at time t [s]; then the time of the next look is noted.
-bool is_time(const Settle& settle, SettleTest& test, double t) {
-    if (t < test.next_look - rounding) return false;
-    const double missed = std::floor((t - test.next_look + rounding) / settle.interval);
-    test.next_look += (missed + 1.0) * settle.interval;
-    return true;
-}
-
 bool is_slow(const Settle& settle, double velocity, double change, double unit) {
     return std::fabs(velocity) <= settle.speed * unit && std::fabs(change) <= settle.acceleration * unit;
 }
 
-Verdict unsettled(const Settle& settle, const SettleTest& test, double t) {
+// Judge a motion at time t [s]; `slow` says of each motor whether it is, and is asked when it is time to look.
+template <class Slow>
+Verdict judge(const Settle& settle, SettleTest& test, double t, Interval motors, Slow slow) {
+    if (t >= test.next_look - rounding) {
+        const double missed = std::floor((t - test.next_look + rounding) / settle.interval);
+        test.next_look += (missed + 1.0) * settle.interval;
+        std::int64_t i = motors.first;
+        while (i < motors.end && slow(i)) ++i;
+        if (i == motors.end) return settled;
+    }
     return t - test.begun >= settle.timeout - rounding ? timed_out : moving;
 }
 
@@ -160,7 +161,31 @@ double client_share(const MotorGains& motor, double length) {
     return maximum / (maximum / motor.client_slope + length);
 }
 
-void add_client_force(const Law& law, const double* f, double* total) {
+void advance(const Law& law, const double* q, double dt, const double* attractor, const double* force, LawState* state) {
+    for (const std::int64_t i : law.active) {
+        const MotorGains& motor = law.motors[i];
+        LawState& own = state[i];
+        const double a = law::acceleration(q[i], own.velocity, attractor[i], force[i], motor);
+        const double v = law::bounded(own.velocity + a * dt, own.sent, motor.max_speed, motor.max_acceleration * dt);
+        own.acceleration = (v - own.sent) / dt;  // of what is sent: after a hold the own velocity is 0 and that is not
+        own.velocity = own.sent = v;
+        own.reference = law::led(own.reference, q[i], v, dt, motor);
+    }
+}
+
+double torque_of(const MotorGains& motor, const LawState& state) {
+    const double wanted = motor_inertia * state.acceleration + motor_friction * state.velocity + state.feedforward;
+    return std::min(std::max(wanted, -motor.max_torque), motor.max_torque);
+}
+
+Verdict look(const Law& law, Interval motors, const LawState* state, double t, SettleTest& test) {
+    const auto slow = [&](std::int64_t i) { return law::is_slow(law.settle, state[i].velocity, state[i].acceleration, law.motors[i].fine); };
+    return law::judge(law.settle, test, t, motors, slow);
+}
+
+// Add a client's force f, bounded (eqs. 5.9 and 5.10), to `total`, both (n,).
+MOBEE_CALL void mobee_law_client(const Law* of, const double* f, double* total) {
+    const Law& law = *of;
     if (!law.direction) {
         for (const std::int64_t i : law.felt) total[i] += squash(f[i], law.motors[i].max_client, law.motors[i].client_knee);
         return;
@@ -181,50 +206,11 @@ void add_client_force(const Law& law, const double* f, double* total) {
     }
 }
 
-void begin_at_rest(const Law& law, const double* q, LawState* state) {
-    for (std::int64_t i = 0; i < law.motors.size; ++i) {
-        state[i] = LawState{};
-        state[i].reference = std::min(std::max(q[i], law.motors[i].low), law.motors[i].high);
-    }
-    for (const std::int64_t i : law.active) state[i].reference = q[i];
-}
-
-void advance(const Law& law, const double* q, double dt, const double* attractor, const double* force, LawState* state) {
-    for (const std::int64_t i : law.active) {
-        const MotorGains& motor = law.motors[i];
-        LawState& own = state[i];
-        const double a = law::acceleration(q[i], own.velocity, attractor[i], force[i], motor);
-        const double v = law::bounded(own.velocity + a * dt, own.sent, motor.max_speed, motor.max_acceleration * dt);
-        own.acceleration = (v - own.sent) / dt;  // of what is sent: after a hold the own velocity is 0 and that is not
-        own.velocity = own.sent = v;
-        own.reference = law::led(own.reference, q[i], v, dt, motor);
-    }
-}
-
-double torque_of(const MotorGains& motor, const LawState& state) {
-    const double wanted = motor_inertia * state.acceleration + motor_friction * state.velocity + state.feedforward;
-    return std::min(std::max(wanted, -motor.max_torque), motor.max_torque);
-}
-
-Verdict look(const Law& law, Interval motors, const LawState* state, double t, SettleTest& test) {
-    if (law::is_time(law.settle, test, t)) {
-        bool slow = true;
-        for (std::int64_t i = motors.first; i < motors.end && slow; ++i)
-            slow = law::is_slow(law.settle, state[i].velocity, state[i].acceleration, law.motors[i].fine);
-        if (slow) return settled;
-    }
-    return law::unsettled(law.settle, test, t);
-}
-
 }  // namespace mobee
 
 MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, const mobee::LawState* state, double* forces) {
     mobee::constraining_forces(*law, {q, torque, state}, forces);
 }
-
-MOBEE_CALL void mobee_law_begin(const mobee::Law* law, const double* q, mobee::LawState* state) { mobee::begin_at_rest(*law, q, state); }
-
-MOBEE_CALL void mobee_law_client(const mobee::Law* law, const double* f, double* total) { mobee::add_client_force(*law, f, total); }
 
 // `commands` (3, n): position, velocity, torque.
 MOBEE_CALL void mobee_law_step(const mobee::Law* law, const double* q, double dt, const double* attractor, const double* force,
@@ -240,12 +226,8 @@ MOBEE_CALL void mobee_law_step(const mobee::Law* law, const double* q, double dt
 
 // Judge commanded velocities and accelerations, (2, count), in fine units.
 MOBEE_CALL std::int64_t mobee_law_look(const mobee::Settle* settle, mobee::SettleTest* test, double t, const double* motion, std::int64_t count) {
-    if (mobee::law::is_time(*settle, *test, t)) {
-        bool slow = true;
-        for (std::int64_t i = 0; i < count && slow; ++i) slow = mobee::law::is_slow(*settle, motion[i], motion[count + i], 1.0);
-        if (slow) return mobee::settled;
-    }
-    return mobee::law::unsettled(*settle, *test, t);
+    const auto slow = [=](std::int64_t i) { return mobee::law::is_slow(*settle, motion[i], motion[count + i], 1.0); };
+    return mobee::law::judge(*settle, *test, t, {0, count}, slow);
 }
 
 // The term of that number: its name, none behind the last, and whether it depends on the state.
@@ -254,24 +236,3 @@ MOBEE_CALL const char* mobee_law_term(std::int64_t index) {
 }
 
 MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return mobee::law::terms[index].moving; }
-
-// Single formulas, for tests.
-MOBEE_CALL double mobee_law_squash(double v, double maximum, double slope) { return mobee::squash(v, maximum, maximum / slope); }
-
-MOBEE_CALL void mobee_law_squash_norm(double* v, std::int64_t count, double maximum, double slope) {
-    mobee::law::squash_norm(v, count, maximum, slope);
-}
-
-MOBEE_CALL double mobee_law_limit_force(const mobee::MotorGains* motor, double q) { return mobee::limit_force(*motor, q); }
-
-MOBEE_CALL double mobee_law_acceleration(const mobee::MotorGains* motor, double q, double velocity, double attractor, double force) {
-    return mobee::law::acceleration(q, velocity, attractor, force, *motor);
-}
-
-MOBEE_CALL double mobee_law_bounded(double velocity, double sent, double fastest, double change) {
-    return mobee::law::bounded(velocity, sent, fastest, change);
-}
-
-MOBEE_CALL double mobee_law_led(const mobee::MotorGains* motor, double reference, double q, double velocity, double dt) {
-    return mobee::law::led(reference, q, velocity, dt, *motor);
-}

@@ -94,12 +94,6 @@ struct Term {
 // Fill `forces` (terms, n), a row for each force that constrains the robot.
 void constraining_forces(const Law& law, const Moment& now, double* forces);
 
-// Add a client's force f, bounded (eqs. 5.9 and 5.10), to `total`, both (n,).
-void add_client_force(const Law& law, const double* f, double* total);
-
-// Begin at rest at the measured q: fill the state, (n,).
-void begin_at_rest(const Law& law, const double* q, LawState* state);
-
 // One step of eq. 5.7 by dt [s]; `force` (n,): the sum of its right-hand side.  Motors that are never moved keep their state.
 void advance(const Law& law, const double* q, double dt, const double* attractor, const double* force, LawState* state);
 

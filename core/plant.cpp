@@ -1,14 +1,57 @@
-#include "plant.hpp"
-
+// The offline plant: encoders, model, law and motors of one robot, tick after tick.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
 
 #include "interface.hpp"
+#include "law.hpp"
+#include "motors.hpp"
+#include "neighbours.hpp"
+#include "reach.hpp"
 #include "threads.hpp"
 
 namespace mobee {
+
+// A part and its action: whether it is under way, how the last one ended, and its settle test.
+struct PartAction {
+    Interval motors;
+    std::int64_t under_way = 0;
+    std::int64_t verdict = moving;
+    SettleTest test;
+};
+
+enum RunEnd : std::int64_t { all_ticks_done, action_ended, state_lost };
+
+// What stands in a row of the record, behind encoders, joint sides and commanded velocities, each (n,): the deepest contacts [m].
+constexpr std::int64_t record_depths = 2;
+
+// All of it belongs to whoever made the plant.
+struct Plant {
+    Neighbours* near = nullptr;  // of the robot in the world; none: nothing is felt
+    const Law* law = nullptr;
+    LawState* law_state = nullptr;
+    double* attractor = nullptr;     // (n,)
+    const double* client = nullptr;  // (n,), f_config and f_work, bounded
+    double* forces = nullptr;        // (rows, n): those of the law's terms, behind them any others, given for one tick
+    std::int64_t rows = 0;
+    View<Reach* const> reaches;
+    Motors* motors = nullptr;
+    double* commands = nullptr;  // (command_age, n): those on their way to the motors
+    std::int64_t command_age = 1;
+    std::int64_t substeps = 1;
+    double dt = 0.0;  // s, a tick
+    const double* noise = nullptr;  // (n,), standard deviations of the encoders; none: they have no noise
+    View<PartAction> parts;
+    double* q = nullptr;       // (n,), the encoders of the last tick
+    double* torque = nullptr;  // (n,), the sum of J^T (depth * normal) there
+    double* total = nullptr;   // (n,), the right-hand side of eq. 5.7
+    double* record = nullptr;  // (most, 3 n + record_depths), a row a tick; none: nothing is recorded
+    std::int64_t ticks = 0;    // that there have been
+    std::int64_t most = 0;     // that are to be run now
+    std::int64_t done = 0;     // that were
+    std::int64_t end = all_ticks_done;
+};
 
 namespace plant {
 
@@ -93,18 +136,9 @@ void write(const Plant& plant, std::int64_t contacts, double* row) {
     }
 }
 
-// What one of several threads does: it runs one plant after the other as long as there are any.
-struct Runner {
-    Plant* const* plants;
-    Blocks* blocks;
-
-    void run() {
-        for (std::int64_t begin, end; blocks->take(begin, end);) mobee::run(*plants[begin]);
-    }
-};
-
 }  // namespace plant
 
+// Run up to `most` ticks, until an action ends.
 void run(Plant& plant) {
     const std::int64_t width = 3 * plant.law->motors.size + record_depths;
     plant.end = all_ticks_done;
@@ -132,11 +166,20 @@ void run(Plant& plant) {
 
 MOBEE_CALL void mobee_plant_run(mobee::Plant* plant) { mobee::run(*plant); }
 
-// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads.
+// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads: each runs one after the other as long as
+// there are any.
 MOBEE_CALL void mobee_plants_run(mobee::Plant* const* plants, std::int64_t count, std::int64_t threads) {
+    struct Runner {
+        mobee::Plant* const* plants;
+        mobee::Blocks* blocks;
+
+        void run() {
+            for (std::int64_t begin, end; blocks->take(begin, end);) mobee::run(*plants[begin]);
+        }
+    };
     mobee::Blocks blocks(count, 1);
-    mobee::plant::Runner runner{plants, &blocks};
-    mobee::Array<mobee::plant::Runner*> runners;
+    Runner runner{plants, &blocks};
+    mobee::Array<Runner*> runners;
     for (std::int64_t k = 0; k < threads && k < count; ++k) runners.push(&runner);
     if (runners.size() > 0) mobee::run_together(runners);
 }

@@ -55,7 +55,6 @@ class Calls:
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
-        self.begin = function("law_begin", ADDRESS, ADDRESS, ADDRESS)
         self.client = function("law_client", ADDRESS, ADDRESS, ADDRESS)
         self.step = function("law_step", ADDRESS, ADDRESS, REAL, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
         self.look = function("law_look", ADDRESS, ADDRESS, REAL, ADDRESS, INTEGER, result=INTEGER)

@@ -1,4 +1,4 @@
-"""The offline plant's ticks: core/plant.hpp says what the numbers are."""
+"""The offline plant's ticks: core/plant.cpp says what the numbers are."""
 
 from __future__ import annotations
 

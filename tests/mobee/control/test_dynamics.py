@@ -5,19 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee._core import ADDRESS, REAL, address, function
-from mobee._core.law import MOTOR_GAINS
 from mobee.control.gains import Gains
-
-acceleration = function("law_acceleration", ADDRESS, REAL, REAL, REAL, REAL, result=REAL)
-bounded = function("law_bounded", REAL, REAL, REAL, REAL, result=REAL)
-led = function("law_led", ADDRESS, REAL, REAL, REAL, REAL, result=REAL)
+from tests.mobee.control.one_law import OneLaw
 
 
 def accelerated(error: float, velocity: float, force: float, gains: Gains) -> float:
-    motor = np.zeros(1, dtype=MOTOR_GAINS)
-    motor["max_spring"], motor["spring_knee"], motor["damping"] = gains.max_spring, gains.max_spring / gains.stiffness, gains.damping
-    return acceleration(address(motor), 0.0, velocity, error, force)
+    law = OneLaw(max_spring=gains.max_spring, spring_knee=gains.max_spring / gains.stiffness, damping=gains.damping)
+    return float(law.step(0.01, error, force, velocity=velocity, sent=velocity)["acceleration"])
 
 
 def test_the_published_spring_by_hand() -> None:
@@ -33,7 +27,7 @@ def test_forces_add_to_the_acceleration() -> None:
 
 @given(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0))
 def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> None:
-    told = bounded(wanted, sent, 1.0, 0.1)
+    told = float(OneLaw(max_speed=1.0, max_acceleration=10.0).step(0.01, velocity=wanted, sent=sent)["sent"])
     assert abs(told - sent) <= 0.1 + 1e-12
     assert abs(told) <= max(1.0, abs(sent) - 0.1 + 1e-12)
     if abs(wanted) <= 1.0 and abs(wanted - sent) <= 0.1:
@@ -46,6 +40,5 @@ def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> N
     ids=["goes on", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
 )
 def test_the_position_reference(reference: float, q: float, velocity: float, then: float) -> None:
-    motor = np.zeros(1, dtype=MOTOR_GAINS)
-    motor["leash"], motor["low"], motor["high"] = 0.3, -1.0, 1.0
-    assert led(address(motor), reference, q, velocity, 0.01) == pytest.approx(then)
+    law = OneLaw(leash=0.3, low=-1.0, high=1.0)
+    assert law.step(0.01, q, q=q, reference=reference, velocity=velocity, sent=velocity)["reference"] == pytest.approx(then)

@@ -5,17 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee._core import ADDRESS, REAL, address, function
-from mobee._core.law import MOTOR_GAINS
-
-formula = function("law_limit_force", ADDRESS, REAL, result=REAL)
+from tests.mobee.control.one_law import OneLaw
 
 
 def limit_force(q: float, low: float, high: float, below: float, above: float, slope: float) -> float:
-    motor = np.zeros(1, dtype=MOTOR_GAINS)
-    for name, value in (("low", low), ("high", high), ("below", below), ("above", above), ("limit_slope", slope)):
-        motor[name] = value
-    return formula(address(motor), q)
+    law = OneLaw(low=low, high=high, below=below, above=above, limit_slope=slope)
+    return float(law.force("limits", np.array([q]), np.zeros(1))[0])
 
 
 def at(q: float, width: float = 1.0, maximum: float = 1.0) -> float:

@@ -5,23 +5,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee._core import ADDRESS, INTEGER, REAL, address, function
+from tests.mobee.control.one_law import OneLaw
 
 vectors = st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=6).map(np.array)
 sizes = st.floats(0.1, 100.0)
-squash = function("law_squash", REAL, REAL, REAL, result=REAL)
-squash_norm = function("law_squash_norm", ADDRESS, INTEGER, REAL, REAL)
 
 
 def each(v: np.ndarray, m: float, k: float) -> np.ndarray:
-    return np.array([squash(x, m, k) for x in v])
+    """As a client's force is bounded, motor by motor."""
+    return OneLaw(len(v), max_client=m, client_knee=m / k).client(v)
+
+
+def squash(v: float, m: float, k: float) -> float:
+    return float(each(np.array([v]), m, k)[0])
 
 
 def whole(v: np.ndarray, m: float, k: float) -> np.ndarray:
-    squashed = np.concatenate([[7.0], v, [7.0]])
-    squash_norm(address(squashed) + squashed.itemsize, len(v), m, k)
-    assert squashed[0] == squashed[-1] == 7.0
-    return squashed[1:-1]
+    """As the force of contacts is bounded, by its norm."""
+    return OneLaw(len(v), law={"contact_gain": 1.0, "max_contact": m, "contact_slope": k}).force("collision", np.zeros(len(v)), v)
 
 
 @given(vectors, sizes, sizes)
