@@ -91,12 +91,6 @@ inline void adopt(const MotorNumbers& numbers, MotorState& state, double q, doub
     }
 }
 
-// Joint sides that nothing blocks.
-inline void stop_hard(const MotorNumbers& numbers, MotorState& state, double dt) {
-    state.dragged = within(state.dragged, numbers.low, numbers.high);
-    adopt(numbers, state, state.dragged, dt);
-}
-
 // References that never ask motors for more than their velocity and acceleration, and never for what cannot be braked.
 struct Braking {
     std::int64_t count = 0;
@@ -132,19 +126,6 @@ void enter(const Motors& motors, std::int64_t motor, std::int64_t mode) {
     if (mode == torque_mode) state.motor_q = state.q;  // from then on its gear is rigid
 }
 
-void drive(Motors& motors, double dt) {
-    motors.newest = motors.next(motors.newest);
-    for (const std::int64_t i : motors.living) {
-        const double before = motors.state[i].motor_velocity;
-        motors::turn(motors, i, motors.state[i], motors.newest, dt);
-        motors::note_effort(motors.state[i], before, dt);
-    }
-}
-
-void integrate(const Motors& motors, double dt) {
-    for (const std::int64_t i : motors.living) motors::stop_hard(motors.numbers[i], motors.state[i], dt);
-}
-
 namespace motors {
 
 void move_one(const Motors& motors, std::int64_t i, std::int64_t substeps, double dt) {
@@ -155,7 +136,8 @@ void move_one(const Motors& motors, std::int64_t i, std::int64_t substeps, doubl
         const double before = state.motor_velocity;
         turn(motors, i, state, now, dt);
         if (k + 1 == substeps) note_effort(state, before, dt);
-        stop_hard(motors.numbers[i], state, dt);
+        state.dragged = within(state.dragged, motors.numbers[i].low, motors.numbers[i].high);
+        adopt(motors.numbers[i], state, state.dragged, dt);
     }
     motors.state[i] = state;
 }
@@ -288,9 +270,15 @@ MOBEE_CALL void mobee_motors_enter(const mobee::Motors* motors, std::int64_t fir
     for (std::int64_t i = first; i < end; ++i) mobee::enter(*motors, i, mode);
 }
 
-MOBEE_CALL void mobee_motors_drive(mobee::Motors* motors, double dt) { mobee::drive(*motors, dt); }
-
-MOBEE_CALL void mobee_motors_integrate(const mobee::Motors* motors, double dt) { mobee::integrate(*motors, dt); }
+// Advance the motor sides by a substep of dt [s]; the joint sides are then told by `mobee_motors_adopt`.
+MOBEE_CALL void mobee_motors_drive(mobee::Motors* motors, double dt) {
+    motors->newest = motors->next(motors->newest);
+    for (const std::int64_t i : motors->living) {
+        const double before = motors->state[i].motor_velocity;
+        mobee::motors::turn(*motors, i, motors->state[i], motors->newest, dt);
+        mobee::motors::note_effort(motors->state[i], before, dt);
+    }
+}
 
 MOBEE_CALL void mobee_motors_move(mobee::Motors* motors, std::int64_t substeps, double dt) { mobee::move(*motors, substeps, dt); }
 

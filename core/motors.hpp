@@ -52,13 +52,7 @@ struct Motors {
 // Change a motor's mode; what is on its way to it has another unit and becomes what it does now: in torque mode, carry its load.
 void enter(const Motors& motors, std::int64_t motor, std::int64_t mode);
 
-// Advance the motor sides by a substep of dt [s].
-void drive(Motors& motors, double dt);
-
-// Joint sides that nothing blocks: go where `drive` dragged, as far as the hard stops.
-void integrate(const Motors& motors, double dt);
-
-// `drive` and `integrate`, that many times.
+// Advance motors whose joint sides nothing blocks but the hard stops, by so many substeps of dt [s].
 void move(Motors& motors, std::int64_t substeps, double dt);
 
 // Fill `q` (n,) of the living motors with the joint sides plus noise of these standard deviations (n,); it is a pure function of seed,

@@ -142,21 +142,19 @@ void note_error(Reach& reach) {
     for (int k = 0; k < 3; ++k) reach.error[3 + k] = turn[k];
 }
 
-void add_reach(const Law& law, Reach& reach, double* q, const double* attractor, double dt, double* total) {
-    place_marker(reach, q);
-    note_error(reach);
-    if (law.published) {
-        reach::force_motors(reach);
-        reach::add_bounded(law, reach, total);
-        return;
-    }
-    const bool nudged = pull_marker(law, reach, q, dt, total);
-    reach::add_bounded(law, reach, total);
-    add_release(law, reach, nudged, q, attractor, total);
-}
-
 void add_reaches(const Law& law, View<Reach* const> reaches, double* q, const double* attractor, double dt, double* total) {
-    for (Reach* reach : reaches) add_reach(law, *reach, q, attractor, dt, total);
+    for (Reach* reach : reaches) {
+        place_marker(*reach, q);
+        note_error(*reach);
+        bool nudged = false;
+        if (law.published) {
+            reach::force_motors(*reach);
+        } else {
+            nudged = pull_marker(law, *reach, q, dt, total);
+        }
+        reach::add_bounded(law, *reach, total);
+        if (!law.published) add_release(law, *reach, nudged, q, attractor, total);
+    }
 }
 
 bool goes_on(const Law& law, View<Reach* const> reaches, std::int64_t part) {

@@ -70,9 +70,7 @@ struct Reach {
     int rows() const { return turned ? 6 : 3; }
 };
 
-// Add the force of a reach at the measured q (n,) to `total` (n,), which has all other forces.  `q` is the same afterwards.
-void add_reach(const Law& law, Reach& reach, double* q, const double* attractor, double dt, double* total);
-
+// Add the forces of reaches at the measured q (n,) to `total` (n,), which has all others.  `q` is the same afterwards.
 void add_reaches(const Law& law, View<Reach* const> reaches, double* q, const double* attractor, double dt, double* total);
 
 // Whether the part that begins with that motor reaches, and goes on although it has settled; never under the published law.

@@ -130,9 +130,7 @@ class _Body:
     def tick(self, mode: str, reference: Array) -> None:
         """Run for a tick under the command of the tick before."""
         self._motors.command(slice(None), "velocity" if mode == "velocity" else "position", reference)
-        for _ in range(self._substeps):
-            self._motors.drive(DT / self._substeps)
-            self._motors.integrate()
+        self._motors.move(self._substeps, DT / self._substeps)
 
 
 def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> Control:

@@ -75,9 +75,7 @@ def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
         if speed != told:
             motors.command(slice(None), "velocity", np.full(q.shape[1], speed))
             told = speed
-        for _ in range(substeps):
-            motors.drive(DT / substeps)
-            motors.integrate()
+        motors.move(substeps, DT / substeps)
     return q.T
 
 

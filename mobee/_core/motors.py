@@ -50,7 +50,6 @@ class Calls:
     def __init__(self) -> None:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER, INTEGER)
         self.drive = function("motors_drive", ADDRESS, REAL)
-        self.integrate = function("motors_integrate", ADDRESS, REAL)
         self.move = function("motors_move", ADDRESS, INTEGER, REAL)
         self.adopt = function("motors_adopt", ADDRESS, ADDRESS, REAL)
         self.read = function("motors_read", ADDRESS, INTEGER, ADDRESS, ADDRESS)

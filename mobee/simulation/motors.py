@@ -27,8 +27,7 @@ _HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 class Motors:
     """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
 
-    Each substep: `drive`, then either `integrate` (the joint side is this class's own, with hard stops) or
-    `adopt` (the joint side is what a physics engine says it has become).
+    Either `move`, or each substep `drive` and `adopt`: the joint side is then what a physics engine says it has become.
     """
 
     def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
@@ -132,12 +131,8 @@ class Motors:
         velocity: Array = (self.state["dragged"] - self.state["q"]) / dt
         return velocity
 
-    def integrate(self) -> None:
-        """Kinematic joint side: go where `drive` asked, as far as the hard stops."""
-        self._core.integrate(self.address, self._dt)
-
     def move(self, substeps: int, dt: float) -> None:
-        """As so many times `drive` and `integrate`, by substeps of dt [s] under the same load."""
+        """Advance by so many substeps of dt [s] under the same load; nothing blocks the joint sides but the hard stops."""
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)
 

@@ -56,9 +56,7 @@ def draw(
         q = plant.encoders(k, DT)
         said.append(reacher.update(q, DT))
         velocity = controller.step(q, DT).velocity
-        for _ in range(2):
-            plant.drive(DT / 2)
-            plant.integrate()
+        plant.move(2, DT / 2)
         path.append(model.evaluate(plant.q).position(marker))
     return Drawn(np.array(path), said, reacher.angle)
 

@@ -50,13 +50,13 @@ def test_whatever_is_commanded_the_simulated_motors_do_this(seed: int) -> None:
         reference.command(mine, where, mode, given_)
         motors.load = mine.load = rng.normal(size=n)
         for _ in range(rng.integers(1, 20)):
-            motors.drive(step)
             if rng.random() < 0.1:  # something blocks the joints
+                motors.drive(step)
                 motors.adopt(motors.q)
                 reference.drive(robot, parameters, mine, step)
                 reference.adopt(robot, parameters, mine, mine.q, step)
             else:
-                motors.integrate()
+                motors.move(1, step)
                 reference.substep(robot, parameters, mine, step)
         assert np.array_equal(motors.q, mine.q)
         assert np.array_equal(motors.velocities, mine.velocity)

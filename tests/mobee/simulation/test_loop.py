@@ -42,9 +42,7 @@ def in_python(ticks: int, age: int, gains: Gains, modality: str, propagate: str,
             motors.command(slice(None), modality, getattr(commands[k - age - 1], modality))
         q = motors.encoders(k, dt)
         commands.append(controller.step(q, dt, controller.forces(track.evaluate(q))))
-        for _ in range(substeps):
-            motors.drive(dt / substeps)
-            motors.integrate()
+        motors.move(substeps, dt / substeps)
         encoders.append(q)
         joints.append(motors.q)
     return np.array(encoders), np.array(joints)

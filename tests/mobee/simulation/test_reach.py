@@ -159,9 +159,7 @@ def reference(gains: Gains, ticks: int, world: str | None) -> Array:
             motors.command(slice(None), "velocity", velocity)
         q = motors.encoders(k, 0.02)
         velocity = controller.step(q, 0.02, controller.forces(track.evaluate(q))).velocity
-        for _ in range(motors.parameters.substeps(0.02)):
-            motors.drive(0.02 / motors.parameters.substeps(0.02))
-            motors.integrate()
+        motors.move(motors.parameters.substeps(0.02), 0.02 / motors.parameters.substeps(0.02))
         encoders.append(q)
     return np.array(encoders)
 

@@ -61,7 +61,5 @@ class Gated:
         self.drive = self.gate.tick(self.k, self.now, self.q, self.velocity)
         self.motors.command(WHERE, self.drive.mode, self.drive.reference)
         substeps = self.motors.parameters.substeps(self.dt)
-        for _ in range(substeps):
-            self.motors.drive(self.dt / substeps)
-            self.motors.integrate()
+        self.motors.move(substeps, self.dt / substeps)
         return self.velocity - before
