@@ -165,13 +165,12 @@ std::int64_t find(Neighbours& near, const double* q) {
     joint_angles(robot, q, near.placed.links.angles.data());
     find_moved(robot, near.placed.links.angles.data(), fresh, near.motion);
     place_links(robot, near.motion.moved.data(), near.placed.links);
-    double farthest = fresh ? 0.0 : measure_groups(robot, near.placed.links, near.motion);
-    if (!fresh && !following::holds(near, farthest)) farthest = measure_shapes(robot, near.placed, near.motion);
+    double farthest = measure_groups(robot, near.placed.links, near.motion);
+    if (!following::holds(near, farthest)) farthest = measure_shapes(robot, near.placed, near.motion);
     if (following::holds(near, farthest)) {
         ++near.served;
         following::use_list(near);
     } else {
-        if (fresh) place_shapes(robot, near.placed, near.motion);
         following::start_anew(near, following::pays(near, farthest));
     }
     return static_cast<std::int64_t>(near.contacts.found.size());
@@ -227,6 +226,22 @@ MOBEE_CALL void mobee_neighbours_state(const Neighbours* near, std::int64_t* sta
     state[0] = static_cast<std::int64_t>(near->state);
     state[1] = static_cast<std::int64_t>(near->list.size());
     state[2] = near->served;
+}
+
+// For tests: how far each shape (shapes,) may have moved from the angles `then` to `now`, as seen from each link that carries both it and
+// another: (shapes, links), by the number of the other link.
+MOBEE_CALL void mobee_swung(const Robot* robot, const double* then, const double* now, double* out) {
+    Motion motion;
+    motion.fit(*robot);
+    std::copy(then, then + robot->joints, motion.angles.begin());
+    bend_links(*robot, now, motion);
+    for (const Cluster cluster : robot->cluster) {
+        for (std::int64_t i = cluster.first; i < cluster.end; ++i) {
+            const Shape& shape = robot->shape[i];
+            for (std::int64_t other = 0; other < robot->links; ++other)
+                *out++ = swung(motion, shape.link, robot->common[shape.link * robot->links + other], shape.lever);
+        }
+    }
 }
 
 }  // namespace mobee
