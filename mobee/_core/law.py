@@ -1,4 +1,4 @@
-"""The control law: core/law.hpp says what its numbers are."""
+"""The control law and reaching: core/law.hpp and core/reach.hpp say what the numbers are."""
 
 from __future__ import annotations
 
@@ -50,20 +50,51 @@ class Law(ctypes.Structure):
     )
 
 
+DRIVE = np.dtype([("motor", WHOLE), ("pulled", WHOLE), ("scale", "f8"), ("lever", "f8")])
+JOINT = np.dtype(
+    [
+        ("slides", WHOLE), ("pulled", WHOLE), ("drives", INTERVAL), ("axis", "f8", 3), ("pivot", "f8", 3), ("offset", "f8"),
+        ("angle", "f8"), ("sine", "f8"), ("cosine", "f8"), ("seen", "f8", 3), ("frame", "f8", (3, 3)), ("motion", "f8", 3),
+        ("turning", "f8", 3),
+    ]
+)  # fmt: skip
+PULLED = np.dtype(
+    [
+        ("motor", WHOLE), ("column", "f8", 6),
+        *((name, "f8") for name in ("slope", "ease", "force", "way", "before", "bent", "limited", "held")),
+    ]
+)  # fmt: skip
+
+_VECTOR, _TWIST = 3 * REAL, 6 * REAL
+
+
+class Reach(ctypes.Structure):
+    """A reach under way; whoever makes it keeps the tables."""
+
+    _fields_ = (
+        *((name, INTEGER) for name in ("part", "surface", "turned", "used")),
+        *((name, View) for name in ("joints", "drives", "motors")),
+        ("curve", ADDRESS),
+        ("target", _VECTOR), ("wanted", _VECTOR), ("radius", REAL), ("point", _VECTOR), ("normal", _VECTOR),
+        ("at", _VECTOR), ("facing", _VECTOR), ("error", _TWIST), ("missing", REAL),
+        ("seen", _TWIST), ("left", REAL), ("best", REAL), ("since", REAL), ("begun", INTEGER),
+    )  # fmt: skip
+
+
 class Calls:
-    """The functions of that file."""
+    """The functions of those files."""
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
         self.client = function("law_client", ADDRESS, ADDRESS, ADDRESS)
         self.step = function("law_step", ADDRESS, ADDRESS, REAL, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+        self.add_reaches = function("reach_add", ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, REAL, ADDRESS)
+        self.reach_goes_on = function("reach_goes_on", ADDRESS, ADDRESS, INTEGER, INTEGER, result=INTEGER)
         self.look = function("law_look", ADDRESS, ADDRESS, REAL, ADDRESS, INTEGER, result=INTEGER)
 
 
-@cache
-def calls() -> Calls:
-    """Found when they are first asked for."""
-    return Calls()
+calls = cache(Calls)
+"""They are found when they are first asked for."""
 
 
 @cache

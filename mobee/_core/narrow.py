@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,6 +36,11 @@ VOLUME = np.dtype(
 
 TOUCH = np.dtype([("normal", np.float64, 3), ("point", np.float64, 3)])
 
+_volume_size = function("volume_size", result=INTEGER)
+_overlap = function("overlap", ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS)
+_distance = function("distance", ADDRESS, ADDRESS, INTEGER, ADDRESS)
+_cut = function("cut", ADDRESS, INTEGER, ADDRESS, ADDRESS, INTEGER, result=INTEGER)
+
 
 class Volumes:
     """Volumes placed in the root frame, which the core reads where they are; hulls keep their corners alive here."""
@@ -44,7 +48,7 @@ class Volumes:
     def __init__(self, count: int) -> None:
         self.table = np.zeros(count, dtype=VOLUME)
         self._kept: list[NDArray[Any]] = []
-        if VOLUME.itemsize != _volume_size()():
+        if VOLUME.itemsize != _volume_size():
             raise RuntimeError("the library's volumes have another layout than these")
 
     def place(self, at: int, kind: str, half: Sequence[float] | Reals, position: Reals, rotation: Reals) -> None:
@@ -86,14 +90,14 @@ def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
     """The depths (p,) and touches (p,) TOUCH, NaN where they do not touch, of each of the first with the same of the second."""
     depth, touch = np.empty(len(first)), np.zeros(len(first), dtype=TOUCH)
     touch["normal"] = touch["point"] = np.nan
-    _overlap()(*_pairs(first, second), address(depth), address(touch))
+    _overlap(*_pairs(first, second), address(depth), address(touch))
     return depth, touch
 
 
 def distances(first: Volumes, second: Volumes) -> Reals:
     """How far they are apart (p,) m."""
     apart = np.empty(len(first))
-    _distance()(*_pairs(first, second), address(apart))
+    _distance(*_pairs(first, second), address(apart))
     return apart
 
 
@@ -102,7 +106,7 @@ def cut(points: Reals, line: Reals, room: int) -> Reals:
     points, line, out = np.ascontiguousarray(points, float), np.ascontiguousarray(line, float), np.full((room + 8, 2), np.nan)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or line.shape != (4,):
         raise ValueError(f"a polygon is (n, 2) and a line (4,), not {points.shape} and {line.shape}")
-    left = _cut()(address(points), len(points), address(line), address(out), room)
+    left = _cut(address(points), len(points), address(line), address(out), room)
     if not np.isnan(out[room:]).all():
         raise RuntimeError("the core wrote beyond its memory")
     return out[:left]
@@ -112,23 +116,3 @@ def _pairs(first: Volumes, second: Volumes) -> tuple[int, int, int]:
     if len(first) != len(second):
         raise ValueError(f"{len(first)} volumes cannot be paired with {len(second)}")
     return address(first.table), address(second.table), len(first)
-
-
-@cache
-def _volume_size() -> Any:
-    return function("volume_size", result=INTEGER)
-
-
-@cache
-def _overlap() -> Any:
-    return function("overlap", ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS)
-
-
-@cache
-def _distance() -> Any:
-    return function("distance", ADDRESS, ADDRESS, INTEGER, ADDRESS)
-
-
-@cache
-def _cut() -> Any:
-    return function("cut", ADDRESS, INTEGER, ADDRESS, ADDRESS, INTEGER, result=INTEGER)

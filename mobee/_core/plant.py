@@ -1,4 +1,4 @@
-"""The offline plant's ticks: core/plant.cpp says what the numbers are."""
+"""The motors of a simulated robot, and the offline plant's ticks: core/motors.hpp and core/plant.cpp say what the numbers are."""
 
 from __future__ import annotations
 
@@ -7,13 +7,38 @@ from functools import cache
 
 import numpy as np
 
-from mobee._core import ADDRESS, BYTES, INTEGER, REAL, function, law, motors, reach
-from mobee._core.tables import INTERVAL, WHOLE, View
+from mobee._core import ADDRESS, BYTES, INTEGER, REAL, function, law
+from mobee._core.tables import INTERVAL, WHOLE, View, columns
 
+NUMBERS = columns(
+    "low", "high", "max_velocity", "max_acceleration", "max_torque", "share", "play", "friction", whole=("delay",)
+)  # fmt: skip
+STATE = columns(
+    "q", "velocity", "effort", "motor_q", "motor_velocity", "dragged", "rest", "reference", "load", "left", whole=("mode", "resting")
+)
+MODES = ("position", "velocity", "torque", "hold")
 PART = np.dtype([("motors", INTERVAL), ("under_way", WHOLE), ("verdict", WHOLE), ("begun", "f8"), ("next_look", "f8")])
 """A part and its action, see `PartAction`."""
 RECORD_DEPTHS = 2
 ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
+
+
+class Motors(ctypes.Structure):
+    """The motors; whoever makes it keeps the tables."""
+
+    _fields_ = (
+        ("living", View), ("numbers", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
+        ("seed", ctypes.c_uint64), ("drawn", ADDRESS), ("drawn_from", INTEGER),
+    )  # fmt: skip
+
+
+class Braking(ctypes.Structure):
+    """Limits of references, each (n,), and the velocities asked for now; whoever makes it keeps the arrays."""
+
+    _fields_ = (
+        ("count", INTEGER), ("lower", ADDRESS), ("upper", ADDRESS), ("fastest", ADDRESS), ("change", ADDRESS), ("velocity", ADDRESS),
+        ("dt", REAL),
+    )  # fmt: skip
 
 
 class Plant(ctypes.Structure):
@@ -30,22 +55,28 @@ class Plant(ctypes.Structure):
 
 
 STRUCTURES = (
-    law.MOTOR_GAINS, law.CLAUSE_ROW, law.CLAUSE_ENTRY, law.STATE, law.Law, reach.DRIVE, reach.JOINT, reach.PULLED, reach.Reach,
-    motors.NUMBERS, motors.STATE, motors.Motors, PART, Plant,
+    law.MOTOR_GAINS, law.CLAUSE_ROW, law.CLAUSE_ENTRY, law.STATE, law.Law, law.DRIVE, law.JOINT, law.PULLED, law.Reach,
+    NUMBERS, STATE, Motors, PART, Plant,
 )  # fmt: skip
 """All that are laid out both here and there."""
 
 
 class Calls:
-    """The functions of that file."""
+    """The functions of those files."""
 
     def __init__(self) -> None:
+        self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER, INTEGER)
+        self.drive = function("motors_drive", ADDRESS, REAL)
+        self.move = function("motors_move", ADDRESS, INTEGER, REAL)
+        self.adopt = function("motors_adopt", ADDRESS, ADDRESS, REAL)
+        self.read = function("motors_read", ADDRESS, INTEGER, ADDRESS, ADDRESS)
+        self.to_velocity = function("braking_to_velocity", ADDRESS, ADDRESS, ADDRESS)
+        self.to_position = function("braking_to_position", ADDRESS, ADDRESS, ADDRESS)
+        self.runs_out = function("braking_runs_out", ADDRESS, ADDRESS, ADDRESS, result=ctypes.c_bool)
         self.run = function("plant_run", ADDRESS)
         self.run_many = function("plants_run", BYTES, INTEGER, INTEGER)
         self.sizes = function("plant_sizes", ADDRESS)
 
 
-@cache
-def calls() -> Calls:
-    """Found when they are first asked for."""
-    return Calls()
+calls = cache(Calls)
+"""They are found when they are first asked for."""

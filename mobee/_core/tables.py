@@ -26,9 +26,9 @@ def view(array: Array | Ints | Table) -> View:
     return View(address(array), len(array))
 
 
-def columns(*names: str) -> np.dtype[np.void]:
-    """A structure of that many numbers."""
-    return np.dtype([(name, "f8") for name in names])
+def columns(*names: str, whole: tuple[str, ...] = ()) -> np.dtype[np.void]:
+    """A structure of these numbers, behind them these whole ones."""
+    return np.dtype([*((name, "f8") for name in names), *((name, WHOLE) for name in whole)])
 
 
 INTERVAL = np.dtype([("first", WHOLE), ("end", WHOLE)])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mobee._core import address
-from mobee._core import reach as core
+from mobee._core import law as core
 from mobee._core.tables import Table, view
 from mobee.control.law import Law
 from mobee.errors import InvalidValue
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """What a reach with one marker by one part begins with; the tables: see `mobee._core.reach`.  `part`: its first motor, see `_first`."""
+    """What a reach with one marker by one part begins with; the tables: see `mobee._core.law`.  `part`: its first motor, see `_first`."""
 
     part: int
     point: Array  # (3,) m, of the marker, at zero pose
@@ -100,11 +100,11 @@ class Reaches:
     def add_forces(self, q: Array, attractor: Array, dt: float, total: Array) -> None:
         """Add the forces at the measured q (n,) rad to `total` (n,) in rad/s^2, which has all others."""
         copy = q.copy()
-        self._core.add(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
+        self._core.add_reaches(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
 
     def go_on(self, part: str | None) -> bool:
         """Whether a part reaches, and goes on although it has settled; never under the published law."""
-        return bool(self._core.goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
+        return bool(self._core.reach_goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:
         """Write down where the core finds them."""

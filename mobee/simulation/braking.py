@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from mobee._core import address
-from mobee._core import motors as core
+from mobee._core import plant as core
 from mobee._core.tables import numbers
 from mobee.robot.robot import Array
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee._core import address
-from mobee._core import motors as core
+from mobee._core import plant as core
 from mobee._core.tables import Table, numbers, view
 from mobee.errors import InvalidValue
 from mobee.kinematics.gravity import gravity_torque
@@ -43,12 +43,12 @@ class Motors:
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
         """Indices of the motors that live, ascending."""
         self.state: Table = np.zeros(n, dtype=core.STATE)
-        """A row for each motor, see `mobee._core.motors.STATE`: always the same array, which a plant advances."""
+        """A row for each motor, see `mobee._core.plant.STATE`: always the same array, which a plant advances."""
         for name in ("q", "motor_q", "dragged", "rest"):
             self.state[name] = q
         self.state["mode"], self.state["resting"] = _HOLD, 1
         self.numbers = _numbers(robot, parameters)
-        """What does not change while the substep is the same, see `mobee._core.motors.NUMBERS`."""
+        """What does not change while the substep is the same, see `mobee._core.plant.NUMBERS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
         self._drawn = np.empty((len(self.living), 4))
