@@ -30,6 +30,7 @@ class Forces(Mapping[str, Array]):
     """
 
     __slots__ = ("_rows",)
+    __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __init__(self, *rows: Array, **more: Array) -> None:
         """The law's in their order or by their names, and any others by theirs."""
@@ -61,12 +62,6 @@ class Forces(Mapping[str, Array]):
 
     def __repr__(self) -> str:
         return f"Forces({', '.join(f'{name}={force!r}' for name, force in self.items())})"
-
-    def __eq__(self, other: object) -> bool:
-        return self is other
-
-    def __hash__(self) -> int:
-        return id(self)
 
     @property
     def total(self) -> Array:

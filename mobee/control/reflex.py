@@ -6,14 +6,13 @@ Pure logic, a tick at a time: poses and what is wrong with them go in; out comes
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from mobee.control.debounce import Debounce
-from mobee.control.history import History
 from mobee.control.reflex_settings import ReflexSettings
 from mobee.control.violation import Violation
 from mobee.errors import InvalidValue
@@ -45,6 +44,23 @@ class Counts:
     flips: int = 0  # changes of the unfiltered judgement
 
 
+class Debounce:
+    """A signal that changes only after the raw one has said the same for some ticks without a break (thesis 4.4)."""
+
+    def __init__(self, confirm: int, release: int) -> None:
+        """Ticks until it becomes true, and until it becomes false; at least 1 each."""
+        self._needed = {True: max(confirm, 1), False: max(release, 1)}
+        self._ticks = 0  # for which the raw signal has differed
+        self.on = False
+
+    def update(self, raw: bool) -> bool:
+        """One tick of the raw signal; the filtered one."""
+        self._ticks = self._ticks + 1 if raw != self.on else 0
+        if self._ticks >= self._needed[raw]:
+            self.on, self._ticks = raw, 0
+        return self.on
+
+
 class Reflex:
     """Who commands the robot: the client (state forward), or the reflex, which rewinds the recent poses.
 
@@ -61,7 +77,7 @@ class Reflex:
         self.state: State = "forward"
         self.recovery: Recovery | None = None  # the one under way, else the last
         self._dt, self._max_step = dt, np.asarray(max_velocity, dtype=float) * dt
-        self._history = History(max(self._ticks(settings.history), 1))
+        self._history = deque[tuple[Array, bool]](maxlen=max(self._ticks(settings.history), 1))  # the newest poses; is it a waypoint
         self._debounce = Debounce(self._ticks(settings.confirm), self._ticks(settings.release))
         self._all_clear = Debounce(1, self._ticks(settings.release))
         self._accepted: frozenset[str] = frozenset()
@@ -79,7 +95,10 @@ class Reflex:
 
     def mark(self) -> bool:
         """A waypoint: the newest recorded pose is safe.  False when nothing is recorded, or the reflex is in control."""
-        return self.state == "forward" and self._history.mark()
+        if self.state != "forward" or not self._history:
+            return False
+        self._history[-1] = self._history[-1][0], True
+        return True
 
     def accept(self, q: Array, violations: Sequence[Violation]) -> None:
         """Leave `stuck`: somebody answers for the pose q (n,) rad as it is.  What is wrong now counts again once all was clear."""
@@ -98,7 +117,7 @@ class Reflex:
         if self.state == "forward" or recovery is None:
             if not violated:
                 if not self._raw:
-                    self._history.append(q)
+                    self._history.append((q.copy(), False))
                 return None
             recovery = self._begin(q, violations)
         _watch(recovery, violations)
@@ -145,10 +164,10 @@ class Reflex:
     def _rewind(self) -> bool:
         """Move the target back along the history; True when it is where the rewinding may end."""
         self._credit += self.settings.pace
-        while self._credit >= 1.0 and len(self._history) and not self._at_waypoint:
-            self._goal, self._at_waypoint = self._history.undo()
+        while self._credit >= 1.0 and self._history and not self._at_waypoint:
+            self._goal, self._at_waypoint = self._history.pop()
             self._credit -= 1.0
-        may_end = self._at_waypoint or not len(self._history)
+        may_end = self._at_waypoint or not self._history
         if self._goal is None:
             return may_end
         way = self._goal - self._target
@@ -162,7 +181,7 @@ class Reflex:
             recovery.outcome = "waypoint" if self._at_waypoint else "end of history"
             self.counts.recovered += 1
             self._keep_place(self._target)
-        elif len(self._history):
+        elif self._history:
             recovery.passed += 1
             self._at_waypoint, self._credit = False, 0.0
             self.state = "rewind"
@@ -176,7 +195,7 @@ class Reflex:
 
     def _keep_place(self, q: Array) -> None:
         """Give control back where the robot is; the client's next motion begins there."""
-        self._history.keep(q.copy())
+        self._history.append((q.copy(), True))
         self.state = "forward"
 
     def _enter(self, state: State, duration: float) -> None:
