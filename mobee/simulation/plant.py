@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mobee.collision.touch import links_moved, touched_in
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
 from mobee.control.modality import Modality
 from mobee.control.terms import Term
+from mobee.engine import engine_of
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.robot.robot import Array
 from mobee.simulation.actions import Actions
-from mobee.simulation.active import living
 from mobee.simulation.described import described
 from mobee.simulation.motors import Motors
 from mobee.simulation.parameters import MotorParameters
 from mobee.simulation.reaches import ReachesUnderWay
-from mobee.simulation.runner import Runner, Work, finished
-from mobee.simulation.touching import Touching
-from mobee.simulation.trace import Trace
+from mobee.simulation.rigid import living, without_pairs
+from mobee.simulation.runner import Runner, Trace, Work, finished
 
 if TYPE_CHECKING:
     from mobee.model import Model, Pose
@@ -89,7 +89,8 @@ class OfflinePlant:
         self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
         if terms:  # a plant without them is described as before there were any
             self._options["terms"] = [term.name for term in terms]
-        self._actions, self._touching = Actions(self.robot, alive), Touching(model)
+        self._actions = Actions(self.robot, alive)
+        self._touching, self._moved = engine_of(without_pairs(self.robot)), links_moved(self.robot)
         self._runner = Runner(self._controller, self.motors, alive, dt, command_age, self._actions.parts)
         self._alive = alive
         self._ticks = 0
@@ -284,4 +285,11 @@ class OfflinePlant:
 
     def _outcome(self, part: str) -> Outcome:
         self.follow()
-        return self._actions.outcome(part, self._q, self.time - self.dt, self._touching.by(part, self._q))
+        return self._actions.outcome(part, self._q, self.time - self.dt, self._touched(part))
+
+    def _touched(self, part: str) -> tuple[str, ...]:
+        """What `touched_by` says of the model's pose, without a look at what the body does to itself."""
+        snapshot = self.model.world.snapshot
+        if not snapshot.names:
+            return ()
+        return touched_in(self._touching.contacts(self._q, snapshot, self.model.hands)[0], self._moved[part])

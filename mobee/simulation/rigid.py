@@ -1,4 +1,4 @@
-"""A robot reduced to what the forces on some of its motors depend on.
+"""Which motors of a plant live, and a robot reduced to what the forces on some of its motors depend on.
 
 Joints that none of them drives are gone, and their links one with what carries them.
 """
@@ -7,14 +7,31 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.errors import InvalidValue, UnknownName
 from mobee.kinematics import link_transforms
 from mobee.robot.per_robot import per_robot
 from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
+
+
+def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
+    """Which motors (n,) are meant by names and patterns of parts and motors; all by None."""
+    if active is None:
+        return np.ones(len(robot.motors), dtype=bool)
+    alive = np.zeros(len(robot.motors), dtype=bool)
+    for pattern in [active] if isinstance(active, str) else active:
+        found = [fnmatchcase(motor.name, pattern) or fnmatchcase(motor.part, pattern) for motor in robot.motor_table]
+        if not any(found):
+            raise UnknownName("part or motor", pattern, (*robot.parts, *robot.motors))
+        alive |= np.array(found)
+    if not alive.any():
+        raise InvalidValue(f"active={active!r}: at least one part or motor must live; None means all.")
+    return alive
 
 
 def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True, apart: Sequence[int] = ()) -> Robot:
@@ -30,6 +47,12 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
     if found is None:
         found = known[key] = _stiffened(robot, alive, keep_parts, solids, apart)
     return found
+
+
+@per_robot
+def without_pairs(robot: Robot) -> Robot:
+    """The robot without contacts of its shapes with each other."""
+    return replace(robot, solid_pairs=robot.solid_pairs[:0], field_pairs=robot.field_pairs[:0])
 
 
 @per_robot

@@ -13,8 +13,7 @@ from mobee._core import plant as core
 from mobee.errors import BatchInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.simulation.plant import OfflinePlant
-from mobee.simulation.runner import Work
-from mobee.simulation.trace import Trace
+from mobee.simulation.runner import Trace, Work
 from mobee.threads import checked_threads
 
 T = TypeVar("T")

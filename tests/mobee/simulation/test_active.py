@@ -13,8 +13,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model import Model
 from mobee.robot.load import load_robot, load_world
 from mobee.simulation import MotorParameters, OfflinePlant
-from mobee.simulation.active import living
-from mobee.simulation.rigid import stiffened
+from mobee.simulation.rigid import living, stiffened
 
 QUIET = MotorParameters(encoder_noise=0.0)
 JOINTS = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
