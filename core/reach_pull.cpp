@@ -207,9 +207,15 @@ void force_motors(Reach& reach, const Push& push) {
     }
 }
 
+// How fast the force moves the motors along what holds them back; below 0: into it.
+double speed_of_held(const Reach& reach) {
+    double speed = 0.0;
+    for (const PulledMotor& motor : reach.motors) speed += motor.held * motor.ease * motor.force;
+    return speed;
+}
+
 // Split what acts against the force: the limit of each motor, and the rest; whether any of it does.
 bool is_held_back(const Law& law, Reach& reach, const double* q, const double* against) {
-    double speed = 0.0;
     bool limited = false;
     for (PulledMotor& motor : reach.motors) {
         const MotorGains& gains = law.motors[motor.motor];
@@ -217,9 +223,8 @@ bool is_held_back(const Law& law, Reach& reach, const double* q, const double* a
         motor.limited = limit * motor.force < 0.0 ? std::fabs(limit) / gains.unit : 0.0;
         motor.held = (against[motor.motor] - limit) / gains.unit;
         limited = limited || motor.limited > 0.0;
-        speed -= motor.held * motor.ease * motor.force;
     }
-    return limited || speed > 0.0;
+    return limited || speed_of_held(reach) < 0.0;
 }
 
 // Take `held` as a direction in which the motors give no way, the less the weaker it is; how much of it is taken.
@@ -238,12 +243,6 @@ double face_wall(const Reach& reach, Push& push) {
     for (int a = 0; a < reach.rows(); ++a)
         for (int b = 0; b < reach.rows(); ++b) push.give[a][b] -= share * away[a] * away[b];
     return share;
-}
-
-double speed_of_held(const Reach& reach) {
-    double speed = 0.0;
-    for (const PulledMotor& motor : reach.motors) speed += motor.held * motor.ease * motor.force;
-    return speed;
 }
 
 // Fill the forces again for motors that are held back: along the wall, not into it.

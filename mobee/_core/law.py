@@ -24,7 +24,6 @@ SETTLE = ("speed", "acceleration", "first_look", "interval", "timeout")
 TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
 """The numbers of the terms that are the same for all motors, by their names in `Gains`."""
 MODALITIES = ("position", "velocity", "torque")
-VERDICTS = ("moving", "settled", "timeout")
 
 
 class Settle(ctypes.Structure):

@@ -8,9 +8,9 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.law import VERDICTS
 from mobee._core.plant import PART
 from mobee._core.tables import Table
+from mobee.control.settle import VERDICTS
 from mobee.errors import InvalidValue
 from mobee.plant import Outcome
 from mobee.real_array import real_array

@@ -235,18 +235,14 @@ class OfflinePlant:
 
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2), empty if none is asked for."""
-        address = self._prepare(most, traced)
+        if self._callback is not None:
+            most = min(most, self._period - self._ticks % self._period)
+        address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
         try:
             yield address
         finally:  # also what was run before a Ctrl-C
             rows = self._conclude()
         return rows
-
-    def _prepare(self, most: int, traced: bool = False) -> int:
-        """Make ready up to that many ticks, fewer if an action ends; gives the address of what the core is to run."""
-        if self._callback is not None:
-            most = min(most, self._period - self._ticks % self._period)
-        return self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
 
     def _conclude(self) -> Array:
         """Take in what the ticks left; the record (ticks, 3 n + 2), empty if none was asked for."""

@@ -50,13 +50,7 @@ class ReachesUnderWay:
             raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not taken away")
         world, self._target = self._model.world, target
         there = world.objects.get(TARGET)
-        if (
-            target is not None
-            and there is not None
-            and there.kind == "sphere"
-            and there.size == (target.radius,)
-            and there.role == "target"
-        ):
+        if target and there and (there.kind, there.size, there.role) == ("sphere", (target.radius,), "target"):
             world.move(TARGET, position=target.position)
         else:
             if there is not None:
