@@ -30,17 +30,10 @@ struct Stretch {
 // One thread's.
 struct Sweeper {
     const Motions* motions = nullptr;
-    Blocks* blocks = nullptr;
     Neighbours* near = nullptr;
     std::int64_t looked = 0;  // at so many poses
     Array<Stretch> stretches;  // of poses of which none was looked at, the long ones first
     Array<double> pose;        // (motors,)
-
-    void run() {
-        pose.resize(motions->motors);
-        for (std::int64_t begin, end; blocks->take(begin, end);)
-            for (std::int64_t edge = begin; edge < end; ++edge) motions->free[edge] = is_free(edge);
-    }
 
     bool is_free(std::int64_t edge) {
         const std::int64_t motors = motions->motors, between = motions->between[edge];
@@ -65,15 +58,16 @@ struct Sweeper {
 
 // Find which edges are free; returns how many poses were looked at.
 MOBEE_CALL std::int64_t mobee_sweep(const Motions* motions) {
-    Blocks blocks(motions->count, sweeping::at_once);
     Array<sweeping::Sweeper*> sweepers;
     for (std::int64_t k = 0; k < motions->threads; ++k) {
         sweepers.push(make<sweeping::Sweeper>());
         sweepers[k]->motions = motions;
-        sweepers[k]->blocks = &blocks;
         sweepers[k]->near = motions->near[k];
+        sweepers[k]->pose.resize(motions->motors);
     }
-    run_together(sweepers);
+    share(motions->count, sweeping::at_once, motions->threads, [&](std::int64_t thread, std::int64_t begin, std::int64_t end) {
+        for (std::int64_t edge = begin; edge < end; ++edge) motions->free[edge] = sweepers[thread]->is_free(edge);
+    });
     std::int64_t looked = 0;
     for (sweeping::Sweeper* one : sweepers) {
         looked += one->looked;

@@ -206,33 +206,33 @@ MOBEE_CALL void mobee_law_client(const Law* of, const double* f, double* total) 
     }
 }
 
-}  // namespace mobee
-
-MOBEE_CALL void mobee_law_forces(const mobee::Law* law, const double* q, const double* torque, const mobee::LawState* state, double* forces) {
-    mobee::constraining_forces(*law, {q, torque, state}, forces);
+MOBEE_CALL void mobee_law_forces(const Law* law, const double* q, const double* torque, const LawState* state, double* forces) {
+    constraining_forces(*law, {q, torque, state}, forces);
 }
 
 // `commands` (3, n): position, velocity, torque.
-MOBEE_CALL void mobee_law_step(const mobee::Law* law, const double* q, double dt, const double* attractor, const double* force,
-                               mobee::LawState* state, double* commands) {
-    mobee::advance(*law, q, dt, attractor, force, state);
+MOBEE_CALL void mobee_law_step(const Law* law, const double* q, double dt, const double* attractor, const double* force,
+                               LawState* state, double* commands) {
+    advance(*law, q, dt, attractor, force, state);
     const std::int64_t n = law->motors.size;
     for (std::int64_t i = 0; i < n; ++i) {
         commands[i] = state[i].reference;
         commands[n + i] = state[i].velocity;
-        commands[2 * n + i] = mobee::torque_of(law->motors[i], state[i]);
+        commands[2 * n + i] = torque_of(law->motors[i], state[i]);
     }
 }
 
 // Judge commanded velocities and accelerations, (2, count), in fine units.
-MOBEE_CALL std::int64_t mobee_law_look(const mobee::Settle* settle, mobee::SettleTest* test, double t, const double* motion, std::int64_t count) {
-    const auto slow = [=](std::int64_t i) { return mobee::law::is_slow(*settle, motion[i], motion[count + i], 1.0); };
-    return mobee::law::judge(*settle, *test, t, {0, count}, slow);
+MOBEE_CALL std::int64_t mobee_law_look(const Settle* settle, SettleTest* test, double t, const double* motion, std::int64_t count) {
+    const auto slow = [=](std::int64_t i) { return law::is_slow(*settle, motion[i], motion[count + i], 1.0); };
+    return law::judge(*settle, *test, t, {0, count}, slow);
 }
 
 // The term of that number: its name, none behind the last, and whether it depends on the state.
 MOBEE_CALL const char* mobee_law_term(std::int64_t index) {
-    return index < mobee::law::term_count ? mobee::law::terms[index].name : nullptr;
+    return index < law::term_count ? law::terms[index].name : nullptr;
 }
 
-MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return mobee::law::terms[index].moving; }
+MOBEE_CALL std::int64_t mobee_law_moving(std::int64_t index) { return law::terms[index].moving; }
+
+}  // namespace mobee

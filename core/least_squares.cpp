@@ -101,8 +101,8 @@ Carriers::Carriers(const Search& search) : aims(search.aims, search.count) {
 // One thread's: where it looks, and what it works in.
 class Descender {
 public:
-    void begin(const Search& search, const Carriers& carriers, Blocks& starts);
-    void run();
+    void begin(const Search& search, const Carriers& carriers);
+    void descend_from(std::int64_t start);
     std::int64_t looks() const { return looks_; }  // how many poses it has looked at
 
 private:
@@ -117,7 +117,6 @@ private:
     const Search* search_ = nullptr;
     const Robot* robot_ = nullptr;
     const Aim* aims_ = nullptr;
-    Blocks* starts_ = nullptr;
     std::int64_t looks_ = 0;
     std::int64_t rows_ = 0, stride_ = 0;  // of the slopes: the numbers of all aims, and the motors that may move, in whole blocks
     Links links_;
@@ -132,12 +131,11 @@ private:
     Array<bool> held_;                     // (motors that may move,): at a limit
 };
 
-void Descender::begin(const Search& search, const Carriers& carriers, Blocks& starts) {
+void Descender::begin(const Search& search, const Carriers& carriers) {
     const Robot& robot = carriers.robot;
     search_ = &search;
     robot_ = &robot;
     aims_ = carriers.aims.data();
-    starts_ = &starts;
     for (const Aim& aim : carriers.aims) rows_ += rows_of(aim.kind);
     stride_ = whole_blocks(search.frees);
     links_.fit(robot);
@@ -156,13 +154,9 @@ void Descender::begin(const Search& search, const Carriers& carriers, Blocks& st
     held_.resize(search.frees);
 }
 
-void Descender::run() {
-    for (std::int64_t begin, end; starts_->take(begin, end);) {
-        for (std::int64_t b = begin; b < end; ++b) {
-            const Goal* goals = search_->goals + (search_->one_goal != 0 ? 0 : b * search_->count);
-            descend(goals, search_->q + b * robot_->motors, search_->residuals + b * search_->count);
-        }
-    }
+void Descender::descend_from(std::int64_t start) {
+    const Goal* goals = search_->goals + (search_->one_goal != 0 ? 0 : start * search_->count);
+    descend(goals, search_->q + start * robot_->motors, search_->residuals + start * search_->count);
 }
 
 // Move one start q (motors,).
@@ -296,13 +290,12 @@ MOBEE_CALL std::int64_t mobee_descend(const Search* search) {
     const std::int64_t most_threads = search->starts > 1 ? search->starts : 1;
     const std::int64_t threads = search->threads < most_threads ? search->threads : most_threads;
     const descent::Carriers carriers(*search);
-    Blocks starts(search->starts, 1);
     Array<descent::Descender*> descenders;
     for (std::int64_t k = 0; k < threads; ++k) {
         descenders.push(make<descent::Descender>());
-        descenders[k]->begin(*search, carriers, starts);
+        descenders[k]->begin(*search, carriers);
     }
-    run_together(descenders);
+    share(search->starts, 1, threads, [&](std::int64_t thread, std::int64_t start, std::int64_t) { descenders[thread]->descend_from(start); });
     std::int64_t looks = 0;
     for (descent::Descender* one : descenders) {
         looks += one->looks();

@@ -264,40 +264,36 @@ void read_encoders(Motors& motors, std::int64_t tick, const double* noise, doubl
     }
 }
 
-}  // namespace mobee
-
-MOBEE_CALL void mobee_motors_enter(const mobee::Motors* motors, std::int64_t first, std::int64_t end, std::int64_t mode) {
-    for (std::int64_t i = first; i < end; ++i) mobee::enter(*motors, i, mode);
-}
+MOBEE_CALL void mobee_motors_enter(const Motors* motors, std::int64_t motor, std::int64_t mode) { enter(*motors, motor, mode); }
 
 // Advance the motor sides by a substep of dt [s]; the joint sides are then told by `mobee_motors_adopt`.
-MOBEE_CALL void mobee_motors_drive(mobee::Motors* motors, double dt) {
+MOBEE_CALL void mobee_motors_drive(Motors* motors, double dt) {
     motors->newest = motors->next(motors->newest);
     for (const std::int64_t i : motors->living) {
         const double before = motors->state[i].motor_velocity;
-        mobee::motors::turn(*motors, i, motors->state[i], motors->newest, dt);
-        mobee::motors::note_effort(motors->state[i], before, dt);
+        motors::turn(*motors, i, motors->state[i], motors->newest, dt);
+        motors::note_effort(motors->state[i], before, dt);
     }
 }
 
-MOBEE_CALL void mobee_motors_move(mobee::Motors* motors, std::int64_t substeps, double dt) { mobee::move(*motors, substeps, dt); }
+MOBEE_CALL void mobee_motors_move(Motors* motors, std::int64_t substeps, double dt) { move(*motors, substeps, dt); }
 
-MOBEE_CALL void mobee_motors_adopt(const mobee::Motors* motors, const double* q, double dt) {
-    for (const std::int64_t i : motors->living) mobee::motors::adopt(motors->numbers[i], motors->state[i], q[i], dt);
+MOBEE_CALL void mobee_motors_adopt(const Motors* motors, const double* q, double dt) {
+    for (const std::int64_t i : motors->living) motors::adopt(motors->numbers[i], motors->state[i], q[i], dt);
 }
 
-MOBEE_CALL void mobee_motors_read(mobee::Motors* motors, std::int64_t tick, const double* noise, double* q) {
-    mobee::read_encoders(*motors, tick, noise, q);
+MOBEE_CALL void mobee_motors_read(Motors* motors, std::int64_t tick, const double* noise, double* q) {
+    read_encoders(*motors, tick, noise, q);
 }
 
 // Approach the wanted velocities; before a position limit no more than can still be braked.
-MOBEE_CALL void mobee_braking_to_velocity(const mobee::motors::Braking* braking, const double* wanted, const double* q) {
+MOBEE_CALL void mobee_braking_to_velocity(const motors::Braking* braking, const double* wanted, const double* q) {
     for (std::int64_t i = 0; i < braking->count; ++i)
         braking->approach(i, std::min(std::max(wanted[i], -braking->down(i, q[i])), braking->up(i, q[i])));
 }
 
 // Advance the positions `at` that are asked for, on the way to the wanted ones, to arrive there at rest.
-MOBEE_CALL void mobee_braking_to_position(const mobee::motors::Braking* braking, const double* wanted, double* at) {
+MOBEE_CALL void mobee_braking_to_position(const motors::Braking* braking, const double* wanted, double* at) {
     for (std::int64_t i = 0; i < braking->count; ++i) {
         const double rest = std::min(std::max(wanted[i], braking->lower[i]), braking->upper[i]) - at[i];
         const double speed = std::min(braking->within(i, std::fabs(rest)), std::fabs(rest) / braking->dt);
@@ -307,10 +303,12 @@ MOBEE_CALL void mobee_braking_to_position(const mobee::motors::Braking* braking,
 }
 
 // Whether some motor that moves so is a tick of braking too fast to stop before its position limit.
-MOBEE_CALL bool mobee_braking_runs_out(const mobee::motors::Braking* braking, const double* q, const double* moving) {
+MOBEE_CALL bool mobee_braking_runs_out(const motors::Braking* braking, const double* q, const double* moving) {
     for (std::int64_t i = 0; i < braking->count; ++i) {
         const double change = braking->change[i];
         if (moving[i] > braking->up(i, q[i]) + change || moving[i] < -braking->down(i, q[i]) - change) return true;
     }
     return false;
 }
+
+}  // namespace mobee

@@ -162,34 +162,19 @@ void run(Plant& plant) {
     }
 }
 
-}  // namespace mobee
+MOBEE_CALL void mobee_plant_run(Plant* plant) { run(*plant); }
 
-MOBEE_CALL void mobee_plant_run(mobee::Plant* plant) { mobee::run(*plant); }
-
-// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads: each runs one after the other as long as
-// there are any.
-MOBEE_CALL void mobee_plants_run(mobee::Plant* const* plants, std::int64_t count, std::int64_t threads) {
-    struct Runner {
-        mobee::Plant* const* plants;
-        mobee::Blocks* blocks;
-
-        void run() {
-            for (std::int64_t begin, end; blocks->take(begin, end);) mobee::run(*plants[begin]);
-        }
-    };
-    mobee::Blocks blocks(count, 1);
-    Runner runner{plants, &blocks};
-    mobee::Array<Runner*> runners;
-    for (std::int64_t k = 0; k < threads && k < count; ++k) runners.push(&runner);
-    if (runners.size() > 0) mobee::run_together(runners);
+// Run plants of which no two are the same, each as by `mobee_plant_run`, in so many threads.
+MOBEE_CALL void mobee_plants_run(Plant* const* plants, std::int64_t count, std::int64_t threads) {
+    share(count, 1, std::min(threads, count), [&](std::int64_t, std::int64_t which, std::int64_t) { run(*plants[which]); });
 }
 
 // How many bytes each structure that Python lays out takes, in the order of `STRUCTURES` in mobee/_core/plant.py.
 MOBEE_CALL void mobee_plant_sizes(std::int64_t* sizes) {
-    using mobee::ClauseEntry, mobee::ClauseRow, mobee::Law, mobee::LawState, mobee::MotorGains, mobee::MotorNumbers, mobee::Motors;
-    using mobee::MotorState, mobee::PartAction, mobee::Plant, mobee::PulledMotor, mobee::Reach, mobee::ReachDrive, mobee::ReachJoint;
     for (const std::size_t size :
          {sizeof(MotorGains), sizeof(ClauseRow), sizeof(ClauseEntry), sizeof(LawState), sizeof(Law), sizeof(ReachDrive), sizeof(ReachJoint),
           sizeof(PulledMotor), sizeof(Reach), sizeof(MotorNumbers), sizeof(MotorState), sizeof(Motors), sizeof(PartAction), sizeof(Plant)})
         *sizes++ = static_cast<std::int64_t>(size);
 }
+
+}  // namespace mobee

@@ -163,13 +163,13 @@ bool goes_on(const Law& law, View<Reach* const> reaches, std::int64_t part) {
     return false;
 }
 
+MOBEE_CALL void mobee_reach_add(const Law* law, Reach* const* reaches, std::int64_t count, double* q, const double* attractor, double dt,
+                                double* total) {
+    add_reaches(*law, {reaches, count}, q, attractor, dt, total);
+}
+
+MOBEE_CALL std::int64_t mobee_reach_goes_on(const Law* law, Reach* const* reaches, std::int64_t count, std::int64_t part) {
+    return goes_on(*law, {reaches, count}, part);
+}
+
 }  // namespace mobee
-
-MOBEE_CALL void mobee_reach_add(const mobee::Law* law, mobee::Reach* const* reaches, std::int64_t count, double* q, const double* attractor,
-                                double dt, double* total) {
-    mobee::add_reaches(*law, {reaches, count}, q, attractor, dt, total);
-}
-
-MOBEE_CALL std::int64_t mobee_reach_goes_on(const mobee::Law* law, mobee::Reach* const* reaches, std::int64_t count, std::int64_t part) {
-    return mobee::goes_on(*law, {reaches, count}, part);
-}

@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 
@@ -10,39 +11,33 @@
 
 namespace mobee {
 
-// A count of things to do, handed out in blocks to whoever has time.
-class Blocks {
-public:
-    Blocks(std::int64_t count, std::int64_t size) : count_(count), size_(size) {}
-
-    // The next block, from `begin` to before `end`; false when there is none.
-    bool take(std::int64_t& begin, std::int64_t& end) {
-        begin = next_.fetch_add(size_, std::memory_order_relaxed);
-        end = begin + size_ < count_ ? begin + size_ : count_;
-        return begin < count_;
-    }
-
-private:
-    std::int64_t count_, size_;
-    std::atomic<std::int64_t> next_{0};
-};
-
-// Call run() of all workers, the first in this thread, and wait until all have returned.  For those for which the system has no thread
-// nothing is called: the others take their blocks.
-template <class Worker>
-void run_together(const Array<Worker*>& workers) {
+// Hand `count` things out, in blocks of `size`, to whichever of the threads has time; the first is this one.  Calls
+// work(number of the thread, begin, end) and returns when all is done; where the system has fewer threads they take more.
+template <class Work>
+void share(std::int64_t count, std::int64_t size, std::int64_t threads, const Work& work) {
+    std::atomic<std::int64_t> next{0};
+    const auto take = [&](std::int64_t thread) {
+        for (std::int64_t begin; (begin = next.fetch_add(size, std::memory_order_relaxed)) < count;)
+            work(thread, begin, std::min(begin + size, count));
+    };
     struct Thread {
+        decltype(take)* takes;
+        std::int64_t number;
         pthread_t id;
         bool runs;
     };
-    constexpr auto entry = [](void* worker) -> void* {
-        static_cast<Worker*>(worker)->run();
+    constexpr auto entry = [](void* given) -> void* {
+        const Thread& thread = *static_cast<Thread*>(given);
+        (*thread.takes)(thread.number);
         return nullptr;
     };
-    Array<Thread> threads(workers.size());
-    for (std::size_t k = 1; k < workers.size(); ++k) threads[k].runs = pthread_create(&threads[k].id, nullptr, entry, workers[k]) == 0;
-    workers[0]->run();
-    for (const Thread& thread : threads)
+    Array<Thread> others(threads);
+    for (std::int64_t k = 1; k < threads; ++k) {
+        others[k] = {&take, k, {}, false};
+        others[k].runs = pthread_create(&others[k].id, nullptr, entry, &others[k]) == 0;
+    }
+    take(0);
+    for (const Thread& thread : others)
         if (thread.runs) pthread_join(thread.id, nullptr);
 }
 

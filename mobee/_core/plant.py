@@ -65,7 +65,7 @@ class Calls:
     """The functions of those files."""
 
     def __init__(self) -> None:
-        self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER, INTEGER)
+        self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER)
         self.drive = function("motors_drive", ADDRESS, REAL)
         self.move = function("motors_move", ADDRESS, INTEGER, REAL)
         self.adopt = function("motors_adopt", ADDRESS, ADDRESS, REAL)

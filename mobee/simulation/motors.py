@@ -118,8 +118,8 @@ class Motors:
         if (self.state["mode"][where] != code).any():
             if mode == "torque":
                 self.load = gravity_torque(self._robot, self.q)
-            for first in range(*where.indices(len(self.state))):
-                self._core.enter(self.address, first, first + 1, code)
+            for motor in range(*where.indices(len(self.state))):
+                self._core.enter(self.address, motor, code)
 
     def drive(self, dt: float) -> Array:
         """Advance the motor side by one substep of dt [s]; the joint-side velocity [rad/s] it asks for, (n,).
