@@ -12,8 +12,8 @@ namespace mobee {
 namespace reach {
 
 constexpr double degree = 3.14159265358979323846 / 180.0;
-constexpr double force_gain = 5000.0 * degree;   // rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
-constexpr double torque_gain = 5000.0 * degree;  // the same, all of it where the normal points the other way
+// rad/s^2 for a lever and a distance of 1 m, of a normal all of it where it points the other way; the 2014 program's 5000 are deg/s^2
+constexpr double gain = 5000.0 * degree;
 
 // Turn a vector about a joint's axis, by an angle of that sine and of the joint's cosine.
 Vec3 spin(const ReachJoint& joint, Vec3 v, double sine) {
@@ -79,11 +79,11 @@ void move_marker(ReachJoint& joint) {
 // J^T f before it is bounded, in rad/s^2: f as strong as the marker is far.
 void force_motors(Reach& reach) {
     double twist = 0.0;
-    if (reach.turned) twist = torque_gain * reach.missing * 0.5 * (1.0 - dot(reach.facing, reach.wanted));
+    if (reach.turned) twist = gain * reach.missing * 0.5 * (1.0 - dot(reach.facing, reach.wanted));
     for (PulledMotor& motor : reach.motors) {
         motor.force = 0.0;
         for (int row = 0; row < 3; ++row)
-            motor.force += force_gain * motor.column[row] * reach.error[row] + twist * motor.column[3 + row] * reach.error[3 + row];
+            motor.force += gain * motor.column[row] * reach.error[row] + twist * motor.column[3 + row] * reach.error[3 + row];
     }
 }
 

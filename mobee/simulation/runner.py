@@ -16,7 +16,7 @@ from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
 from mobee.control import Controller
 from mobee.engine import engine_of
-from mobee.engine.hands import NOBODY, Hand, Hands
+from mobee.engine.hands import Hand, Hands
 from mobee.engine.track import Neighbours
 from mobee.kinematics.gravity import gravity_torque
 from mobee.robot.robot import Array
@@ -71,10 +71,7 @@ class Runner:
         n = len(alive)
         self._controller, self._motors, self._alive, self._dt = controller, motors, alive, dt
         self._cut = controller.propagate == "part"
-        self._fields = self._neighbours(solids=False)
-        self._solids: Neighbours | None = None  # where they are asked for
-        self._whole: Neighbours | None = None
-        self._reaching: dict[tuple[Hands, bool], tuple[Neighbours, Hands]] = {}  # for hands that have reached, with these
+        self._neighbours: dict[tuple[bool, Hands, bool], tuple[Neighbours, Hands]] = {}  # see `_near`
         substeps = motors.parameters.substeps(dt)
         self._substep = dt / substeps
         self._commands = np.zeros((command_age, n))
@@ -133,29 +130,21 @@ class Runner:
         """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
         model = self._controller.model
         snapshot = model.world.snapshot
-        near, reaching = self._fields, NOBODY
-        if snapshot.attached:
-            near = self._whole = self._whole or Neighbours(engine_of(model.robot), SKIN, self._cut)
-            reaching = model.hands
-        elif model.hands:
-            near, reaching = self._sparing(model.hands, solids)
-        elif solids:
-            near = self._solids = self._solids or self._neighbours(solids=True)
-        return near.enter(snapshot, reaching)
+        key = bool(snapshot.attached), model.hands, solids
+        if key not in self._neighbours:
+            self._neighbours[key] = self._new_neighbours(*key)
+        near, hands = self._neighbours[key]
+        return near.enter(snapshot, hands)
 
-    def _neighbours(self, solids: bool) -> Neighbours:
-        return Neighbours(engine_of(stiffened(self._controller.robot, self._alive, self._cut, solids)), SKIN, self._cut)
-
-    def _sparing(self, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
-        """Those of a robot whose hands are apart from what carries them, and their hands."""
-        known = self._reaching.get((reaching, solids))
-        if known is None:
-            robot = self._controller.robot
-            stiff = stiffened(robot, self._alive, self._cut, solids, apart=[link for hand in reaching for link in (hand.link, hand.fields)])
-            new = {robot.links.index(name): index for index, name in enumerate(stiff.links)}
-            hands = tuple(Hand(new[hand.link], new[hand.fields]) for hand in reaching)
-            known = self._reaching[reaching, solids] = Neighbours(engine_of(stiff), SKIN, self._cut), hands
-        return known
+    def _new_neighbours(self, whole: bool, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
+        """Those of the whole robot, or of one whose hands are apart from what carries them; and its hands."""
+        robot = stiff = self._controller.robot
+        if not whole:
+            apart = [link for hand in reaching for link in (hand.link, hand.fields)]
+            stiff = stiffened(robot, self._alive, self._cut, solids, apart)
+            link = {robot.links.index(name): index for index, name in enumerate(stiff.links)}
+            reaching = tuple(Hand(link[hand.link], link[hand.fields]) for hand in reaching)
+        return Neighbours(engine_of(stiff), SKIN, self._cut), reaching
 
     def _pose_forces(self, q: Array) -> Array:
         """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
