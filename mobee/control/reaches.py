@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,39 +14,28 @@ from mobee.control.law import Law
 from mobee.errors import InvalidValue
 from mobee.kinematics.tables import tables
 from mobee.robot.motor_units import motor_units
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Array, Ints, Marker, Robot
 
 if TYPE_CHECKING:
     from mobee.reach import ReachTarget
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Chain:
-    """What a reach with one marker by one part begins with; the tables: see `mobee._core.law`.  `part`: its first motor, see `_first`."""
-
-    part: int
-    point: Array  # (3,) m, of the marker, at zero pose
-    normal: Array  # (3,)
-    joints: Table
-    drives: Table
-    motors: Table
-
-    @property
-    def used(self) -> int:
-        """How many joints there are up to the last that a pulled motor drives."""
-        return 1 + int(np.flatnonzero(self.joints["pulled"])[-1])
+Chain = tuple[int, Marker, Table, Table, Table]
+"""What a reach with one marker by one part begins with, see `Reaching`."""
 
 
 class Reaching:
     """One reach, with what it remembers."""
 
-    def __init__(self, marker: str, chain: Chain) -> None:
-        self.marker = marker
-        self.joints, self.motors = chain.joints.copy(), chain.motors.copy()
-        self._drives, self._curve = chain.drives, np.zeros((len(chain.motors), len(chain.motors)))
+    def __init__(self, part: int, marker: Marker, joints: Table, drives: Table, motors: Table) -> None:
+        """`part`: its first motor, see `_first`; the tables: see `mobee._core.law`, what the reach changes is copied."""
+        self.marker = marker.name
+        self.joints, self.motors = joints.copy(), motors.copy()
+        self._drives, self._curve = drives, np.zeros((len(motors), len(motors)))
         self.struct = core.Reach(
-            part=chain.part, used=chain.used, joints=view(self.joints), drives=view(self._drives), motors=view(self.motors),
-            curve=address(self._curve), point=tuple(chain.point), normal=tuple(chain.normal),
+            part=part, used=1 + int(np.flatnonzero(joints["pulled"])[-1]),  # joints up to the last that a pulled motor drives
+            joints=view(self.joints), drives=view(self._drives), motors=view(self.motors),
+            curve=address(self._curve), point=tuple(marker.position), normal=tuple(marker.normal),
         )  # fmt: skip
         self.address = ctypes.addressof(self.struct)
 
@@ -84,7 +72,7 @@ class Reaches:
         if (part, marker) not in self._chains:
             self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))
         self._under_way.pop(part, None)
-        self._under_way[part] = Reaching(marker, self._chains[part, marker])
+        self._under_way[part] = Reaching(*self._chains[part, marker])
         self._list()
 
     def end(self, part: str | None) -> None:
@@ -148,4 +136,4 @@ def _chain(robot: Robot, part: str | None, marker: str, motors: Ints) -> Chain:
         drives += [(int(m), number.get(int(m), -1), matrix[j, m], matrix[j, m] * units[m] * (int(m) in number)) for m in by]
     pulled: Table = np.zeros(len(motors), dtype=core.PULLED)
     pulled["motor"] = motors
-    return Chain(_first(robot, part), placed.position, placed.normal, joints, np.array(drives, dtype=core.DRIVE), pulled)
+    return _first(robot, part), placed, joints, np.array(drives, dtype=core.DRIVE), pulled
