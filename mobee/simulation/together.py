@@ -1,10 +1,13 @@
-"""Many offline plants in one process, which go on together in one call of the core: the results are those of one after the other."""
+"""Many offline plants at once, in one call of the core or each in a process of its own; the results are those of one after the other."""
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
+from multiprocessing import get_context
 from typing import TypeVar
 
 import numpy as np
@@ -95,3 +98,23 @@ def _go_on(waiting: dict[int, Work[T]], results: dict[int, T], lost: dict[int, E
                 lost[number] = error
         run(np.array([*ready.values()], dtype=np.int64).tobytes(), len(ready), threads)
         waiting = {number: waiting[number] for number in ready}
+
+
+def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
+    """`work(seed)` for every seed, in the order of the seeds, whatever finishes first.
+
+    `work`: a function of a module, which makes a plant of that seed, uses it, and returns what can be pickled.  `processes`: how
+    many at once; None: as many as there are cores, and with 1 all is done here.  Exceptions of `work` are raised here.
+    """
+    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
+        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one a core.")
+    given = list(seeds)
+    count = min(processes or _cores(), len(given))
+    if count <= 1:
+        return [work(seed) for seed in given]
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:  # a fork would share locks that threads hold
+        return list(pool.map(work, given))
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
