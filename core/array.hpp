@@ -1,7 +1,8 @@
-// Arrays that own their memory.  The library links no C++ runtime, so there is neither `new` nor std::vector.
+// Arrays that own their memory, and views of those of others.  The library links no C++ runtime: there is neither `new` nor std::vector.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <new>
@@ -82,6 +83,21 @@ private:
 
     T* data_ = nullptr;
     std::size_t size_ = 0, room_ = 0;
+};
+
+// Numbers that somebody else owns: what Python passes.
+template <class T>
+struct View {
+    T* data = nullptr;
+    std::int64_t size = 0;
+
+    T& operator[](std::int64_t i) const { return data[i]; }
+    T* begin() const { return data; }
+    T* end() const { return data + size; }
+};
+
+struct Interval {
+    std::int64_t first = 0, end = 0;
 };
 
 // An object made in C memory; destroy it with `discard`.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "view.hpp"
+#include "array.hpp"
 
 namespace mobee {
 

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "view.hpp"
+#include "array.hpp"
 
 namespace mobee {
 

@@ -8,7 +8,6 @@
 
 #include "law.hpp"
 #include "vector.hpp"
-#include "view.hpp"
 
 namespace mobee {
 
