@@ -39,7 +39,8 @@ struct Neighbours {
     Array<Neighbour> list;
     Array<Contact> kept;  // when the list was made
     Contacts contacts;
-    Array<Pair> close;    // pairs of the list that are looked at
+    Array<Pair> close;     // pairs of the list that are looked at
+    Array<Contact> still;  // contacts of those of which neither has moved
     Array<Wrench> wrench;
     Rows rows;
 };
@@ -92,14 +93,14 @@ double approach(const Neighbours& near, Pair pair) {
 // Collect the listed pairs that may have met, and the contacts of those of which neither has moved.
 void gather(Neighbours& near) {
     near.close.clear();
-    near.contacts.found.clear();
+    near.still.clear();
     bool bent = false;
     for (const Neighbour& one : near.list) {
         if (way_of_groups(near.motion, one.groups) < one.gap) continue;
         const double between = way_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
-            if (one.kept >= 0) near.contacts.found.push(near.kept[one.kept]);
+            if (one.kept >= 0) near.still.push(near.kept[one.kept]);
             continue;
         }
         if (one.gap > 0.0 && one.pair.second < near.scene->robot->slots()) {
@@ -113,12 +114,8 @@ void gather(Neighbours& near) {
 
 void use_list(Neighbours& near) {
     gather(near);
-    Touch touch;
-    Contact contact;
-    for (const Pair pair : near.close) {
-        const double depth = overlap_of(*near.scene, near.placed, pair, touch);
-        if (depth > 0.0 && name_contact(*near.scene, near.hands, pair, depth, touch, contact)) near.contacts.found.push(contact);
-    }
+    find_contacts(*near.scene, near.hands, near.placed, near.close, near.contacts.found);
+    for (const Contact& one : near.still) near.contacts.found.push(one);
 }
 
 void make_list(Neighbours& near) {
