@@ -33,6 +33,7 @@ class Scene:
 
     snapshot: Snapshot
     handle: core.Handle
+    nothing: ContactTable  # that of all poses without contacts
 
 
 class Engine:
@@ -55,29 +56,31 @@ class Engine:
         return core.jacobians(self._bare, q, link, point)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q, (n,) or (B, n), and the sum of J^T (depth * normal) over those of fields, of the same shape.
+        """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
 
         `reaching`: who spares the targets; `cut`: a part's motors feel only what happens to its own links, as in the original
         program.  The results are the same for any number of threads.
         """
+        scene = self.scene_of(snapshot)
+        room = self._room()
+        hands = hand_numbers(reaching) if reaching else _NOBODY
+        numbers, reals, torque = room.evaluate(scene.handle, q, hands, cut, threads)
+        self._rooms.append(room)
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
+
+    def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
+        """The same for one pose, of which `q` are the bytes."""
         scene = self._scene
         if scene is None or scene.snapshot is not snapshot:
             scene = self.scene_of(snapshot)
-        try:
-            room = self._rooms.pop()  # as one step: other threads take rooms too
-        except IndexError:
-            room = core.Room(len(self.robot.motor_table))
-        hands = hand_numbers(reaching) if reaching else _NOBODY
-        if q.ndim == 1:
-            numbers, reals, torque = room.evaluate_one(scene.handle, q, hands, cut)
-        else:
-            numbers, reals, torque = room.evaluate(scene.handle, q, hands, cut, threads)
+        room = self._room()
+        rows, torque = room.evaluate_one(scene.handle, q, hand_numbers(reaching) if reaching else _NOBODY, cut)
         self._rooms.append(room)
-        return ContactTable(self._shapes, snapshot.names, numbers, reals), torque
+        return ContactTable(self._shapes, snapshot.names, rows) if rows else scene.nothing, torque
 
     def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
         """The table of what the core has written."""
-        return ContactTable(self._shapes, snapshot.names, numbers, reals)
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals))
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
         """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
@@ -88,9 +91,16 @@ class Engine:
         count = len(snapshot.roles)
         side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
         robot = self._robot_with(snapshot, carried)
-        new = Scene(snapshot, core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side))
+        handle = core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side)
+        new = Scene(snapshot, handle, ContactTable(self._shapes, snapshot.names, (core.NO_NUMBERS, core.NO_REALS)))
         self._scene = new
         return new
+
+    def _room(self) -> core.Room:
+        try:
+            return self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            return core.Room(len(self.robot.motor_table))
 
     def _robot_with(self, snapshot: Snapshot, carried: list[int]) -> core.Handle:
         """The robot with what it carries; made anew only when that has changed."""

@@ -28,7 +28,7 @@ class Touching:
         snapshot = self._model.world.snapshot
         if not snapshot.names:
             return ()
-        return touched_in(self._engine.contacts(q, snapshot, self._model.hands)[0], self._moved[part])
+        return touched_in(self._engine.contacts_of_one(q.tobytes(), snapshot, self._model.hands)[0], self._moved[part])
 
 
 @per_robot
