@@ -150,6 +150,9 @@ class Model:
 
     def _checked(self, q: ArrayLike) -> Array:
         n = self._motors
+        one = self._one_pose(q)
+        if one is not None:
+            return np.frombuffer(one).copy()
         value = real_array("q", q)
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")

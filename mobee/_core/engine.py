@@ -21,8 +21,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NO_NUMBERS, NO_REALS = np.empty((0, NUMBERS), dtype=np.int64), np.empty((0, REALS))
-NO_ROWS = bytearray()
-MANY = 128  # contacts for which a room has space from the beginning, when it evaluates one pose
+MANY = 128  # contacts for which a room has space from the beginning
 
 
 class Handle:
@@ -109,7 +108,8 @@ _room_free = function("room_free", ADDRESS)
 _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
-_evaluate_one = function("evaluate_one", result=INTEGER)  # of byref(_RequestOfOne) and bytes: undeclared, they pass sooner
+evaluate_one = function("evaluate_one", result=INTEGER)
+"""Evaluates one pose, of `Room.asked` and the bytes of q (n,); gives the number of contacts.  Undeclared arguments pass sooner."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -155,19 +155,17 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 class Room:
     """What evaluations work in, one at a time; kept for the next one, for fresh memory costs more than the arithmetic of a pose."""
 
-    __slots__ = ("_asked", "_at", "_cut", "_handle", "_hands", "_most", "_request", "_rows", "_scene", "_torque")
+    __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
 
     def __init__(self, motors: int) -> None:
         self._handle = Handle(_room_new(), _room_free)
         self._at = self._handle.at
-        # What the evaluations of one pose are asked, and where they write.
-        self._scene: Handle | None = None
-        self._hands: Sequence[int] = ()
-        self._cut = False
-        self._torque = np.empty(motors)
-        self._request = _RequestOfOne(room=self._at, torque=address(self._torque))
-        self._asked = ctypes.byref(self._request)
-        self._make_space(MANY)
+        self.torque = np.empty(motors)
+        """Where `evaluate_one` writes what the contacts do to the motors, (n,)."""
+        self._request = _RequestOfOne(room=self._at, torque=address(self.torque))
+        self.asked = ctypes.byref(self._request)
+        """What `evaluate_one` is asked, see `ask`."""
+        self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
         """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""
@@ -176,24 +174,14 @@ class Room:
         count = _evaluate(self._at, ctypes.addressof(request))
         return *_rows(_room_rows, self._at, count), torque
 
-    def evaluate_one(self, scene: Handle, q: bytes, hands: Sequence[int], cut: bool) -> tuple[bytearray, Array]:
-        """The rows of all contacts in one pose, see `ContactTable`, and what they do to the motors (n,); `q` (n,) as bytes."""
-        if self._scene is not scene or self._hands is not hands or self._cut is not cut:
-            self._ask(scene, hands, cut)
-        count = _evaluate_one(self._asked, q)
-        if count > self._most:
-            self._make_space(2 * count)
-            _evaluate_one(self._asked, q)
-        rows = self._rows[: count * ROW_BYTES] if count else NO_ROWS
-        return rows, self._torque.copy()
-
-    def _ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        self._scene, self._hands, self._cut = scene, hands, cut
+    def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
+        """What `evaluate_one` shall find from now on; the caller keeps the scene alive."""
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
-    def _make_space(self, contacts: int) -> None:
-        self._rows, self._most = bytearray(contacts * ROW_BYTES), contacts
-        self._request.rows, self._request.most = address(np.frombuffer(self._rows, dtype=np.uint8)), contacts
+    def make_space(self, most: int) -> None:
+        """For the rows of the most contacts that `evaluate_one` shall write."""
+        self.most, self.rows = most, bytearray(most * ROW_BYTES)
+        self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:
