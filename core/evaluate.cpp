@@ -20,6 +20,10 @@ struct Worker {
 struct Room {
     Array<Worker*> workers;
 
+    void make_workers(std::int64_t count) {
+        while (static_cast<std::int64_t>(workers.size()) < count) workers.push(make<Worker>());
+    }
+
     ~Room() {
         for (Worker* worker : workers) discard(worker);
     }
@@ -28,11 +32,19 @@ struct Room {
 // What Python asks, see mobee/_core/engine.py.
 struct Request {
     const Scene* scene;
-    const double* q;          // (poses, motors)
-    double* torque;           // (poses, motors), overwritten
-    ContactNumbers* numbers;  // (few,): the rows of a single pose are written here if there are no more
-    ContactReals* reals;      // (few,)
-    std::int64_t poses, few, cut, threads;
+    const double* q;  // (poses, motors)
+    double* torque;  // (poses, motors), overwritten
+    std::int64_t poses, cut, threads;
+    Hands hands;
+};
+
+// The same for one pose.
+struct RequestOfOne {
+    Room* room;
+    const Scene* scene;
+    double* torque;  // (motors,), overwritten
+    void* rows;      // room for the most contacts: their numbers, and behind them their reals
+    std::int64_t most, cut;
     Hands hands;
 };
 
@@ -43,25 +55,32 @@ void fit(Worker& worker, const Robot& robot) {
     worker.wrench.resize(robot.links);
 }
 
+// The contacts of one pose q (motors,), in order, and what they do to the motors, `torque` (motors,).
+const Array<Contact>& contacts_at(const Scene& scene, const double* q, const Hands& hands, bool cut, Worker& worker, double* torque) {
+    const Robot& robot = *scene.robot;
+    Placed& placed = worker.placed;
+    std::memset(torque, 0, robot.motors * sizeof(double));
+    joint_angles(robot, q, placed.links.angles.data());
+    place(robot, placed);
+    bound_clusters(robot, placed);
+    find_pairs(scene, placed, 0.0, worker.pairs);
+    sieve(scene, placed, 0.0, worker.pairs);
+    Array<Contact>& found = worker.contacts.found;
+    find_contacts(scene, hands, placed, worker.pairs.left, found);
+    if (found.size() == 0) return found;
+    sort_contacts(scene, worker.contacts);
+    project(robot, placed.links.frame.data(), found, cut, worker.wrench, torque);
+    return found;
+}
+
 // The poses from `begin` to before `end`.
 void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& worker) {
     const Scene& scene = *request.scene;
-    const Robot& robot = *scene.robot;
-    fit(worker, robot);
-    Placed& placed = worker.placed;
+    const std::int64_t motors = scene.robot->motors;
+    fit(worker, *scene.robot);
     for (std::int64_t b = begin; b < end; ++b) {
-        double* torque = request.torque + b * robot.motors;
-        std::memset(torque, 0, robot.motors * sizeof(double));
-        joint_angles(robot, request.q + b * robot.motors, placed.links.angles.data());
-        place(robot, placed);
-        bound_clusters(robot, placed);
-        find_pairs(scene, placed, 0.0, worker.pairs);
-        sieve(scene, placed, 0.0, worker.pairs);
-        find_contacts(scene, request.hands, placed, worker.pairs.left, worker.contacts.found);
-        if (worker.contacts.found.size() == 0) continue;
-        sort_contacts(scene, worker.contacts);
-        project(robot, placed.links.frame.data(), worker.contacts.found, request.cut != 0, worker.wrench, torque);
-        worker.rows.append(b, worker.contacts.found);
+        const double* q = request.q + b * motors;
+        worker.rows.append(b, contacts_at(scene, q, request.hands, request.cut != 0, worker, request.torque + b * motors));
     }
 }
 
@@ -110,11 +129,11 @@ MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
     all.give(arrays);
 }
 
-// Find the contacts of all poses; returns how many there are.  If they are more than few, `mobee_room_rows` gives them.
+// Find the contacts of all poses; returns how many there are.  `mobee_room_rows` gives them.
 MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     const std::int64_t most_threads = request->poses > 1 ? request->poses : 1;
     const std::int64_t threads = request->threads < most_threads ? request->threads : most_threads;
-    while (static_cast<std::int64_t>(room->workers.size()) < threads) room->workers.push(make<Worker>());
+    room->make_workers(threads);
     for (Worker* worker : room->workers) worker->rows.size = 0;
     if (threads == 1) {
         evaluation::run(*request, 0, request->poses, *room->workers[0]);
@@ -123,15 +142,22 @@ MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     }
     std::size_t rows = 0;
     for (const Worker* worker : room->workers) rows += worker->rows.size;
-    const Rows& first = room->workers[0]->rows;
-    if (request->poses == 1 && static_cast<std::int64_t>(rows) <= request->few) first.copy_to(request->numbers, request->reals);
     return static_cast<std::int64_t>(rows);
 }
 
-// The same for the one pose at q (motors,).
-MOBEE_CALL std::int64_t mobee_evaluate_one(Room* room, Request* request, const double* q) {
-    request->q = q;
-    return mobee_evaluate(room, request);
+// The same for the one pose at q (motors,).  Contacts that are more than the most are only counted.
+MOBEE_CALL std::int64_t mobee_evaluate_one(const RequestOfOne* request, const double* q) {
+    Room& room = *request->room;
+    room.make_workers(1);
+    Worker& worker = *room.workers[0];
+    evaluation::fit(worker, *request->scene->robot);
+    const Array<Contact>& found = evaluation::contacts_at(*request->scene, q, request->hands, request->cut != 0, worker, request->torque);
+    const auto count = static_cast<std::int64_t>(found.size());
+    if (count <= request->most) {
+        auto* numbers = static_cast<ContactNumbers*>(request->rows);
+        write_rows(0, found, numbers, reinterpret_cast<ContactReals*>(numbers + count));
+    }
+    return count;
 }
 
 }  // namespace mobee

@@ -17,6 +17,14 @@ struct ContactReals {
     Touch touch;
 };
 
+// A row for each contact of a pose.
+inline void write_rows(std::int64_t pose, const Array<Contact>& contacts, ContactNumbers* numbers, ContactReals* reals) {
+    for (const Contact& one : contacts) {
+        *numbers++ = {pose, one.kind, one.first, one.second, one.first_link, one.second_link};
+        *reals++ = {one.depth, one.touch};
+    }
+}
+
 // Memory for rows.  Large pieces that are ended wait for the next user: for a batch, getting them anew from the system would cost as
 // much as a tenth of the search.  `resized` gives other memory that begins like the old, which may be none.
 void* resized(void* old, std::size_t bytes);
@@ -45,10 +53,8 @@ struct Rows {
 
     void append(std::int64_t pose, const Array<Contact>& contacts) {
         make_room(contacts.size());
-        for (const Contact& one : contacts) {
-            numbers[size] = {pose, one.kind, one.first, one.second, one.first_link, one.second_link};
-            reals[size++] = {one.depth, one.touch};
-        }
+        write_rows(pose, contacts, numbers + size, reals + size);
+        size += contacts.size();
     }
 
     void append(const Rows& others) {
@@ -57,13 +63,6 @@ struct Rows {
         std::memcpy(numbers + size, others.numbers, others.size * sizeof(ContactNumbers));
         std::memcpy(reals + size, others.reals, others.size * sizeof(ContactReals));
         size += others.size;
-    }
-
-    // Write all to arrays of others.
-    void copy_to(ContactNumbers* to_numbers, ContactReals* to_reals) const {
-        if (size == 0) return;
-        std::memcpy(to_numbers, numbers, size * sizeof(ContactNumbers));
-        std::memcpy(to_reals, reals, size * sizeof(ContactReals));
     }
 
     // Give both arrays away.

@@ -43,6 +43,7 @@ class Model:
         self.world = World() if world is None else world
         self._engine = _engine(robot, engine)
         self._motors = len(robot.motor_table)
+        self._shape = (self._motors,)  # of one pose
         self._reaching: str | tuple[str, ...] | None = None
         self._hands: Hands = NOBODY
         self._hand_of: dict[str, Hand] = {}
@@ -102,12 +103,14 @@ class Model:
 
         `threads`: how many share the poses of a batch, one block each; the results are the same to the last bit for any number.
         """
-        value = self._checked(q)
+        one = self._one_pose(q)
+        value: Array | bytes = self._checked(q) if one is None else one
         if threads < 1:
             raise InvalidValue(f"threads {threads}: must be at least 1")
-        pose = Pose(self.robot, self._engine, value, self.world.snapshot, self._hands, threads)
-        if value.ndim == 1:
-            self.world.follow(pose)
+        world = self.world
+        pose = Pose(self.robot, self._engine, value, world.snapshot, self._hands, threads)
+        if isinstance(value, bytes) or value.ndim == 1:
+            world.follow(pose)
         return pose
 
     def track(self, skin: float = 0.02) -> Track:
@@ -136,11 +139,20 @@ class Model:
             raise UnknownName("world object", name, pose.objects)
         self.world.attach(name, link, seen_from(carrier, pose.objects[name]))
 
+    def _one_pose(self, q: ArrayLike) -> bytes | None:
+        """The bytes of one pose as most callers have it; None of all else, which takes several times as long to look at."""
+        if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == self._shape:
+            value = q.tobytes()
+            signs_and_exponents = value[7::8]  # the highest seven bits of the exponent are set beyond 1e303, and of inf and NaN
+            if not (127 in signs_and_exponents or 255 in signs_and_exponents):
+                return value
+        return None
+
     def _checked(self, q: ArrayLike) -> Array:
         n = self._motors
-        # The first of all tests is for one pose: what comes after it takes several times as long.
-        if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == (n,) and math.isfinite(q.dot(q)):
-            return q.copy()
+        one = self._one_pose(q)
+        if one is not None:
+            return np.frombuffer(one).copy()
         value = real_array("q", q)
         if value.ndim == 0 or value.shape[-1] != n:
             raise InvalidValue(f"q has shape {value.shape}; {self.robot.name!r} has {n} motors, so it must be ({n},) or (..., {n}) rad.")

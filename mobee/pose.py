@@ -21,7 +21,7 @@ class Finder(Protocol):
     """What finds contacts."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape."""
+        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
 
 
 class Engine(Protocol):
@@ -34,22 +34,26 @@ class Engine(Protocol):
         """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape."""
+        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
+
+    def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
+        """The same for one pose, of which `q` are the bytes."""
 
 
 class Pose:
     """The robot at one q or at a batch of them, in the world as it was when `Model.evaluate` was called.
 
-    `q`: (..., n) rad.  What is asked for is computed when it is first asked for, and kept.
+    What is asked for is computed when it is first asked for, and kept.
     """
 
-    __slots__ = ("_contacts", "_engine", "_felt", "_reaching", "_snapshot", "_threads", "_transforms", "q", "robot")
+    __slots__ = ("_contacts", "_engine", "_felt", "_given", "_reaching", "_snapshot", "_threads", "_transforms", "robot")
 
     # Kept by hand: functools.cached_property takes one lock for all poses before Python 3.12, and no evaluation may wait for another.
 
-    def __init__(self, robot: Robot, engine: Engine, q: Array, snapshot: Snapshot, reaching: Hands, threads: int = 1) -> None:
+    def __init__(self, robot: Robot, engine: Engine, q: Array | bytes, snapshot: Snapshot, reaching: Hands, threads: int = 1) -> None:
+        """`q`: (..., n) rad; or the bytes of one (n,), which is sooner."""
         self.robot = robot
-        self.q = q
+        self._given = q
         self._engine = engine
         self._snapshot = snapshot
         self._reaching = reaching
@@ -57,6 +61,14 @@ class Pose:
         self._transforms: Array | None = None
         self._felt: tuple[ContactTable, Array] | None = None
         self._contacts: tuple[Contact, ...] | None = None
+
+    @property
+    def q(self) -> Array:
+        """The motor positions, (..., n) rad."""
+        given = self._given
+        if isinstance(given, bytes):
+            given = self._given = np.frombuffer(given).copy()
+        return given
 
     @property
     def transforms(self) -> Array:
@@ -90,7 +102,9 @@ class Pose:
     def table(self) -> ContactTable:
         """Every overlap of the tested pairs in every pose, as columns."""
         felt = self._felt
-        return (self._feel() if felt is None else felt)[0]
+        if felt is None:
+            felt = self._felt = self._found(False)
+        return felt[0]
 
     @property
     def projection(self) -> Array:
@@ -99,7 +113,9 @@ class Pose:
         Both sides of a self contact get opposite vectors, and all motors down to the base feel it.
         """
         felt = self._felt
-        return (self._feel() if felt is None else felt)[1]
+        if felt is None:
+            felt = self._felt = self._found(False)
+        return felt[1]
 
     @property
     def projection_of_part(self) -> Array:
@@ -150,12 +166,11 @@ class Pose:
     def _flat(self) -> Array:
         return self.q.reshape(-1, self.q.shape[-1])
 
-    def _feel(self) -> tuple[ContactTable, Array]:
-        felt = self._felt = self._found(False)
-        return felt
-
     def _found(self, cut: bool) -> tuple[ContactTable, Array]:
-        if self.q.ndim == 1:
-            return self._engine.contacts(self.q, self._snapshot, self._reaching, cut)
-        table, torque = self._engine.contacts(self._flat, self._snapshot, self._reaching, cut, self._threads)
-        return table, torque.reshape(self.q.shape)
+        given = self._given
+        if not isinstance(given, bytes):
+            if given.ndim > 1:
+                table, torque = self._engine.contacts(self._flat, self._snapshot, self._reaching, cut, self._threads)
+                return table, torque.reshape(given.shape)
+            given = given.tobytes()
+        return self._engine.contacts_of_one(given, self._snapshot, self._reaching, cut)

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from mobee._core import ADDRESS, BYTES, INTEGER, REAL, address, function
 from mobee._core.narrow import VOLUME
+from mobee.collision.contact import NUMBERS, REALS, ROW_BYTES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
 NO_NUMBERS, NO_REALS = np.empty((0, NUMBERS), dtype=np.int64), np.empty((0, REALS))
-FEW = 128  # contacts that an evaluation of one pose writes where Python reads them; more are asked for
+MANY = 128  # contacts for which a room has space from the beginning
 
 
 class Handle:
@@ -83,8 +83,18 @@ class _Request(ctypes.Structure):
     """`Request` of core/evaluate.cpp."""
 
     _fields_ = (
-        *((name, ADDRESS) for name in ("scene", "q", "torque", "numbers", "reals")),
-        *((name, INTEGER) for name in ("poses", "few", "cut", "threads")),
+        *((name, ADDRESS) for name in ("scene", "q", "torque")),
+        *((name, INTEGER) for name in ("poses", "cut", "threads")),
+        ("hands", INTEGER * 4),
+    )
+
+
+class _RequestOfOne(ctypes.Structure):
+    """`RequestOfOne` of core/evaluate.cpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("room", "scene", "torque", "rows")),
+        *((name, INTEGER) for name in ("most", "cut")),
         ("hands", INTEGER * 4),
     )
 
@@ -98,7 +108,8 @@ _room_free = function("room_free", ADDRESS)
 _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
-_evaluate_one = function("evaluate_one", ADDRESS, ADDRESS, BYTES, result=INTEGER)
+evaluate_one = function("evaluate_one", result=INTEGER)
+"""Evaluates one pose, of `Room.asked` and the bytes of q (n,); gives the number of contacts.  Undeclared arguments pass sooner."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -144,39 +155,33 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 class Room:
     """What evaluations work in, one at a time; kept for the next one, for fresh memory costs more than the arithmetic of a pose."""
 
-    __slots__ = ("_asked", "_at", "_handle", "_numbers", "_one", "_one_at", "_reals", "_scene", "_torque")
+    __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
 
     def __init__(self, motors: int) -> None:
         self._handle = Handle(_room_new(), _room_free)
         self._at = self._handle.at
-        self._torque = np.empty(motors)
-        self._numbers, self._reals = np.empty((FEW, NUMBERS), dtype=np.int64), np.empty((FEW, REALS))
-        self._one = _Request(
-            torque=address(self._torque), numbers=address(self._numbers), reals=address(self._reals), poses=1, few=FEW, threads=1
-        )
-        self._one_at = ctypes.addressof(self._one)
-        self._scene: Handle | None = None
-        self._asked: tuple[object, ...] = ()  # what the last evaluation of one pose was asked
+        self.torque = np.empty(motors)
+        """Where `evaluate_one` writes what the contacts do to the motors, (n,)."""
+        self._request = _RequestOfOne(room=self._at, torque=address(self.torque))
+        self.asked = ctypes.byref(self._request)
+        """What `evaluate_one` is asked, see `ask`."""
+        self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
         """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""
         torque = np.empty(q.shape)
-        request = _Request(scene.at, address(q), address(torque), 0, 0, len(q), 0, cut, threads, (INTEGER * 4)(*hands))
+        request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
         count = _evaluate(self._at, ctypes.addressof(request))
         return *_rows(_room_rows, self._at, count), torque
 
-    def evaluate_one(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool) -> tuple[Ints, Array, Array]:
-        """The same for one pose q (n,), with what they do to the motors (n,)."""
-        if self._scene is not scene or self._asked != (hands, cut):
-            request = self._one
-            request.scene, request.cut, request.hands[:] = scene.at, cut, hands
-            self._scene, self._asked = scene, (hands, cut)
-        count = _evaluate_one(self._at, self._one_at, q.tobytes())
-        if count == 0:
-            return NO_NUMBERS, NO_REALS, self._torque.copy()
-        if count > FEW:
-            return *_rows(_room_rows, self._at, count), self._torque.copy()
-        return self._numbers[:count].copy(), self._reals[:count].copy(), self._torque.copy()
+    def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
+        """What `evaluate_one` shall find from now on; the caller keeps the scene alive."""
+        self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
+
+    def make_space(self, most: int) -> None:
+        """For the rows of the most contacts that `evaluate_one` shall write."""
+        self.most, self.rows = most, bytearray(most * ROW_BYTES)
+        self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:

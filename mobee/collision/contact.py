@@ -14,6 +14,9 @@ KINDS: tuple[Literal["solid", "field"], ...] = ("solid", "field")
 
 Column = NDArray[np.int64]
 
+NUMBERS, REALS = 6, 7  # of a contact
+ROW_BYTES = 8 * (NUMBERS + REALS)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
@@ -33,32 +36,48 @@ class Contact:
     second_link: int
 
 
-@dataclass(frozen=True, slots=True, eq=False, init=False)
 class ContactTable:
     """c contacts of a batch of poses, one row each, sorted by pose, kind, first and second; fields as in Contact.
 
     Names are given by index: the robot's shapes, then the world's objects.
     """
 
-    shapes: tuple[str, ...]
-    objects: tuple[str, ...]
-    numbers: Column  # (c, 6): pose, kind, first, second, first link, second link
-    reals: Array  # (c, 7): depth [m], normal (3), point (3) [m]
+    # One is made for every pose, and often nothing of it is read: rows become arrays when they are asked for.
+    __slots__ = ("_objects", "_rows", "_shapes")
 
-    def __init__(self, shapes: tuple[str, ...], objects: tuple[str, ...], numbers: Column, reals: Array) -> None:
-        # In half the time of the one that a frozen dataclass gets: a table is made for every pose.
-        _set_shapes(self, shapes)
-        _set_objects(self, objects)
-        _set_numbers(self, numbers)
-        _set_reals(self, reals)
+    def __init__(self, shapes: tuple[str, ...], objects: tuple[str, ...], rows: tuple[Column, Array] | bytearray) -> None:
+        """`rows`: `numbers` and `reals`, or both as the core writes them: all numbers, then all reals."""
+        self._shapes = shapes
+        self._objects = objects
+        self._rows = rows
 
     def __len__(self) -> int:
         return len(self.reals)
 
     def name(self, index: int) -> str:
         """The shape or object that `first` or `second` stands for."""
-        count = len(self.shapes)
-        return self.shapes[index] if index < count else self.objects[index - count]
+        count = len(self._shapes)
+        return self._shapes[index] if index < count else self._objects[index - count]
+
+    @property
+    def shapes(self) -> tuple[str, ...]:
+        """The names of the robot's shapes."""
+        return self._shapes
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """The names of the world's objects."""
+        return self._objects
+
+    @property
+    def numbers(self) -> Column:
+        """(c, 6): pose, kind, first, second, first link, second link."""
+        return self._arrays()[0]
+
+    @property
+    def reals(self) -> Array:
+        """(c, 7): depth [m], normal (3), point (3) [m]."""
+        return self._arrays()[1]
 
     @property
     def pose(self) -> Column:
@@ -114,5 +133,15 @@ class ContactTable:
             )
         )
 
+    def _arrays(self) -> tuple[Column, Array]:
+        rows = self._rows
+        if isinstance(rows, bytearray):
+            rows = self._rows = _read(rows)
+        return rows
 
-_set_shapes, _set_objects, _set_numbers, _set_reals = (getattr(ContactTable, name).__set__ for name in ContactTable.__slots__)
+
+def _read(rows: bytearray) -> tuple[Column, Array]:
+    """The numbers and the reals of a block, which they share."""
+    count = len(rows) // ROW_BYTES
+    numbers: Column = np.ndarray((count, NUMBERS), np.int64, rows)
+    return numbers, np.ndarray((count, REALS), np.float64, rows, offset=numbers.nbytes)

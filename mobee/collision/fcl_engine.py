@@ -49,11 +49,11 @@ class FclEngine:
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q, (n,) or (B, n), and the projected depths of those of fields, of the same shape.
+        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n).
 
         `reaching`: who spares the targets; `cut`: a motor feels only what happens to links of its own part.  `threads`: fcl knows but one.
         """
-        transforms = link_transforms(self.robot, q.reshape(-1, q.shape[-1]))
+        transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
         tables = [_contact_table(self.robot, one, snapshot, pairs) for one in transforms]
         for pose, table in enumerate(tables):
@@ -62,6 +62,11 @@ class FclEngine:
         none = _table(self.robot, snapshot, np.empty((0, 6), dtype=np.int64), np.empty((0, 7)))
         numbers, reals = (np.concatenate([getattr(table, what) for table in (none, *tables)]) for what in ("numbers", "reals"))
         return _table(self.robot, snapshot, numbers, reals), torque
+
+    def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
+        """The same for one pose, of which `q` are the bytes."""
+        table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
+        return table, torque[0]
 
     def _tested(self, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
         known = self._pairs
@@ -113,7 +118,7 @@ def _contact_table(robot: Robot, transforms: Array, snapshot: Snapshot, pairs: t
 
 
 def _table(robot: Robot, snapshot: Snapshot, numbers: Ints, reals: Array) -> ContactTable:
-    return ContactTable(tuple(shape.name for shape in robot.shapes), snapshot.names, numbers, reals)
+    return ContactTable(tuple(shape.name for shape in robot.shapes), snapshot.names, (numbers, reals))
 
 
 def _links(robot: Robot, snapshot: Snapshot) -> list[int]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee._core import engine as core
-from mobee.collision.contact import ContactTable
+from mobee.collision.contact import ROW_BYTES, ContactTable
 from mobee.collision.snapshot import ATTACHED, Snapshot
-from mobee.engine.hands import Hands, hand_numbers
+from mobee.engine.hands import NOBODY, Hands, hand_numbers
 from mobee.engine.robot_tables import Carried, robot_tables
 from mobee.errors import UnknownName
 from mobee.robot.per_robot import per_robot
@@ -17,8 +17,6 @@ from mobee.robot.robot import Array, Robot
 
 GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
 PER_CELL = 8  # objects, aimed at
-
-_NOBODY = hand_numbers(())
 
 
 @per_robot
@@ -33,6 +31,25 @@ class Scene:
 
     snapshot: Snapshot
     handle: core.Handle
+    nothing: ContactTable  # that of all poses without contacts
+
+
+class _Room(core.Room):
+    """A room, and what was asked last of one pose there."""
+
+    __slots__ = ("cut", "reaching", "scene")
+
+    def __init__(self, motors: int) -> None:
+        super().__init__(motors)
+        self.scene: Scene | None = None
+        self.reaching: Hands = NOBODY
+        self.cut = False
+
+    def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:
+        """Ask something else."""
+        self.ask(scene.handle, hand_numbers(reaching), cut)
+        self.scene, self.reaching, self.cut = scene, reaching, cut
+        return scene
 
 
 class Engine:
@@ -40,11 +57,12 @@ class Engine:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        self._motors = len(robot.motor_table)
         self._shapes = tuple(shape.name for shape in robot.shapes)
         self._bare = robot_handle(robot)
         self._laden: tuple[tuple[bytes, ...], core.Handle] = (), self._bare
         self._scene: Scene | None = None
-        self._rooms: list[core.Room] = []  # of evaluations that have ended
+        self._rooms: list[_Room] = []  # of evaluations that have ended
 
     def transforms(self, q: Array) -> Array:
         """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
@@ -55,29 +73,41 @@ class Engine:
         return core.jacobians(self._bare, q, link, point)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q, (n,) or (B, n), and the sum of J^T (depth * normal) over those of fields, of the same shape.
+        """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
 
         `reaching`: who spares the targets; `cut`: a part's motors feel only what happens to its own links, as in the original
         program.  The results are the same for any number of threads.
         """
-        scene = self._scene
-        if scene is None or scene.snapshot is not snapshot:
-            scene = self.scene_of(snapshot)
+        scene = self.scene_of(snapshot)
         try:
             room = self._rooms.pop()  # as one step: other threads take rooms too
         except IndexError:
-            room = core.Room(len(self.robot.motor_table))
-        hands = hand_numbers(reaching) if reaching else _NOBODY
-        if q.ndim == 1:
-            numbers, reals, torque = room.evaluate_one(scene.handle, q, hands, cut)
-        else:
-            numbers, reals, torque = room.evaluate(scene.handle, q, hands, cut, threads)
+            room = _Room(self._motors)
+        numbers, reals, torque = room.evaluate(scene.handle, q, hand_numbers(reaching), cut, threads)
         self._rooms.append(room)
-        return ContactTable(self._shapes, snapshot.names, numbers, reals), torque
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
+
+    def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
+        """The same for one pose, of which `q` are the bytes."""
+        try:
+            room = self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            room = _Room(self._motors)
+        scene = room.scene
+        if scene is None or scene.snapshot is not snapshot or room.reaching is not reaching or room.cut is not cut:
+            scene = room.ask_for(self.scene_of(snapshot), reaching, cut)
+        count = core.evaluate_one(room.asked, q)
+        if count > room.most:
+            room.make_space(2 * count)
+            core.evaluate_one(room.asked, q)
+        table = ContactTable(self._shapes, snapshot.names, room.rows[: count * ROW_BYTES]) if count else scene.nothing
+        found = table, room.torque.copy()
+        self._rooms.append(room)
+        return found
 
     def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
         """The table of what the core has written."""
-        return ContactTable(self._shapes, snapshot.names, numbers, reals)
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals))
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
         """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
@@ -88,7 +118,8 @@ class Engine:
         count = len(snapshot.roles)
         side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
         robot = self._robot_with(snapshot, carried)
-        new = Scene(snapshot, core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side))
+        handle = core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side)
+        new = Scene(snapshot, handle, ContactTable(self._shapes, snapshot.names, (core.NO_NUMBERS, core.NO_REALS)))
         self._scene = new
         return new
 

@@ -288,4 +288,4 @@ class OfflinePlant:
         snapshot = self.model.world.snapshot
         if not snapshot.names:
             return ()
-        return touched_in(self._touching.contacts(self._q, snapshot, self.model.hands)[0], self._moved[part])
+        return touched_in(self._touching.contacts_of_one(self._q.tobytes(), snapshot, self.model.hands)[0], self._moved[part])

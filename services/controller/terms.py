@@ -51,4 +51,4 @@ class ToldContacts:
                     if link >= 0:
                         felt[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
         names = tuple(name for contact in self._told for name in (contact.first, contact.second))
-        return ContactTable(names, (), np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7)), felt
+        return ContactTable(names, (), (np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7))), felt
