@@ -216,10 +216,14 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     if (prefer_square_to(best, b, a, axis, shift)) best.direction = into(a.rotation, out_of(b.rotation, best.direction));
     if (best.reach <= 0.0) return best.reach;
     Touch found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
+    const double known = best.reach, bound = least_way_out(a, b, found, known);
+    if (bound >= known - tie) {
+        touch = found;
+        return known;
+    }
     Difference difference(a, b);
-    const double gap = known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
+    const double gap = bound > 0.0 || known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
     if (gap > 0.0) return -gap;
-    const double known = best.reach;
     if (leans && !rims::prefer_where_they_meet(best, {d, c, a.half.x, a.half.y, b.half.x, b.half.y, sine})) best = way_out(difference, best);
     if (best.reach < known) found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
     touch = found;
