@@ -76,10 +76,12 @@ struct Pair {
     }
 };
 
-// A circle about the z axis and another: its middle, and two radii of it, of which the second is level.
+// A circle about the z axis and another: its middle, and two radii of it, of which the second is level; which way is out of the other's
+// end, and how much of that is level.
 struct Circles {
-    double radius, height;
-    Vec3 middle, rising, level;
+    double radius, height, other_radius;
+    Vec3 middle, rising, level, out_of_end;
+    double sine;
 };
 
 // A point of the other circle and what is nearest on the first.
@@ -87,19 +89,22 @@ struct Near {
     Vec3 way;     // from there
     Vec3 across;  // both circles
     double side, distance;
+    double out, beyond;  // the way, along the radius there and out of the other's end
     double slope, bend;  // first and second derivative of half the squared distance
 
     Near(const Circles& circles, Point at) {
-        const Vec3 out = at.x * circles.rising + at.y * circles.level, along = at.x * circles.level - at.y * circles.rising;
-        const Vec3 p = circles.middle + out;
+        const Vec3 outwards = at.x * circles.rising + at.y * circles.level, along = at.x * circles.level - at.y * circles.rising;
+        const Vec3 p = circles.middle + outwards;
         side = std::sqrt(p.x * p.x + p.y * p.y);
         const Vec3 radial = side > 0.0 ? Vec3{p.x / side, p.y / side, 0.0} : Vec3{1.0, 0.0, 0.0}, round = {-radial.y, radial.x, 0.0};
         way = p - circles.radius * radial - Vec3{0.0, 0.0, circles.height};
         across = cross(round, along);
         distance = length(way);
+        out = dot(way, outwards);
+        beyond = dot(way, circles.out_of_end);
         slope = dot(way, along);
         const double turning = dot(along, round);
-        bend = dot(along, along) - circles.radius / side * turning * turning - dot(way, out);
+        bend = dot(along, along) - circles.radius / side * turning * turning - out;
     }
 };
 
@@ -140,9 +145,31 @@ void prefer(Way& best, const Pair& pair, const Near& near, double up) {
     }
 }
 
+enum class Minimum { none, perhaps, at_most_one };
+
+// What the middle of an arc tells of the shortest ways, shorter than a limit, that start there; no end is farther than `angle` from it.
+//
+// Of half the squared distance, derivatives that the middle does not tell are bounded: side >= the least there is, turning by the
+// radius, and the product of turning and its derivative by half of the square.  A way out leads out of both volumes.
+Minimum shortest_on_arc(const Circles& circles, const Near& middle, double angle, double limit) {
+    const double other = circles.other_radius, far = other * angle, side = middle.side - far;
+    if (middle.distance - far >= limit || side >= circles.radius) return Minimum::none;
+    if (side <= 0.0) return Minimum::perhaps;
+    const double tight = circles.radius / side, square = other * other, far_off = other * (middle.distance + far);
+    const double slope = std::fabs(middle.slope);
+    if (slope > angle * (square * most(1.0, tight - 1.0) + far_off)) return Minimum::none;
+    if (middle.out < -angle * (0.5 * tight * square + far_off)) return Minimum::none;
+    if (middle.beyond < -angle * tight * other * circles.sine) return Minimum::none;
+    const double change = angle * (tight * square * (1.5 + 1.155 * other / side) + far_off);
+    if (middle.bend < -change || slope > angle * (std::fabs(middle.bend) + 0.5 * change)) return Minimum::none;
+    const double least_square = middle.distance * middle.distance - angle * (2.0 * slope + angle * most(change - middle.bend, 0.0));
+    if (least_square >= limit * limit) return Minimum::none;
+    return middle.bend > change ? Minimum::at_most_one : Minimum::perhaps;
+}
+
 // Of the arcs of the other circle that are below the first; false if they are too many.
 bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up) {
-    const double other = pair.other_radius, rise = circles.rising.z, above = circles.height - circles.middle.z;
+    const double rise = circles.rising.z, above = circles.height - circles.middle.z;
     const double high = clamp(above / rise, -1.0, 1.0), low = clamp((above - best.reach) / rise, -1.0, 1.0);
     if (!(low < high)) return true;
     const double beside_high = std::sqrt(1.0 - high * high), beside_low = std::sqrt(1.0 - low * low);
@@ -152,22 +179,11 @@ bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up
         if (waiting == 0) return true;
         const Arc arc = stack[--waiting];
         const Point chord = arc.to - arc.from, middle = normalized({chord.y, -chord.x});
-        // No end is farther from the middle than this angle, nor its point than `far`.
-        const double half = 0.5 * std::sqrt(dot(chord, chord)), angle = half * (1.0 + 0.58 * half * half), far = other * angle;
+        const double half = 0.5 * std::sqrt(dot(chord, chord)), angle = half * (1.0 + 0.58 * half * half);  // above its sine's inverse
         Near near(circles, middle);
-        const double side = near.side - far;
-        if (near.distance - far >= best.reach - tie || side >= circles.radius) continue;
-        if (side > 0.0) {
-            // Bounds of the second and third derivative.
-            const double tight = circles.radius / side, square = other * other, distance = near.distance + far;
-            if (std::fabs(near.slope) > angle * (square * most(1.0, tight - 1.0) + other * distance)) continue;
-            const double change = angle * (3.0 * tight * square * (1.0 + other / side) + other * distance);
-            if (near.bend < -change) continue;
-            if (near.bend > change) {
-                if (descend(circles, middle, angle, near)) prefer(best, pair, near, up);
-                continue;
-            }
-        }
+        const Minimum found = shortest_on_arc(circles, near, angle, best.reach - tie);
+        if (found == Minimum::at_most_one && descend(circles, middle, angle, near)) prefer(best, pair, near, up);
+        if (found != Minimum::perhaps) continue;
         if (waiting + 2 > most_arcs) return false;
         stack[waiting++] = {arc.from, middle};
         stack[waiting++] = {middle, arc.to};
@@ -186,7 +202,8 @@ bool prefer_where_they_meet(Way& best, const Pair& pair) {
             // The first's rim must come below the other's end, too, by less than the shortest way.
             const double off = turn * dot(Vec3{0.0, 0.0, pair.height} - shift, axis), swing = pair.radius * pair.sine;
             if (off - swing > pair.other_height || off + swing < pair.other_height - best.reach) continue;
-            const Circles circles = {pair.radius, pair.height, middle, pair.other_radius * rising, pair.other_radius * level};
+            const double other = pair.other_radius;
+            const Circles circles = {pair.radius, pair.height, other, middle, other * rising, other * level, turn * axis, pair.sine};
             if (!prefer_along(best, pair, circles, up)) return false;
         }
     }
