@@ -69,10 +69,10 @@ void descend(const Disc& disc, Point corner, Arc arc, Exit& best) {
     if (here.reach < best.reach - tie) best = {here.reach, here.n};
 }
 
-// The smooth minima between two directions, less than half a turn apart against the clock; the outline is the disc's about a corner.
-void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit& best) {
+// The smooth minima along an arc of less than half a turn; the outline is the disc's about a corner.
+void improve_between(const Disc& disc, Point corner, const Arc& whole, Exit& best) {
     Arc stack[most_arcs];
-    stack[0] = {support(disc, corner, from), support(disc, corner, to)};
+    stack[0] = whole;
     int waiting = 1;
     for (int step = 0; step < most_steps && waiting > 0; ++step) {
         const Arc arc = stack[--waiting];
@@ -90,17 +90,26 @@ void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit&
     }
 }
 
-// Between two kinks, and opposite to that: `swell` is the disc's outline there, about a corner.
-inline void improve_part(const Disc& disc, Point shift, Point corner, Point from, Point to, Point swell_from, Point swell_to, Exit& best) {
-    const Point first = corner + swell_from, chord = swell_to - swell_from;
-    const double reach = dot(from, first), off = dot(from, shift);
+// The support opposite or not, `side` -1 or 1, moved.
+inline Support placed(const Support& own, double side, Point by) {
+    const Point n = side * own.n, point = side * own.point + by;
+    return {n, point, dot(n, point), cross(n, point), own.radius};
+}
+
+// Between two kinks, and opposite to that, with the disc's own outline about a corner.
+inline void improve_part(const Disc& disc, Point shift, Point corner, const Support& from, const Support& to, Exit& best) {
+    const Point first = corner + from.point, chord = to.point - from.point;
+    const double reach = dot(from.n, first), off = dot(from.n, shift);
     const double area = cross(first, chord), aside = cross(shift, chord), square = dot(chord, chord);
     // Cheaper than to tell the two sides apart where, mostly, neither can be shorter.
     const double limit = least(best.reach, reach - std::fabs(off)) - tie, lower = area - std::fabs(aside);
     if (reach - std::fabs(off) >= best.reach - tie && lower > 0.0 && lower * lower >= limit * limit * square) return;
+    const double far = std::sqrt(square);
     for (const double side : {1.0, -1.0}) {
-        if (reach + side * off < best.reach - tie) best = {reach + side * off, side * from};
-        improve_between(disc, shift + side * corner, side * from, side * to, best);
+        if (reach + side * off < best.reach - tie) best = {reach + side * off, side * from.n};
+        if (area + side * aside >= (best.reach - tie) * far) continue;
+        const Point center = shift + side * corner;
+        improve_between(disc, center, {placed(from, side, center), placed(to, side, center)}, best);
     }
 }
 
@@ -118,13 +127,13 @@ void improve_around(const Disc& seen, Point shift, Point half, Exit& best) {
     disc.axis = {std::fabs(seen.axis.x), std::fabs(seen.axis.y)};
     disc.end = {std::fabs(seen.end.x), std::fabs(seen.end.y)};
     shift.x *= mirror;
-    const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x;
-    const Point out_x = support(disc, {0.0, 0.0}, x).point, out_y = support(disc, {0.0, 0.0}, y).point;
-    const Point out_square = (disc.radius + disc.ball) * square, end = disc.end;
+    const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x, end = disc.end;
+    const Support at_x = support(disc, {0.0, 0.0}, x), at_y = support(disc, {0.0, 0.0}, y);
+    const Support at_square = {square, (disc.radius + disc.ball) * square, 0.0, 0.0, disc.radius * disc.lean + disc.ball};
     Exit found = best;
-    improve_part(disc, shift, half + end, x, y, out_x, out_y, found);
-    improve_part(disc, shift, Point{-half.x, half.y} + end, y, square, out_y, out_square, found);
-    improve_part(disc, shift, Point{-half.x, half.y} - end, square, -x, out_square, -out_x, found);
+    improve_part(disc, shift, half + end, at_x, at_y, found);
+    improve_part(disc, shift, Point{-half.x, half.y} + end, at_y, at_square, found);
+    improve_part(disc, shift, Point{-half.x, half.y} - end, at_square, placed(at_x, -1.0, {0.0, 0.0}), found);
     if (found.reach < best.reach) best = {found.reach, {mirror * found.n.x, found.n.y}};
 }
 
