@@ -54,19 +54,30 @@ inline Point across_chord(const Arc& arc) {
 
 inline bool inside(const Arc& arc, Point n) { return cross(arc.from.n, n) > 0.0 && cross(n, arc.to.n) > 0.0; }
 
-// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does).
-void descend(const Disc& disc, Point corner, Arc arc, Exit& best) {
-    Support here = support(disc, corner, across_chord(arc));
+// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does; halved where that is slow).
+//
+// Along n = start + t aside, not made a unit, the disc reaches radius * swing, where swing^2 = lean n.n + u^2 with u = axis x n, which
+// grows by v at the start.  The slope times a power of n's length is then across - along t + radius * u (v - w t) / swing, with w = u(0).
+void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
+    const Point start = across_chord(arc), aside = {-start.y, start.x};
+    const double w = cross(disc.axis, start), v = cross(disc.axis, aside), along = dot(corner, start), across = dot(corner, aside);
+    double low = cross(start, arc.from.n) / dot(start, arc.from.n), high = cross(start, arc.to.n) / dot(start, arc.to.n), t = 0.0;
+    double last = high - low;
     for (int step = 0; step < most_steps; ++step) {
-        (here.slope < 0.0 ? arc.from : arc.to) = here;
-        const double rise = here.radius - here.reach, turn = rise > 0.0 ? -here.slope / rise : 1.0;
+        const double u = w + v * t, turned = v - w * t, per_swing = 1.0 / std::sqrt(disc.lean * (1.0 + t * t) + u * u);
+        const double slope = across - along * t + disc.radius * per_swing * (u * turned);
+        const double grown = (v * u + disc.lean * t) * per_swing * per_swing;
+        const double rise = disc.radius * per_swing * (v * turned - w * u - u * turned * grown) - along;
+        (slope < 0.0 ? low : high) = t;
+        const double turn = rise > 0.0 ? -slope / rise : high - low;
         if (std::fabs(turn) < settled) break;
-        Point next = std::fabs(turn) < 0.5 ? normalized(here.n + turn * Point{-here.n.y, here.n.x}) : across_chord(arc);
-        if (!inside(arc, next)) next = across_chord(arc);
-        if (!inside(arc, next)) break;
-        here = support(disc, corner, next);
+        const bool fast = std::fabs(turn) <= 0.5 * last && t + turn > low && t + turn < high;
+        const double next = fast ? t + turn : 0.5 * (low + high);
+        last = std::fabs(next - t);
+        t = next;
     }
-    if (here.reach < best.reach - tie) best = {here.reach, here.n};
+    const Support found = support(disc, corner, normalized(start + t * aside));
+    if (found.reach < best.reach - tie) best = {found.reach, found.n};
 }
 
 // The smooth minima along an arc of less than half a turn; the outline is the disc's about a corner.
