@@ -56,13 +56,14 @@ inline bool inside(const Arc& arc, Point n) { return cross(arc.from.n, n) > 0.0 
 
 // The minimum of an arc along which the slope rises through zero (Newton, within the part where it does; halved where that is slow).
 //
-// Along n = start + t aside, not made a unit, the disc reaches radius * swing, where swing^2 = lean n.n + u^2 with u = axis x n, which
-// grows by v at the start.  The slope times a power of n's length is then across - along t + radius * u (v - w t) / swing, with w = u(0).
+// Along n = start + t aside, not made a unit, the disc reaches radius * swing, where swing^2 = lean n.n + u^2 and u = axis x n = w + v t.
+// The slope times a power of n's length is then across - along t + radius * u (v - w t) / swing.
 void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
     const Point start = across_chord(arc), aside = {-start.y, start.x};
     const double w = cross(disc.axis, start), v = cross(disc.axis, aside), along = dot(corner, start), across = dot(corner, aside);
-    double low = cross(start, arc.from.n) / dot(start, arc.from.n), high = cross(start, arc.to.n) / dot(start, arc.to.n), t = 0.0;
-    double last = high - low;
+    // No arc is more than a quarter turn, so that its ends are in front of the start but for rounding.
+    const auto tangent = [start](Point n) { return cross(start, n) / most(dot(start, n), flat); };
+    double low = tangent(arc.from.n), high = tangent(arc.to.n), last = high - low, t = 0.0;
     for (int step = 0; step < most_steps; ++step) {
         const double u = w + v * t, turned = v - w * t, per_swing = 1.0 / std::sqrt(disc.lean * (1.0 + t * t) + u * u);
         const double slope = across - along * t + disc.radius * per_swing * (u * turned);
@@ -80,7 +81,7 @@ void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
     if (found.reach < best.reach - tie) best = {found.reach, found.n};
 }
 
-// The smooth minima along an arc of less than half a turn; the outline is the disc's about a corner.
+// The smooth minima along an arc of a quarter turn at most; the outline is the disc's about a corner.
 void improve_between(const Disc& disc, Point corner, const Arc& whole, Exit& best) {
     Arc stack[most_arcs];
     stack[0] = whole;
