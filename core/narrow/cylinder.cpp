@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "difference.hpp"
+#include "lanes.hpp"
 #include "narrow.hpp"
 #include "outline.hpp"
 
@@ -80,6 +81,48 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
     const Vec3 n = over(-corner, size);
     const double reach = swept.reach(n);
     if (reach < best.reach - tie) best = {reach, n};
+}
+
+// Of three axes what comes after each in order, and what comes before.
+inline Four afters(Vec3 v) { return Four{v.y, v.z, v.x, 0.0}; }
+inline Four befores(Vec3 v) { return Four{v.z, v.x, v.y, 0.0}; }
+
+// Whether no smooth part of three outlines about the origin, from a point on and along a chord, nor its mirror image about `shift`, is
+// nearer than a limit; `reach` is how far it goes at the first point, of which `off` is due to the shift.  Bit by bit.
+struct Parts {
+    Four shift_x, shift_y;
+    double limit;
+
+    // (Where there is no disc to see, numbers are none, and nothing is ruled out.)
+    unsigned beyond(Four reach, Four off, Four x, Four y, Four chord_x, Four chord_y) const {
+        const Four area = (x * chord_y - y * chord_x) - absolute_of(shift_x * chord_y - shift_y * chord_x);
+        const Four nearest = least_of(reach - absolute_of(off), area / root_of(chord_x * chord_x + chord_y * chord_y));
+        return less(Four{} + limit, nearest);
+    }
+};
+
+// Bit i: whether a smooth minimum square to axis i may be below the limit, as the chords of the outlines say, see `improve_around`.
+unsigned where_around(const Swept& swept, double limit) {
+    const Four one{1.0, 1.0, 1.0, 1.0};
+    const Four x = afters(swept.axis), y = befores(swept.axis), turn = x * y < -1e-12 ? -one : one;
+    const Four c_x = absolute_of(x), c_y = absolute_of(y), size = four(swept.beside);
+    const Four half_x = afters(swept.half), half_y = befores(swept.half), end_x = swept.height * c_x, end_y = swept.height * c_y;
+    const Parts parts = {turn * afters(swept.shift), befores(swept.shift), limit};
+    // How far the disc reaches along the plane's axes and across the cylinder's, and how far it is then off them.
+    const Four beside_x = afters(swept.beside), beside_y = befores(swept.beside), both = swept.radius * c_x * c_y;
+    const Four out_x = swept.radius * beside_x, off_x = both / beside_x, out_y = swept.radius * beside_y, off_y = both / beside_y;
+    const auto leans = size > flat;
+    const Four square_x = leans ? -c_y / size : -one, square_y = leans ? c_x / size : Four{};
+    const Four edge_x = swept.radius * square_x, edge_y = swept.radius * square_y;
+
+    Four from_x = half_x + end_x + out_x, from_y = half_y + end_y - off_x;
+    unsigned hopeless = parts.beyond(from_x, parts.shift_x, from_x, from_y, -off_y - out_x, out_y + off_x);
+    from_x = end_x - half_x - off_y, from_y = half_y + end_y + out_y;
+    hopeless &= parts.beyond(from_y, parts.shift_y, from_x, from_y, edge_x + off_y, edge_y - out_y);
+    from_x = edge_x - half_x - end_x, from_y = edge_y + half_y - end_y;
+    const Four off = square_x * parts.shift_x + square_y * parts.shift_y;
+    hopeless &= parts.beyond(square_x * from_x + square_y * from_y, off, from_x, from_y, -out_x - edge_x, off_x - edge_y);
+    return ~hopeless & 7u;
 }
 
 // Square to the segment along axis i.
@@ -170,7 +213,9 @@ double cylinder_box(const Volume& a, const Volume& b, Touch& touch) {
     for (int i = 0; i < 3; ++i) prefer(best, swept.normal_across(i), across[i], aside[i]);
     // Where the cylinder's axis passes beside the box, a corner may be closest.
     if (between < swept.radius) prefer_away_from_corner(best, swept);
-    for (int i = 0; i < 3; ++i) prefer_around(best, swept, i);
+    unsigned around = where_around(swept, best.reach - tie);
+    for (int i = 0; around != 0; ++i, around >>= 1)
+        if ((around & 1u) != 0) prefer_around(best, swept, i);
     if (best.reach <= 0.0) return best.reach;
     const Touch found = touch_along(a, b, out_of(b.rotation, best.direction), best.reach);
     const double gap = known_to_meet(a, b, found.point) ? 0.0 : Difference(a, b).apart();

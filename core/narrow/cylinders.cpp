@@ -2,9 +2,11 @@
 //
 // Their difference is two discs and two segments.  Its shortest way out is along an axis, across both axes, a smooth minimum among the
 // directions square to one axis, or the least distance of a rim of one from a rim of the other.
+#include <bit>
 #include <limits>
 
 #include "difference.hpp"
+#include "lanes.hpp"
 #include "narrow.hpp"
 #include "outline.hpp"
 
@@ -62,7 +64,7 @@ double across_axes(const Volume& a, const Volume& b) {
 // two circles: the second derivatives of the reach and of the distance have the same sign there.
 namespace rims {
 
-constexpr int most_steps = 60, most_arcs = 16;
+constexpr int most_steps = 60, most_arcs = 32;
 
 // In the axes of the first cylinder, whose own axis is z.
 struct Pair {
@@ -76,10 +78,12 @@ struct Pair {
     }
 };
 
-// A circle about the z axis and another: its middle, and two radii of it, of which the second is level.
+// A circle about the z axis and another: its middle, and two radii of it, of which the second is level; which way is out of the other's
+// end, and how much of that is level.
 struct Circles {
-    double radius, height;
-    Vec3 middle, rising, level;
+    double radius, height, other_radius;
+    Vec3 middle, rising, level, out_of_end;
+    double sine;
 };
 
 // A point of the other circle and what is nearest on the first.
@@ -90,8 +94,8 @@ struct Near {
     double slope, bend;  // first and second derivative of half the squared distance
 
     Near(const Circles& circles, Point at) {
-        const Vec3 out = at.x * circles.rising + at.y * circles.level, along = at.x * circles.level - at.y * circles.rising;
-        const Vec3 p = circles.middle + out;
+        const Vec3 outwards = at.x * circles.rising + at.y * circles.level, along = at.x * circles.level - at.y * circles.rising;
+        const Vec3 p = circles.middle + outwards;
         side = std::sqrt(p.x * p.x + p.y * p.y);
         const Vec3 radial = side > 0.0 ? Vec3{p.x / side, p.y / side, 0.0} : Vec3{1.0, 0.0, 0.0}, round = {-radial.y, radial.x, 0.0};
         way = p - circles.radius * radial - Vec3{0.0, 0.0, circles.height};
@@ -99,7 +103,7 @@ struct Near {
         distance = length(way);
         slope = dot(way, along);
         const double turning = dot(along, round);
-        bend = dot(along, along) - circles.radius / side * turning * turning - dot(way, out);
+        bend = dot(along, along) - circles.radius / side * turning * turning - dot(way, outwards);
     }
 };
 
@@ -140,37 +144,98 @@ void prefer(Way& best, const Pair& pair, const Near& near, double up) {
     }
 }
 
+// Three numbers of four each.
+struct FourVectors {
+    Four x, y, z;
+};
+
+inline FourVectors operator+(FourVectors a, FourVectors b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline FourVectors operator-(FourVectors a, FourVectors b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline FourVectors operator*(Four s, Vec3 v) { return {s * v.x, s * v.y, s * v.z}; }
+inline Four dot(FourVectors a, FourVectors b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+// Four arcs, with the directions of their middles and how far no end is from these.
+struct FourArcs {
+    Four from_x, from_y, to_x, to_y;
+    Four middle_x, middle_y, angle;
+
+    explicit FourArcs(const Arc* arcs)
+        : from_x(load<Four>(&arcs[0])), from_y(load<Four>(&arcs[1])), to_x(load<Four>(&arcs[2])), to_y(load<Four>(&arcs[3])) {
+        transpose(from_x, from_y, to_x, to_y);
+        const Four chord_x = to_x - from_x, chord_y = to_y - from_y, size = root_of(chord_x * chord_x + chord_y * chord_y), half = 0.5 * size;
+        middle_x = chord_y / size;
+        middle_y = -chord_x / size;
+        angle = half * (1.0 + 0.58 * half * half);  // above the inverse of its sine
+    }
+    Point middle(int which) const { return {middle_x[which], middle_y[which]}; }
+    Arc first_half(int which) const { return {{from_x[which], from_y[which]}, middle(which)}; }
+    Arc second_half(int which) const { return {middle(which), {to_x[which], to_y[which]}}; }
+};
+
+// Of four arcs which may hold shortest ways, and of these which hold one at most; bit by bit.
+struct Minima {
+    unsigned perhaps, at_most_one;
+};
+
+// What the middles of four arcs tell of the shortest ways, shorter than a limit, that start there.
+//
+// Of half the squared distance, derivatives that a middle does not tell are bounded: side >= the least there is, turning by the
+// radius, and the product of turning and its derivative by half of the square.  A way out leads out of both volumes.
+Minima minima_on(const Circles& circles, const FourArcs& arcs, double limit) {
+    const FourVectors out_of_axis = arcs.middle_x * circles.rising + arcs.middle_y * circles.level;
+    const FourVectors along = arcs.middle_x * circles.level - arcs.middle_y * circles.rising;
+    const FourVectors p = Four{1.0, 1.0, 1.0, 1.0} * circles.middle + out_of_axis;
+    const Four none{}, p_side = root_of(p.x * p.x + p.y * p.y), x = p.x / p_side, y = p.y / p_side;
+    const FourVectors way = {p.x - circles.radius * x, p.y - circles.radius * y, p.z - circles.height};
+    const Four distance = root_of(dot(way, way)), out = dot(way, out_of_axis);
+    const Four beyond = way.x * circles.out_of_end.x + way.y * circles.out_of_end.y + way.z * circles.out_of_end.z;
+    const Four slope = absolute_of(dot(way, along)), turning = along.y * x - along.x * y;
+    const Four bend = dot(along, along) - circles.radius / p_side * turning * turning - out;
+
+    const double other = circles.other_radius, square = other * other;
+    const Four angle = arcs.angle, far = other * angle, side = p_side - far, far_off = other * (distance + far);
+    const Four tight = circles.radius / side;
+    const Four change = angle * (tight * square * (1.5 + 1.155 * other / side) + far_off);
+    const Four least_square = distance * distance - angle * (2.0 * slope + angle * most_of(change - bend, none));
+    unsigned ruled_out = less(angle * (square * most_of(tight - 1.0, none + 1.0) + far_off), slope);
+    ruled_out |= less(out + angle * (0.5 * square * tight + far_off), none);
+    ruled_out |= less(beyond + angle * tight * (other * circles.sine), none);
+    ruled_out |= less(bend + change, none) | less(angle * (absolute_of(bend) + 0.5 * change), slope);
+    ruled_out |= less(none + limit * limit, least_square);
+    ruled_out &= less(none, side);
+    ruled_out |= less(none + limit, distance - far) | less(none + circles.radius, side);
+    const unsigned at_most_one = less(change, bend) & less(none, side) & ~ruled_out;
+    return {~ruled_out & ~at_most_one & 0xfu, at_most_one};
+}
+
 // Of the arcs of the other circle that are below the first; false if they are too many.
 bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up) {
-    const double other = pair.other_radius, rise = circles.rising.z, above = circles.height - circles.middle.z;
+    const double rise = circles.rising.z, above = circles.height - circles.middle.z;
     const double high = clamp(above / rise, -1.0, 1.0), low = clamp((above - best.reach) / rise, -1.0, 1.0);
     if (!(low < high)) return true;
-    const double beside_high = std::sqrt(1.0 - high * high), beside_low = std::sqrt(1.0 - low * low);
-    Arc stack[most_arcs] = {{{high, beside_high}, {low, beside_low}}, {{low, -beside_low}, {high, -beside_high}}};
-    int waiting = 2;
+    const Point from = {high, std::sqrt(1.0 - high * high)}, to = {low, std::sqrt(1.0 - low * low)};
+    const Point middle = normalized({to.y - from.y, high - low});
+    const auto mirrored = [](Point point) { return Point{point.x, -point.y}; };
+    Arc stack[most_arcs] = {{from, middle}, {middle, to}, {mirrored(to), mirrored(middle)}, {mirrored(middle), mirrored(from)}};
+    int waiting = 4;
     for (int step = 0; step < most_steps; ++step) {
         if (waiting == 0) return true;
-        const Arc arc = stack[--waiting];
-        const Point chord = arc.to - arc.from, middle = normalized({chord.y, -chord.x});
-        // No end is farther from the middle than this angle, nor its point than `far`.
-        const double half = 0.5 * std::sqrt(dot(chord, chord)), angle = half * (1.0 + 0.58 * half * half), far = other * angle;
-        Near near(circles, middle);
-        const double side = near.side - far;
-        if (near.distance - far >= best.reach - tie || side >= circles.radius) continue;
-        if (side > 0.0) {
-            // Bounds of the second and third derivative.
-            const double tight = circles.radius / side, square = other * other, distance = near.distance + far;
-            if (std::fabs(near.slope) > angle * (square * most(1.0, tight - 1.0) + other * distance)) continue;
-            const double change = angle * (3.0 * tight * square * (1.0 + other / side) + other * distance);
-            if (near.bend < -change) continue;
-            if (near.bend > change) {
-                if (descend(circles, middle, angle, near)) prefer(best, pair, near, up);
-                continue;
-            }
+        const int taken = waiting < 4 ? waiting : 4;
+        waiting -= taken;
+        const FourArcs arcs(stack + waiting);
+        const unsigned all = (1u << taken) - 1u;
+        const auto [perhaps, at_most_one] = minima_on(circles, arcs, best.reach - tie);
+        for (unsigned left = at_most_one & all; left != 0; left &= left - 1) {
+            const int which = std::countr_zero(left);
+            Near near(circles, arcs.middle(which));
+            if (descend(circles, arcs.middle(which), arcs.angle[which], near)) prefer(best, pair, near, up);
         }
-        if (waiting + 2 > most_arcs) return false;
-        stack[waiting++] = {arc.from, middle};
-        stack[waiting++] = {middle, arc.to};
+        if (waiting + 8 > most_arcs) return false;
+        for (unsigned left = perhaps & all; left != 0; left &= left - 1) {
+            const int which = std::countr_zero(left);
+            stack[waiting++] = arcs.first_half(which);
+            stack[waiting++] = arcs.second_half(which);
+        }
     }
     return false;
 }
@@ -186,7 +251,8 @@ bool prefer_where_they_meet(Way& best, const Pair& pair) {
             // The first's rim must come below the other's end, too, by less than the shortest way.
             const double off = turn * dot(Vec3{0.0, 0.0, pair.height} - shift, axis), swing = pair.radius * pair.sine;
             if (off - swing > pair.other_height || off + swing < pair.other_height - best.reach) continue;
-            const Circles circles = {pair.radius, pair.height, middle, pair.other_radius * rising, pair.other_radius * level};
+            const double other = pair.other_radius;
+            const Circles circles = {pair.radius, pair.height, other, middle, other * rising, other * level, turn * axis, pair.sine};
             if (!prefer_along(best, pair, circles, up)) return false;
         }
     }
@@ -216,10 +282,14 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     if (prefer_square_to(best, b, a, axis, shift)) best.direction = into(a.rotation, out_of(b.rotation, best.direction));
     if (best.reach <= 0.0) return best.reach;
     Touch found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
+    const double known = best.reach, bound = least_way_out(a, b, found, known);
+    if (bound >= known - tie) {
+        touch = found;
+        return known;
+    }
     Difference difference(a, b);
-    const double gap = known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
+    const double gap = bound > 0.0 || known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
     if (gap > 0.0) return -gap;
-    const double known = best.reach;
     if (leans && !rims::prefer_where_they_meet(best, {d, c, a.half.x, a.half.y, b.half.x, b.half.y, sine})) best = way_out(difference, best);
     if (best.reach < known) found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
     touch = found;

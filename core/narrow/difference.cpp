@@ -119,11 +119,30 @@ bool holds(const Volume& v, Vec3 point) {
     return p.x * p.x + p.y * p.y < half.x * half.x && std::fabs(p.z) < half.y;
 }
 
+// How far inside a point is: the radius of the largest ball about it; below 0 outside.
+double inside(const Volume& v, Vec3 point) {
+    const Vec3 p = absolute(into(v.rotation, point - v.center)), half = v.half;
+    if (v.kind == Kind::box) return least(least(half.x - p.x, half.y - p.y), half.z - p.z);
+    return least(half.x - std::sqrt(p.x * p.x + p.y * p.y), half.y - p.z);
+}
+
 }  // namespace core_support
 
 bool known_to_meet(const Volume& a, const Volume& b, Vec3 point) {
     using core_support::holds;
     return (holds(a, point) && holds(b, point)) || holds(a, b.center) || holds(b, a.center);
+}
+
+// With balls of radii r in one and s in the other about the same point, the difference holds a ball of r + s about the origin.  Where
+// a vertex of one sinks into a face of the other, or two edges cross, that about one of the deepest points is the best there is.
+double least_way_out(const Volume& a, const Volume& b, const Touch& way, double length) {
+    double bound = 0.0;
+    for (const double along : {0.0, 0.5, -0.5}) {
+        const Vec3 point = way.point + along * length * way.normal;
+        const double in_a = core_support::inside(a, point), in_b = core_support::inside(b, point);
+        if (in_a > -touching && in_b > -touching) bound = most(bound, in_a + in_b);
+    }
+    return bound;
 }
 
 Difference::Difference(const Volume& a, const Volume& b) : first(a), second(b), shift(into(a.rotation, b.center - a.center)) {

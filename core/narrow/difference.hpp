@@ -33,6 +33,9 @@ struct Difference {
 // Whether a point, or the centre of one, is inside both; of boxes and cylinders.
 bool known_to_meet(const Volume& a, const Volume& b, Vec3 point);
 
+// A lower bound of how far two cylinders or boxes must move to part, as a way out of known length tells; 0 if it tells nothing.
+double least_way_out(const Volume& a, const Volume& b, const Touch& way, double length);
+
 struct Nearest {
     double distance;
     Vec3 point;

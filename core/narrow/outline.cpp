@@ -54,25 +54,37 @@ inline Point across_chord(const Arc& arc) {
 
 inline bool inside(const Arc& arc, Point n) { return cross(arc.from.n, n) > 0.0 && cross(n, arc.to.n) > 0.0; }
 
-// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does).
-void descend(const Disc& disc, Point corner, Arc arc, Exit& best) {
-    Support here = support(disc, corner, across_chord(arc));
+// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does; halved where that is slow).
+//
+// Along n = start + t aside, not made a unit, the disc reaches radius * swing, where swing^2 = lean n.n + u^2 and u = axis x n = w + v t.
+// The slope times a power of n's length is then across - along t + radius * u (v - w t) / swing.
+void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
+    const Point start = across_chord(arc), aside = {-start.y, start.x};
+    const double w = cross(disc.axis, start), v = cross(disc.axis, aside), along = dot(corner, start), across = dot(corner, aside);
+    // No arc is more than a quarter turn, so that its ends are in front of the start but for rounding.
+    const auto tangent = [start](Point n) { return cross(start, n) / most(dot(start, n), flat); };
+    double low = tangent(arc.from.n), high = tangent(arc.to.n), last = high - low, t = 0.0;
     for (int step = 0; step < most_steps; ++step) {
-        (here.slope < 0.0 ? arc.from : arc.to) = here;
-        const double rise = here.radius - here.reach, turn = rise > 0.0 ? -here.slope / rise : 1.0;
+        const double u = w + v * t, turned = v - w * t, per_swing = 1.0 / std::sqrt(disc.lean * (1.0 + t * t) + u * u);
+        const double slope = across - along * t + disc.radius * per_swing * (u * turned);
+        const double grown = (v * u + disc.lean * t) * per_swing * per_swing;
+        const double rise = disc.radius * per_swing * (v * turned - w * u - u * turned * grown) - along;
+        (slope < 0.0 ? low : high) = t;
+        const double turn = rise > 0.0 ? -slope / rise : high - low;
         if (std::fabs(turn) < settled) break;
-        Point next = std::fabs(turn) < 0.5 ? normalized(here.n + turn * Point{-here.n.y, here.n.x}) : across_chord(arc);
-        if (!inside(arc, next)) next = across_chord(arc);
-        if (!inside(arc, next)) break;
-        here = support(disc, corner, next);
+        const bool fast = std::fabs(turn) <= 0.5 * last && t + turn > low && t + turn < high;
+        const double next = fast ? t + turn : 0.5 * (low + high);
+        last = std::fabs(next - t);
+        t = next;
     }
-    if (here.reach < best.reach - tie) best = {here.reach, here.n};
+    const Support found = support(disc, corner, normalized(start + t * aside));
+    if (found.reach < best.reach - tie) best = {found.reach, found.n};
 }
 
-// The smooth minima between two directions, less than half a turn apart against the clock; the outline is the disc's about a corner.
-void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit& best) {
+// The smooth minima along an arc of a quarter turn at most; the outline is the disc's about a corner.
+void improve_between(const Disc& disc, Point corner, const Arc& whole, Exit& best) {
     Arc stack[most_arcs];
-    stack[0] = {support(disc, corner, from), support(disc, corner, to)};
+    stack[0] = whole;
     int waiting = 1;
     for (int step = 0; step < most_steps && waiting > 0; ++step) {
         const Arc arc = stack[--waiting];
@@ -90,17 +102,26 @@ void improve_between(const Disc& disc, Point corner, Point from, Point to, Exit&
     }
 }
 
-// Between two kinks, and opposite to that: `swell` is the disc's outline there, about a corner.
-inline void improve_part(const Disc& disc, Point shift, Point corner, Point from, Point to, Point swell_from, Point swell_to, Exit& best) {
-    const Point first = corner + swell_from, chord = swell_to - swell_from;
-    const double reach = dot(from, first), off = dot(from, shift);
+// The support opposite or not, `side` -1 or 1, moved.
+inline Support placed(const Support& own, double side, Point by) {
+    const Point n = side * own.n, point = side * own.point + by;
+    return {n, point, dot(n, point), cross(n, point), own.radius};
+}
+
+// Between two kinks, and opposite to that, with the disc's own outline about a corner.
+inline void improve_part(const Disc& disc, Point shift, Point corner, const Support& from, const Support& to, Exit& best) {
+    const Point first = corner + from.point, chord = to.point - from.point;
+    const double reach = dot(from.n, first), off = dot(from.n, shift);
     const double area = cross(first, chord), aside = cross(shift, chord), square = dot(chord, chord);
     // Cheaper than to tell the two sides apart where, mostly, neither can be shorter.
     const double limit = least(best.reach, reach - std::fabs(off)) - tie, lower = area - std::fabs(aside);
     if (reach - std::fabs(off) >= best.reach - tie && lower > 0.0 && lower * lower >= limit * limit * square) return;
+    const double far = std::sqrt(square);
     for (const double side : {1.0, -1.0}) {
-        if (reach + side * off < best.reach - tie) best = {reach + side * off, side * from};
-        improve_between(disc, shift + side * corner, side * from, side * to, best);
+        if (reach + side * off < best.reach - tie) best = {reach + side * off, side * from.n};
+        if (area + side * aside >= (best.reach - tie) * far) continue;
+        const Point center = shift + side * corner;
+        improve_between(disc, center, {placed(from, side, center), placed(to, side, center)}, best);
     }
 }
 
@@ -118,13 +139,13 @@ void improve_around(const Disc& seen, Point shift, Point half, Exit& best) {
     disc.axis = {std::fabs(seen.axis.x), std::fabs(seen.axis.y)};
     disc.end = {std::fabs(seen.end.x), std::fabs(seen.end.y)};
     shift.x *= mirror;
-    const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x;
-    const Point out_x = support(disc, {0.0, 0.0}, x).point, out_y = support(disc, {0.0, 0.0}, y).point;
-    const Point out_square = (disc.radius + disc.ball) * square, end = disc.end;
+    const Point x = {1.0, 0.0}, y = {0.0, 1.0}, square = leans ? (1.0 / size) * beside(disc) : -x, end = disc.end;
+    const Support at_x = support(disc, {0.0, 0.0}, x), at_y = support(disc, {0.0, 0.0}, y);
+    const Support at_square = {square, (disc.radius + disc.ball) * square, 0.0, 0.0, disc.radius * disc.lean + disc.ball};
     Exit found = best;
-    improve_part(disc, shift, half + end, x, y, out_x, out_y, found);
-    improve_part(disc, shift, Point{-half.x, half.y} + end, y, square, out_y, out_square, found);
-    improve_part(disc, shift, Point{-half.x, half.y} - end, square, -x, out_square, -out_x, found);
+    improve_part(disc, shift, half + end, at_x, at_y, found);
+    improve_part(disc, shift, Point{-half.x, half.y} + end, at_y, at_square, found);
+    improve_part(disc, shift, Point{-half.x, half.y} - end, at_square, placed(at_x, -1.0, {0.0, 0.0}), found);
     if (found.reach < best.reach) best = {found.reach, {mirror * found.n.x, found.n.y}};
 }
 

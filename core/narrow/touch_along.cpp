@@ -68,36 +68,49 @@ int of_cap(const Volume& v, double z, const Plane& plane, Vec3 center, Point* ou
     return cap_corners;
 }
 
-// Write the corners, in order round the feature that is farthest along n; how many.  The centre is seen from the plane's origin.
-int corners(const Volume& v, Vec3 way, const Plane& plane, Vec3 center, Point* out) {
-    const Vec3 n = into(v.rotation, way);
-    if (v.kind == Kind::convex) return of_hull(v, n, plane, center, out);
-    // A point and up to two half edges across the direction, or a cap.
+// What of a volume is farthest along a direction, in its own axes: a point and up to two half edges across the direction, or a cap.
+struct Feature {
+    Vec3 n;  // the direction
     Vec3 point, edge;
+    int count;  // of corners; 0: see `of_hull`
+};
+
+Feature feature_of(const Volume& v, Vec3 way) {
+    const Vec3 n = into(v.rotation, way);
+    Feature found = {n, {}, {}, 1};
+    if (v.kind == Kind::convex) return {n, {}, {}, 0};
     if (v.kind == Kind::box) {
-        point = {end(n.x, v.half.x), end(n.y, v.half.y), end(n.z, v.half.z)};
-        edge = v.half - absolute(point);
+        found.point = {end(n.x, v.half.x), end(n.y, v.half.y), end(n.z, v.half.z)};
+        found.edge = v.half - absolute(found.point);
     } else if (v.kind != Kind::sphere) {
-        point.z = end(n.z, v.half.y);
-        edge.z = v.half.y - std::fabs(point.z);
+        found.point.z = end(n.z, v.half.y);
+        found.edge.z = v.half.y - std::fabs(found.point.z);
         if (v.kind == Kind::cylinder) {
             const double side = std::sqrt(n.x * n.x + n.y * n.y);
-            if (side < aligned) return of_cap(v, point.z, plane, center, out);
-            point.x = v.half.x * n.x / side;
-            point.y = v.half.x * n.y / side;
+            if (side < aligned) return {n, found.point, {}, cap_corners};
+            found.point.x = v.half.x * n.x / side;
+            found.point.y = v.half.x * n.y / side;
         }
     }
-    const int edges = (edge.x > 0.0) + (edge.y > 0.0) + (edge.z > 0.0);
-    const int count = edges == 0 ? 1 : edges == 1 ? 2 : 4;
+    const int edges = (found.edge.x > 0.0) + (found.edge.y > 0.0) + (found.edge.z > 0.0);
+    found.count = edges == 0 ? 1 : edges == 1 ? 2 : 4;
+    return found;
+}
+
+// Write the corners of a feature, in order round it; how many.  The centre is seen from the plane's origin.
+int corners(const Volume& v, const Feature& feature, const Plane& plane, Vec3 center, Point* out) {
+    const Vec3 point = feature.point, edge = feature.edge;
+    if (feature.count == 0) return of_hull(v, feature.n, plane, center, out);
+    if (feature.count == cap_corners) return of_cap(v, point.z, plane, center, out);
     // Round a square; a single edge takes two corners that differ in both signs.
     constexpr double round[4][2] = {{1.0, 1.0}, {-1.0, 1.0}, {-1.0, -1.0}, {1.0, -1.0}};
-    for (int k = 0; k < count; ++k) {
-        const double one = round[k][0], two = edges == 1 ? one : round[k][1];
+    for (int k = 0; k < feature.count; ++k) {
+        const double one = round[k][0], two = feature.count == 2 ? one : round[k][1];
         const Vec3 corner = edge.x > 0.0 ? Vec3{point.x + one * edge.x, point.y + two * edge.y, point.z + two * edge.z}
                                          : Vec3{point.x, point.y + one * edge.y, point.z + two * edge.z};
         out[k] = plane.seen(center + out_of(v.rotation, corner));
     }
-    return count;
+    return feature.count;
 }
 
 // How far a volume reaches along a unit direction of the root frame, from its centre.
@@ -226,9 +239,16 @@ int cut(const Point* points, int count, Point on, Point inward, Point* out, int 
     return kept;
 }
 
-Touch touch_along(const Volume& a, const Volume& b, Vec3 normal, double depth) {
-    const feature::Plane plane(normal);
-    const int room = feature::most_points(a) + feature::most_points(b);
+namespace feature {
+
+// The middle of what the features of two volumes share; the second's centre is the plane's origin.
+Point shared(const Volume& a, const Volume& b, const Plane& plane) {
+    const Vec3 center = a.center - b.center;
+    const Feature of_a = feature_of(a, -plane.normal), of_b = feature_of(b, plane.normal);
+    // Mostly one of them is a vertex, and then it is there.
+    if (of_a.count == 1 && of_b.count > 1) return plane.seen(center + out_of(a.rotation, of_a.point));
+    if (of_b.count == 1 && of_a.count > 1) return plane.seen(Vec3{} + out_of(b.rotation, of_b.point));
+    const int room = most_points(a) + most_points(b);
     constexpr int here = 3 * 64;
     Point few[here];
     Array<Point> many;
@@ -238,9 +258,15 @@ Touch touch_along(const Volume& a, const Volume& b, Vec3 normal, double depth) {
         memory = many.data();
     }
     Point *one = memory, *two = one + room, *spare = two + room;
-    const int ones = feature::corners(a, -normal, plane, a.center - b.center, one);
-    const int twos = feature::corners(b, normal, plane, Vec3{}, two);
-    const Point at = polygon::shared(one, ones, two, twos, spare, room);
+    const int ones = corners(a, of_a, plane, center, one), twos = corners(b, of_b, plane, Vec3{}, two);
+    return polygon::shared(one, ones, two, twos, spare, room);
+}
+
+}  // namespace feature
+
+Touch touch_along(const Volume& a, const Volume& b, Vec3 normal, double depth) {
+    const feature::Plane plane(normal);
+    const Point at = feature::shared(a, b, plane);
     const double height = feature::reach(b, normal) - depth / 2.0;
     return {normal, b.center + at.x * plane.t + at.y * plane.u + height * normal};
 }

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee._core.narrow import KINDS
+from mobee.kinematics.quaternion import to_matrix
 from tests.mobee.engine.narrow.solids import (
     coal_distance,
     distance,
@@ -16,6 +17,7 @@ from tests.mobee.engine.narrow.solids import (
     random_solid,
     random_turn,
     sampled_depth,
+    solid,
 )
 
 PAIRS = list(itertools.product(KINDS, KINDS))
@@ -51,6 +53,28 @@ def test_no_direction_separates_sooner(first, second, seed):
     assert depth <= max(bound, 0.0) + 1e-8
     if bound < 0.0:
         assert depth <= 0.0
+
+
+@pytest.mark.parametrize("second", ["capsule", "cylinder", "box"])
+@settings(max_examples=60)
+@given(seed=SEEDS)
+def test_no_direction_separates_plates_and_rods_sooner(second, seed):
+    rng = np.random.default_rng(seed)
+
+    def any_size(kind, turn):
+        return solid(kind, 10.0 ** rng.uniform(-2.5, -0.5, 3 if kind == "box" else 2), rng.uniform(-0.03, 0.03, 3), turn)
+
+    turn = random_turn(rng)
+    tilt = to_matrix(np.append(1.0, rng.normal(size=3) * 10.0 ** rng.uniform(-8.0, 0.0)))  # often nearly parallel
+    a, b = any_size("cylinder", turn), any_size(second, tilt @ turn)
+    assert overlap(a, b).depth <= max(sampled_depth(a, b, rng), 0.0) + 1e-8
+
+
+def test_steps_of_newton_that_circle_about_a_way_out_are_ended():
+    turn = [[0.91465762, 0.05816297, 0.40002313], [0.40415949, -0.14999197, -0.90230678], [0.00751942, 0.98697491, -0.16069842]]
+    other = [[-0.43426384, -0.31458822, 0.84406704], [0.88412026, -0.32826686, 0.33252403], [0.1724711, 0.89065994, 0.42068824]]
+    plate = solid("cylinder", [0.0036134, 0.00143178], [0.01798722, 0.01103023, 0.00796064], np.array(other))
+    assert overlap(solid("cylinder", [0.02337641, 0.03301569], rotation=np.array(turn)), plate).depth == pytest.approx(0.00281139, abs=1e-7)
 
 
 @pytest.mark.parametrize(("first", "second"), SORTED)
