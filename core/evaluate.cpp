@@ -1,9 +1,8 @@
 // The contacts of many poses at once.  One pose is a batch of one, and threads share a batch in blocks: all give the same bits.
-#include <pthread.h>
-
 #include "contacts.hpp"
 #include "interface.hpp"
 #include "rows.hpp"
+#include "threads.hpp"
 
 namespace mobee {
 
@@ -84,35 +83,6 @@ void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& w
     }
 }
 
-struct Block {
-    const Request* request;
-    std::int64_t begin, end;
-    Worker* worker;
-    pthread_t thread;
-    bool apart;  // in a thread of its own
-};
-
-void* run_block(void* given) {
-    const Block& block = *static_cast<Block*>(given);
-    run(*block.request, block.begin, block.end, *block.worker);
-    return nullptr;
-}
-
-void run_all(Room& room, const Request& request, std::int64_t threads) {
-    Array<Block> blocks(threads);
-    for (std::int64_t k = 0; k < threads; ++k) {
-        Block& block = blocks[k];
-        block = {&request, request.poses * k / threads, request.poses * (k + 1) / threads, room.workers[k], {}, false};
-        if (k > 0) block.apart = pthread_create(&block.thread, nullptr, run_block, &block) == 0;
-    }
-    for (Block& block : blocks) {  // the first, and those for which the system has no thread
-        if (!block.apart) run_block(&block);
-    }
-    for (Block& block : blocks) {
-        if (block.apart) pthread_join(block.thread, nullptr);
-    }
-}
-
 }  // namespace evaluation
 
 MOBEE_CALL Room* mobee_room_new() { return make<Room>(); }
@@ -135,11 +105,9 @@ MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     const std::int64_t threads = request->threads < most_threads ? request->threads : most_threads;
     room->make_workers(threads);
     for (Worker* worker : room->workers) worker->rows.size = 0;
-    if (threads == 1) {
-        evaluation::run(*request, 0, request->poses, *room->workers[0]);
-    } else {
-        evaluation::run_all(*room, *request, threads);
-    }
+    share(threads, 1, threads, [&](std::int64_t, std::int64_t k, std::int64_t) {
+        evaluation::run(*request, request->poses * k / threads, request->poses * (k + 1) / threads, *room->workers[k]);
+    });
     std::size_t rows = 0;
     for (const Worker* worker : room->workers) rows += worker->rows.size;
     return static_cast<std::int64_t>(rows);

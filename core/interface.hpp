@@ -12,6 +12,6 @@
 namespace mobee {
 
 // Raise it when a function changes its arguments or its meaning, and with it ABI in mobee/_core/__init__.py.
-constexpr std::int64_t abi = 1;
+constexpr std::int64_t abi = 2;
 
 }  // namespace mobee

@@ -36,7 +36,7 @@ BYTES = ctypes.c_char_p
 
 _NOTHING: Any = ctypes.c_char * 0
 
-ABI = 1
+ABI = 2
 """What `mobee_abi` of a library must say that these declarations belong to; see core/interface.hpp."""
 
 FORCED = "MOBEE_CORE"
