@@ -64,6 +64,11 @@ def test_what_was_learned_offline_is_planned_with(tmp_path: Path) -> None:
     assert planned.startswith("torso, by 300 transitions: from state 0 to 26 by ")
 
 
+def test_an_explorer_of_the_reader_explores(tmp_path: Path) -> None:
+    (flow,) = blocks("docs/agents.md", tmp_path)
+    assert run(tmp_path, "-c", flow) == "my_explorers:stubborn 20\n"
+
+
 def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
     flow, _ = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
