@@ -127,7 +127,7 @@ def test_an_explorer_of_ones_own_is_asked_and_recorded_by_where_it_is_defined():
         (lambda agent, state, rng: np.zeros(3), r"give a score for each action, shape \(16,\)"),
         (lambda agent, state, rng: np.full(16, np.nan), "give a score for each action"),
     ],
-    ids=str,
+    ids=["no name", "no module", "no function", "no function at all", "wrong shape", "no numbers"],
 )
 def test_an_explorer_that_does_not_serve_is_refused(explorer, said):
     space = arm()
