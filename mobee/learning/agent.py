@@ -7,6 +7,7 @@ from typing import Any
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.decider import Decider
 from mobee.learning.exploit import Goal
+from mobee.learning.explorable import Explorer
 from mobee.learning.space import Space
 from mobee.plant import Described, Outcome, Plant
 from mobee.robot.robot import Array
@@ -22,7 +23,8 @@ class CuriousAgent(Decider):
     Args:
         space: states and actions of one part.
         plant: through which it acts; its robot must be the space's.
-        explorer: a name in `mobee.learning.explorers.EXPLORERS`: "curious", "random", "least_tried", ...
+        explorer: a name in `mobee.learning.explorers.EXPLORERS`, "curious", "random", "least_tried", ...; or your own, see `Explorer`:
+            a function, or `module:name` of one that can be imported.
         seed: decides ties; agents of different parts draw differently under the same seed.
         discount: of future rewards in the plan.
         initial: what actions are imagined to do before they are tried, "50-50" or "60-40".
@@ -46,7 +48,7 @@ class CuriousAgent(Decider):
         self,
         space: Space,
         plant: Plant,
-        explorer: str = "curious",
+        explorer: str | Explorer = "curious",
         seed: int = 0,
         discount: float = 0.9,
         initial: str = "50-50",

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from mobee.errors import UnknownName
+import numpy as np
+
+from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.draws import Draws
 from mobee.learning.exploit import Goal, pursued
+from mobee.learning.explorable import Explorer
 from mobee.learning.explorers import EXPLORERS, choose
+from mobee.learning.named import named
 from mobee.learning.plans import Plans
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
@@ -27,7 +31,7 @@ class Decider:
     def __init__(
         self,
         space: Space,
-        explorer: str,
+        explorer: str | Explorer,
         seed: int,
         discount: float,
         initial: str,
@@ -39,10 +43,10 @@ class Decider:
         goal: Goal | None,
         goal_weight: float | None,
     ) -> None:
-        for what, name, valid in (("explorer", explorer, EXPLORERS), ("beliefs", beliefs, BELIEFS)):
-            if name not in valid:
-                raise UnknownName(what, name, valid)
-        self.space, self.part, self.explorer = space, space.part, explorer
+        if beliefs not in BELIEFS:
+            raise UnknownName("beliefs", beliefs, BELIEFS)
+        self.space, self.part = space, space.part
+        self.explorer, self._score = named("explorer", explorer, EXPLORERS)
         self.seed, self.discount = seed, discount
         self.model = TransitionModel(space, initial, divergence, forgetting)
         self.beliefs: OutcomeModel = self.model.debiased() if beliefs == "debiased" else self.model
@@ -52,9 +56,9 @@ class Decider:
         self.last: Transition | None = None
         """The newest transition."""
         self._believes = beliefs
-        self._external = pursued(space, goal, goal_weight, explorer)
+        self._external = pursued(space, goal, goal_weight, self.explorer)
         self._plans = Plans(discount, tolerance, relative)
-        self._score, self._draws = EXPLORERS[explorer], Draws(space.part)
+        self._draws = Draws(space.part)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -87,7 +91,18 @@ class Decider:
 
     def _choose(self, state: int) -> int:
         draws = self._draws.at(self.seed, self.transitions)
-        return choose(self._score(self, state, draws), draws)
+        scores = self._score(self, state, draws)
+        if self.explorer not in EXPLORERS:
+            self._require_scores(scores, state)
+        return choose(scores, draws)
+
+    def _require_scores(self, scores: Array, state: int) -> None:
+        """Raise InvalidValue unless an explorer from outside gives a number for each action of the state."""
+        actions = len(self.space.actions(state))
+        if np.shape(scores) != (actions,) or np.isnan(scores).any():
+            raise InvalidValue(
+                f"explorer {self.explorer!r} gave {scores!r} in state {state}: give a score for each action, shape ({actions},)."
+            )
 
     def _learn(self, transition: Transition) -> None:
         self.model.observe(transition.s, transition.a, transition.s_next)

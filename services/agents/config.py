@@ -7,7 +7,9 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from mobee.errors import InvalidValue
+from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
+from mobee.learning.named import require_name
 from mobee.learning.space import MAX_STATES
 from mobee.reach import RADIUS
 from mobee.robot.robot import Robot
@@ -15,7 +17,6 @@ from services.common.config import ServiceConfig
 from services.common.hands import hand_of, moved_markers
 
 ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
-Explorer = Literal["curious", "random", "least_tried", "nearest_untried", "count_bonus", "posterior_sampling", "depleting"]
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
@@ -31,8 +32,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """How many nearest states it can go to; 0: the published 8 of the torso, 16 of an arm."""
     tie_seed: int = 0
     """Seed of the draw among equally near neighbours."""
-    explorer: Explorer = "curious"
-    """How it chooses."""
+    explorer: str = "curious"
+    """How it chooses: a name of the library, or `module:name` of your own."""
     discount: Annotated[float, Meta(ge=0, lt=1)] = 0.9
     """Of future rewards."""
     initial: Literal["50-50", "60-40"] = "50-50"
@@ -73,8 +74,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """End after so many problem-tries in all; 0: go on for ever."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: the part must span a state space, and have a marker to reach with if there are targets."""
+        """As ServiceConfig: the part must span a state space, have a marker to reach with if there are targets, and what is named exist."""
         super().check_robot(robot)
+        require_name("explorer", self.explorer, EXPLORERS)
         if not self.learned:  # else the space is that of the record
             self.space(robot)
         if not self.targets:

@@ -13,7 +13,7 @@ import pytest
 from experiments.launched import stop
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page: str, folder: Path) -> list[str]:
@@ -62,6 +62,11 @@ def test_what_was_learned_offline_is_planned_with(tmp_path: Path) -> None:
     run(tmp_path, "-c", flow)
     planned = run(tmp_path, "-m", "mobee_cli", "plan", "--run", ".", "--from", "0", "--to", "26")
     assert planned.startswith("torso, by 300 transitions: from state 0 to 26 by ")
+
+
+def test_an_explorer_of_the_reader_explores(tmp_path: Path) -> None:
+    (flow,) = blocks("docs/agents.md", tmp_path)
+    assert run(tmp_path, "-c", flow) == "my_explorers:stubborn 20\n"
 
 
 def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
@@ -130,15 +135,42 @@ def wait_for_router(endpoint: str, folder: Path) -> None:
         time.sleep(0.2)
 
 
+def anchors(page: Path) -> set[str]:
+    """The headings of a page, as links name them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
-def test_links_lead_to_files_of_the_project(page: Path) -> None:
-    targets = re.findall(r"\]\((?!https?://)([^)#]+)\)", page.read_text())
-    assert [target for target in targets if not (page.parent / target).exists()] == []
+def test_links_lead_to_files_and_headings_of_the_project(page: Path) -> None:
+    wrong = []
+    for target, _, heading in (link.partition("#") for link in re.findall(r"\]\((?!https?://)([^)]+)\)", page.read_text())):
+        path = page.parent / target if target else page
+        if not path.exists() or (heading and heading not in anchors(path)):
+            wrong.append(f"{target}#{heading}")
+    assert wrong == []
 
 
-def test_the_readme_names_every_command_and_no_other() -> None:
-    named = set(re.findall(r"mobee (\w+)", " ".join(re.findall(r"`([^`]+)`", (ROOT / "README.md").read_text()))))
+def test_the_index_names_every_page() -> None:
+    index = (ROOT / "docs/index.md").read_text()
+    assert [page.name for page in (ROOT / "docs").glob("*.md") if page.name != "index.md" and f"({page.name}" not in index] == []
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 150
+
+
+def test_the_page_of_commands_names_every_command_and_no_other() -> None:
+    page = (ROOT / "docs/commands.md").read_text()
     told = subprocess.run([sys.executable, "-m", "mobee_cli", "--help"], capture_output=True, text=True).stdout
     verbs = set(re.findall(r"^  (\w+) ", told, re.MULTILINE))
+    named = set(re.findall(r"`mobee ([a-z]+)", page + (ROOT / "README.md").read_text()))
     assert named <= verbs
-    assert [verb for verb in verbs if not re.search(rf"`(mobee )?{verb}\b", (ROOT / "README.md").read_text())] == []
+    assert [verb for verb in verbs if not re.search(rf"`(mobee )?{verb}\b", page)] == []
+
+
+def test_the_keys_in_the_diagram_of_the_architecture_are_those_of_the_bus() -> None:
+    diagram = re.findall(r"^```\n(.*?)^```$", (ROOT / "docs/architecture.md").read_text(), re.DOTALL | re.MULTILINE)[0]
+    keys = set(re.findall(r"[\w{}]+/[\w{}/]+", diagram)) | {"tick", "commands"}
+    bus = (ROOT / "docs/bus.md").read_text().replace("<", "{").replace(">", "}")
+    assert {key for key in keys if f"`{key}`" not in bus and f"`{key.rpartition('/')[0]}/" not in bus} == set()

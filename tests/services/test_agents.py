@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +17,10 @@ from bus_schema import encoding_of, keys
 from bus_schema.messages import Clock, Event, Motion, Transition
 from bus_schema.rpc import Done, Empty, Goal
 from mobee import Lattice, load_robot
-from mobee.learning.explorers import EXPLORERS
+from mobee.errors import UnknownName
 from mobee.store import STORE, TransitionStore
-from services.agents.config import Explorer
+from services.agents.config import Config
+from tests.services.an_explorer import last_action
 from tests.services.fake_controller import FakeController
 from tests.services.harness import Program, Rig, rig, wait_for
 
@@ -218,8 +219,14 @@ def test_an_agent_with_a_goal_goes_there_and_keeps_what_it_was_told_on_record(st
     assert [settings[name] for name in ("beliefs", "divergence", "forgetting", "tolerance")] == ["debiased", "kl", 0.9, 0.001]
 
 
-def test_every_explorer_of_the_library_can_be_had() -> None:
-    assert get_args(Explorer) == tuple(EXPLORERS)
+def test_an_explorer_of_the_user_explores_live(stage: Stage) -> None:
+    assert stage.agent("--explorer", f"{last_action.__module__}:last_action", "--transitions", "3").wait(30.0) == 0
+    assert all(t.a == len(TORSO.actions(t.s)) - 1 for t in stage.made(3))
+
+
+def test_an_unknown_explorer_is_refused_with_the_nearest() -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'curious'"):
+        Config(explorer="curios").check_robot(ROBOT)
 
 
 def test_an_arm_has_four_joints_sixteen_neighbours_and_its_other_motors_at_rest(tmp_path: Path) -> None:

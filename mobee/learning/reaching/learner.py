@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from mobee.errors import InvalidValue, UnknownName
+from mobee.errors import InvalidValue
 from mobee.learning.draws import Draws
 from mobee.learning.explorers import choose
+from mobee.learning.named import named
 from mobee.learning.reaching.failures import failures_of, has_failed
 from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.problems import Problems
-from mobee.learning.reaching.strategies import STRATEGIES
+from mobee.learning.reaching.strategies import STRATEGIES, StrategyOf
 from mobee.learning.reaching.tries import Step, Try, made_of
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
@@ -34,7 +35,7 @@ class ReachLearner:
         reaches: Reaches,
         beliefs: OutcomeModel | None,
         predictor: str | RewardPredictor,
-        strategy: str,
+        strategy: str | StrategyOf,
         failures: str,
         discount: float,
         penalty: float,
@@ -42,13 +43,11 @@ class ReachLearner:
         seed: int,
         model: TransitionModel | None,
     ) -> None:
-        for what, name, valid in (("strategy", strategy, STRATEGIES), ("predictor", predictor, PREDICTORS)):
-            if isinstance(name, str) and name not in valid:
-                raise UnknownName(what, name, valid)
         if not (penalty < 0.0 and limit >= 1):
             raise InvalidValue(f"penalty={penalty!r}, limit={limit!r}: valid are a reward below 0, and at least 1 action a problem-try.")
         self.space, self.part, self.reaches, self.model = space, space.part, reaches, model
-        self.predictor = PREDICTORS[predictor](reaches) if isinstance(predictor, str) else predictor
+        self._strategy_name, make_strategy = named("strategy", strategy, STRATEGIES)
+        self.predictor = named("predictor", predictor, PREDICTORS)[1](reaches) if isinstance(predictor, str) else predictor
         self.failures = failures_of(space, reaches, failures)
         """What is known of failed transitions."""
         self.problems = Problems()
@@ -61,7 +60,7 @@ class ReachLearner:
             beliefs = (TransitionModel(space) if model is None else model).debiased()
         self.planning = ReachPlanning(space, beliefs, discount)
         self.discount, self.penalty, self.limit, self.seed = discount, penalty, limit, seed
-        self._strategy, self._strategy_name, self._failures_kind = STRATEGIES[strategy](reaches, self.predictor), strategy, failures
+        self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), failures
         self._draws, self._draws_of_try, self._draws_of_problem = (
             Draws(f"{space.part} {what}") for what in ("reaching", "problem-try", "problem")
         )

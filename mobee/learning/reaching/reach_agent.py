@@ -13,6 +13,7 @@ from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.predictors import Reaches, RewardPredictor
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.strategies import StrategyOf
 from mobee.learning.reaching.tries import Step, Try
 from mobee.learning.reaching.where import reaches_of
 from mobee.learning.space import Space
@@ -34,8 +35,10 @@ class ReachAgent(ReachLearner):
         plant: through which it acts; its robot must be the space's.
         beliefs: where transitions lead, e.g. `load_learned(file).model.debiased()`.  None: as `model` says, else mostly to the goal.
         marker: what is to come to the targets.
-        predictor: of rewards, a name in `predictors.PREDICTORS` or an object that has seen nothing yet; "weighted" is the thesis'.
-        strategy: what it pursues while it learns, a name in `strategies.STRATEGIES`: "intrinsic", "greedy" and "random" are the thesis'.
+        predictor: of rewards, a name in `predictors.PREDICTORS` ("weighted" is the thesis'), `module:name` of what makes your own, or
+            an object that has seen nothing yet.
+        strategy: what it pursues while it learns, a name in `strategies.STRATEGIES` ("intrinsic", "greedy" and "random" are the thesis'),
+            or what makes your own, see `StrategyOf`: a class, or its `module:name`.
         failures: how failed transitions are remembered, "spread" over all targets as published, "local", or as a hint to others "alike".
         discount: of future rewards in the plan.
         scale: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
@@ -61,7 +64,7 @@ class ReachAgent(ReachLearner):
         *,
         marker: str,
         predictor: str | RewardPredictor = "weighted",
-        strategy: str = "intrinsic",
+        strategy: str | StrategyOf = "intrinsic",
         failures: str = "spread",
         discount: float = 0.9,
         scale: float = SCALE,

@@ -91,7 +91,10 @@ class Thompson(Greedy):
         return self._predictor.sample(target, rng)
 
 
-STRATEGIES: dict[str, Callable[[Reaches, RewardPredictor], Strategy]] = {
+StrategyOf = Callable[[Reaches, RewardPredictor], Strategy]
+"""Makes the strategy of a learner from its reaches and its predictor: a class, or a function."""
+
+STRATEGIES: dict[str, StrategyOf] = {
     "random": Random,
     "greedy": Greedy,
     "intrinsic": Intrinsic,

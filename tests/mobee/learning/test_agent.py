@@ -12,6 +12,7 @@ from mobee.learning.tabular import TabularPlant, ideal
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
 from tests.mobee.learning.toys import TORSO, FickleDice, InstantPlant, Interrupting, arm, torso, toy_robot
+from tests.services.an_explorer import last_action
 
 
 def test_a_step_decides_acts_and_observes():
@@ -103,6 +104,35 @@ def test_agents_of_different_parts_draw_differently_under_one_seed():
         return chosen
 
     assert actions("l") != actions("r")
+
+
+def test_an_explorer_of_ones_own_is_asked_and_recorded_by_where_it_is_defined():
+    space = arm()
+    agent = CuriousAgent(space, InstantPlant(space.robot), explorer=last_action)
+    agent.run(5)
+    assert agent.last.a == len(space.actions(agent.last.s)) - 1
+    assert agent.settings["explorer"] == f"{last_action.__module__}:last_action"
+    named = CuriousAgent(space, InstantPlant(space.robot), explorer=agent.settings["explorer"])
+    named.run(5)
+    assert named.last == agent.last and named.settings == agent.settings
+
+
+@pytest.mark.parametrize(
+    ("explorer", "said"),
+    [
+        ("last_actoin", "unknown explorer 'last_actoin'.*module:name of your own"),
+        ("no_such_module:last_action", "No module named 'no_such_module'.*working directory"),
+        ("tests.services.an_explorer:first", "has no attribute 'first'"),
+        ("math:pi", "cannot be called"),
+        (lambda agent, state, rng: np.zeros(3), r"give a score for each action, shape \(16,\)"),
+        (lambda agent, state, rng: np.full(16, np.nan), "give a score for each action"),
+    ],
+    ids=["no name", "no module", "no function", "no function at all", "wrong shape", "no numbers"],
+)
+def test_an_explorer_that_does_not_serve_is_refused(explorer, said):
+    space = arm()
+    with pytest.raises(MobeeError, match=said):
+        CuriousAgent(space, InstantPlant(space.robot), explorer=explorer).run(1)
 
 
 RESUMED = [{"explorer": name} for name in EXPLORERS] + [
