@@ -73,7 +73,7 @@ class Listener:
 
         def offer(sample: zenoh.Sample) -> None:
             if self.keeps_step:
-                self.inbox.put(lambda: handle(sample))
+                self.inbox.handle(lambda: handle(sample))
             else:
                 slot.offer(sample)
 
