@@ -16,7 +16,7 @@ def test_handlers_run_in_order_of_arrival_in_the_thread_that_spins() -> None:
     inbox, seen = Inbox(), []
     for i in range(100):
         inbox.put(lambda i=i: seen.append((i, threading.get_ident())))
-    inbox.spin(now())
+    inbox.spin(now() + 10.0, lambda: len(seen) == 100)
     assert seen == [(i, threading.get_ident()) for i in range(100)]
 
 
@@ -247,5 +247,5 @@ def test_without_a_server_who_brings_something_leaves_it() -> None:
     inbox, seen = Inbox(), []
     inbox.handle(lambda: seen.append(1))
     assert seen == []
-    inbox.spin(now())
+    inbox.spin(now() + 10.0, lambda: bool(seen))
     assert seen == [1]
