@@ -12,7 +12,7 @@ from mobee.robot.robot import Array, Robot
 from services.common.bus import Bus
 from services.controller.action import Action, Owner
 
-SOMETIMES = 10  # ticks: so often a part under way, or one that nobody owns, tells of its motion in lockstep
+SOMETIMES = 50  # ticks: so often a part under way, or one that nobody owns, tells of its motion in lockstep
 NEWS = 0.01  # s of real time: so often every part tells of its motion in free mode, and of a change at once
 
 
