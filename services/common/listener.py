@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -18,6 +20,7 @@ from services.common.inbox import CROWDED, Inbox, Newest
 
 _M = TypeVar("_M", bound=Message)
 _T = TypeVar("_T", Clock, Tick, Turn)
+_known = threading.local()  # lives as long as Python knows the thread
 
 
 class Listener:
@@ -70,7 +73,7 @@ class Listener:
 
         def offer(sample: zenoh.Sample) -> None:
             if self.keeps_step:
-                self.inbox.put(lambda: handle(sample))
+                self.inbox.handle(lambda: handle(sample))
             else:
                 slot.offer(sample)
 
@@ -78,7 +81,7 @@ class Listener:
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
         """Each subscriber has a thread of its own, which costs time and in lockstep would mix up what one service put on two keys."""
-        self._kept.append(self.bus.session.declare_subscriber(key, Callback(offer, indirect=False) if self._direct else offer))
+        self._kept.append(self.bus.session.declare_subscriber(key, Callback(_stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
@@ -124,3 +127,18 @@ class Listener:
         message = self.bus.receive(cls, sample, part, any_run=any_run)
         if message is not None:
             handler(message)
+
+
+def _stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
+    """The callback, for a thread of Zenoh's own that stays known to Python.
+
+    Python makes a state for a foreign thread that calls it, on fresh pages of memory, and takes it down when the call is over: dearer
+    than the callback.  A claim on the state that is never given up keeps it.
+    """
+
+    def call(sample: zenoh.Sample) -> None:
+        if not hasattr(_known, "claim"):
+            _known.claim = ctypes.pythonapi.PyGILState_Ensure()
+        offer(sample)
+
+    return call

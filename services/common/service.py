@@ -28,7 +28,7 @@ from services.common.config import ServiceConfig
 from services.common.entry import wait_until_released
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
-from services.common.session import LEASE, open_client, spare_threads
+from services.common.session import LEASE, SHORT_WAY, open_client, spare_threads
 
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
@@ -37,7 +37,10 @@ ORPHANED = 10.0  # s without a router after which a service ends
 
 
 class Service(Listener):
-    """A process on the bus.  All handlers run in the main thread, inside `spin` or `run`."""
+    """A process on the bus.  All handlers run one after the other, inside `spin` or `run`: in the main thread.
+
+    In lockstep those of a `prompt` service that is in `run` run in Zenoh's thread, which must not wait for an answer: none may `call`.
+    """
 
     def __init__(
         self,
@@ -50,7 +53,8 @@ class Service(Listener):
     ) -> None:
         """`session` and `inbox`: its own unless they are given; two services of one process share an inbox.
 
-        `prompt`: every tick waits for it, and it never computes for long, so that Zenoh's own thread may put into its inbox.
+        `prompt`: every tick waits for it, and it never computes for long, so that Zenoh's own thread may put into its inbox, or
+        in lockstep handle what it brings.
         """
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         signal.signal(signal.SIGTERM, _end)
@@ -61,7 +65,7 @@ class Service(Listener):
         lease = config.patience if config.mode == "lock" else LEASE
         if session is None:
             wait_until_released()
-        session = session or open_client(config.endpoint, namespace=config.namespace, lease=lease)
+        session = session or open_client(os.environ.get(SHORT_WAY) or config.endpoint, namespace=config.namespace, lease=lease)
         with ExitStack() as failed:
             failed.enter_context(session)  # closed: an open callback would keep the interpreter from exiting
             self._begin(session, robot, inbox or Inbox(), prompt)
@@ -69,6 +73,7 @@ class Service(Listener):
 
     def _begin(self, session: zenoh.Session, robot: Robot | None, inbox: Inbox, prompt: bool) -> None:
         locked = self.config.mode == "lock"
+        self._serves = prompt and locked
         super().__init__(Bus(session, self.who, self.log), inbox, locked, direct=prompt or locked)
         self.patience = rpc.LOCKED_TIMEOUT if self.locked else rpc.TIMEOUT  # s that a call waits for its answer
         if robot is not None:
@@ -153,8 +158,9 @@ class Service(Listener):
 
     def run(self) -> None:
         """Handle what comes until SIGTERM, a shutdown call, or ten seconds without a router."""
+        spin = self.inbox.serve if self._serves else self.inbox.spin
         while True:
-            self.inbox.spin(time.monotonic() + 1.0)
+            spin(time.monotonic() + 1.0)
             self.check_router()
 
     def check_router(self) -> None:

@@ -94,20 +94,21 @@ class ControllerNode:
             self._patience = self._service.inbox.at(time.monotonic() + 0.5e-9 * tick.dt / tick.rate, lambda: self._wait_is_over(k))
 
     def _take_forces(self, forces: ForcesMessage) -> None:
-        terms = {name: np.array(row) for name, row in forces.terms.items()}
-        why = self._refusal(forces, terms)
+        why = self._refusal(forces)
         if why:
             self._service.bus.reject("value", f"forces of tick {forces.re_k}: {why}")
             return
-        self._forces, self._acting = forces, Forces(**terms)
+        self._forces, self._acting = forces, Forces(**{name: np.array(row) for name, row in forces.terms.items()})
         if self._tick is not None and forces.re_k >= self._tick.k:
             self._step()
 
-    def _refusal(self, forces: ForcesMessage, terms: Mapping[str, Array]) -> str:
+    def _refusal(self, forces: ForcesMessage) -> str:
         """What is wrong with forces, empty if nothing is."""
+        terms = forces.terms
         if terms.keys() != set(told_terms()):
             return f"they are {', '.join(terms) or 'none'}; the law has {', '.join(told_terms())}"
-        if max(np.abs(force).max(initial=0.0) for force in terms.values()) > LARGEST_FORCE / len(terms):
+        largest = LARGEST_FORCE / len(terms)
+        if any(max(row, default=0.0) > largest or min(row, default=0.0) < -largest for row in terms.values()):
             return "larger than any law makes them"
         if self._needs_contacts and forces.contacts is None:
             return "without the contacts, on which this controller's terms may depend: set shared.terms"

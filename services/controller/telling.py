@@ -12,7 +12,7 @@ from mobee.robot.robot import Array, Robot
 from services.common.bus import Bus
 from services.controller.action import Action, Owner
 
-SOMETIMES = 10  # ticks: so often a part under way tells of its motion in lockstep
+SOMETIMES = 50  # ticks: so often a part under way, or one that nobody owns, tells of its motion in lockstep
 NEWS = 0.01  # s of real time: so often every part tells of its motion in free mode, and of a change at once
 
 
@@ -50,11 +50,11 @@ class Telling:
             )
 
     def _goes_without_saying(self, part: str, tick: Tick) -> bool:
-        """Whether the part is under way as it was, or in free mode goes on in any way, which is told only now and then."""
+        """Whether nobody waits for news of the part, since it is under way as it was, or nobody's, or in free mode goes on in any way."""
         action, k = self._actions[part], tick.k
         known, self._told[part] = self._told.get(part), (action.id, action.owner)
         if known != self._told[part] or action.since_k >= k:
             return False
         if tick.mode == "lock":
-            return action.status == "moving" and k % SOMETIMES > 0
+            return (action.status == "moving" or action.owner is None) and k % SOMETIMES > 0
         return k % max(1, round(1e9 * NEWS * tick.rate / tick.dt)) > 0

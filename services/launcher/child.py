@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -33,6 +34,7 @@ class Program:
     nice: int = 0
     vital: bool = True
     patience: float = 0.0  # s for which it may be silent at least
+    environment: Mapping[str, str] = field(default_factory=dict)  # beside the launcher's own
 
 
 @dataclass
@@ -80,7 +82,7 @@ class Child:
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **_ONE_THREAD, "PYTHONUNBUFFERED": "1", HELD: "1"},
+                env={**os.environ, **self.program.environment, **_ONE_THREAD, "PYTHONUNBUFFERED": "1", HELD: "1"},
                 process_group=0,
             )
         if self.program.nice:

@@ -20,7 +20,7 @@ from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, LEASE, BusUnreachable, open_router, spare_threads
+from services.common.session import DEFAULT_ENDPOINT, LEASE, SHORT_WAY, BusUnreachable, open_router, short_way, spare_threads
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
@@ -63,7 +63,12 @@ class Options:
 
 def launch(options: Options) -> int:
     """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C."""
-    started = time.monotonic()
+    with contextlib.ExitStack() as open_meanwhile:
+        return _launch(options, open_meanwhile)
+
+
+def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
+    started, way = time.monotonic(), ""
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
@@ -76,26 +81,27 @@ def launch(options: Options) -> int:
         check_extras(scenario)
         check_ports(scenario)
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+        lease = LEASE
         if scenario.is_locked:
             spare_threads()
-        session = open_router(endpoint, max(part.config.patience for part in scenario.parts) if scenario.is_locked else LEASE)
+            way, lease = open_meanwhile.enter_context(short_way()), max(part.config.patience for part in scenario.parts)
+        session = open_meanwhile.enter_context(open_router(endpoint, lease, way))
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
     except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before anything was started", INTERRUPTED)
-    with session:
-        try:
-            directory = make_run_directory(options.runs, scenario, endpoint)
-            service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
-            service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
-        except OSError as error:
-            return _refuse(
-                f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
-            )
-        with service:
-            return _Run(service, scenario, directory, options).execute(started)
+    try:
+        directory = make_run_directory(options.runs, scenario, endpoint)
+        service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
+        service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
+    except OSError as error:
+        return _refuse(
+            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
+        )
+    with service:
+        return _Run(service, scenario, directory, options, way).execute(started)
 
 
 def _refuse(text: str, code: int) -> int:
@@ -106,10 +112,11 @@ def _refuse(text: str, code: int) -> int:
 class _Run:
     """The state of one run, in the launcher's main thread."""
 
-    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options) -> None:
+    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, way: str) -> None:
+        """`way`: where the services find the router, if not at its endpoint."""
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
-        self._supervisor = Supervisor(service, _programs(scenario, directory), self._tell)
+        self._supervisor = Supervisor(service, _programs(scenario, directory, way), self._tell)
         self._children = self._supervisor.children.values()
         self._stop_asked, self._starting = False, True
 
@@ -233,7 +240,7 @@ def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None
     waiting.discard(who)
 
 
-def _programs(scenario: Scenario, directory: Path) -> list[Program]:
+def _programs(scenario: Scenario, directory: Path, way: str) -> list[Program]:
     return [
         Program(
             who=part.who,
@@ -244,6 +251,7 @@ def _programs(scenario: Scenario, directory: Path) -> list[Program]:
             nice=part.entry.nice,
             vital=part.entry.vital,
             patience=part.config.patience if scenario.is_locked else 0.0,
+            environment={SHORT_WAY: way} if way else {},
         )
         for part in scenario.parts
     ]

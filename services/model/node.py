@@ -109,11 +109,18 @@ class ModelNode:
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
         self._participant.done(tick.k, told=tick.k > 0 and bool(self._service.alive.get("controller")))
-        self._publish_pose(tick.k, pose)
+        self._tell_viewers(tick.k, pose)
         self._count(tick.k)
 
+    def _tell_viewers(self, k: int, pose: ModelPose) -> None:
+        """What is dear to make is made only if somebody listens; in lockstep not here, for the forces leave when this handler ends."""
+        if self._pose.heard or self._contacts.heard:
+            if self._service.locked:
+                self._service.inbox.put(partial(self._publish_pose, k, pose))
+            else:
+                self._publish_pose(k, pose)
+
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
-        """What is dear to make is made only if somebody listens."""
         if self._pose.heard:
             markers = [
                 MarkerPose(name=name, position=pose.position(name).tolist(), quaternion=from_matrix(pose.rotation(name)).tolist())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from bus_schema import Refused
 from bus_schema.messages import GateState, Mode
@@ -18,8 +19,7 @@ LOCKED_TTL = 3  # ticks after which a part holds in lockstep, where the clock on
 Tell = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class Drive(Struct, frozen=True, eq=False):
     """What the motors shall do in this tick; `reference` (n,) rad, rad/s or N m by mode, None on hold."""
 
     mode: Mode
@@ -29,8 +29,7 @@ class Drive:
 HOLD = Drive("hold")
 
 
-@dataclass(frozen=True, slots=True)
-class InForce:
+class InForce(Struct, frozen=True):
     """An accepted command."""
 
     order: Order

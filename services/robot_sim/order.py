@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from bus_schema.chain import Commands
 from bus_schema.messages import Command, Mode
 from mobee.robot.robot import Array, Robot
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Order:
+class Order(Struct, frozen=True, eq=False):
     """See `Command`; `reference` (n,) rad, rad/s or N m by mode."""
 
     src: str

@@ -16,7 +16,7 @@ def test_handlers_run_in_order_of_arrival_in_the_thread_that_spins() -> None:
     inbox, seen = Inbox(), []
     for i in range(100):
         inbox.put(lambda i=i: seen.append((i, threading.get_ident())))
-    inbox.spin(now())
+    inbox.spin(now() + 10.0, lambda: len(seen) == 100)
     assert seen == [(i, threading.get_ident()) for i in range(100)]
 
 
@@ -136,3 +136,116 @@ def test_no_newest_sample_is_lost_between_two_threads() -> None:
     sender.join()
     assert seen[-1] == 19_999
     assert seen == sorted(set(seen))
+
+
+class Serving:
+    """An inbox that a thread of its own serves, as the main thread of a service does; leaving raises what ended it."""
+
+    def __init__(self) -> None:
+        self.inbox = Inbox()
+        self._error: BaseException | None = None
+        self._started = threading.Event()
+        self.thread = threading.Thread(target=self._serve)
+
+    def __enter__(self) -> Inbox:
+        self.inbox.put(self._started.set)
+        self.thread.start()
+        self._started.wait()
+        self.idle()
+        return self.inbox
+
+    def __exit__(self, *_: object) -> None:
+        self.inbox.put(lambda: _end())
+        self.thread.join()
+        if not isinstance(self._error, SystemExit):
+            raise self._error or AssertionError("nothing ended it")
+
+    def idle(self) -> None:
+        """Wait until the thread waits: then this one may handle."""
+        by: list[int] = []
+        while by[-1:] != [threading.get_ident()]:
+            self.inbox.handle(lambda: by.append(threading.get_ident()))
+            time.sleep(0.001)
+
+    def _serve(self) -> None:
+        try:
+            while True:
+                self.inbox.serve(now() + 10.0)
+        except BaseException as error:
+            self._error = error
+
+
+def _end() -> None:
+    raise SystemExit
+
+
+def test_while_the_inbox_is_served_who_brings_something_handles_it() -> None:
+    with Serving() as inbox:
+        seen: list[int] = []
+        for _ in range(100):
+            inbox.handle(lambda: seen.append(threading.get_ident()))
+        assert seen == [threading.get_ident()] * 100
+
+
+def test_what_comes_while_the_server_handles_waits_for_its_turn() -> None:
+    with Serving() as inbox:
+        busy, go_on, done, seen = threading.Event(), threading.Event(), threading.Event(), []
+        inbox.put(lambda: (busy.set(), go_on.wait(), seen.append("first")))
+        busy.wait()
+        for name in ("second", "third"):
+            inbox.handle(lambda name=name: seen.append(name))
+        inbox.handle(done.set)
+        assert seen == []
+        go_on.set()
+        done.wait()
+        assert seen == ["first", "second", "third"]
+
+
+def test_two_threads_never_handle_at_a_time_and_each_keeps_its_order() -> None:
+    seen: list[tuple[int, int]] = []
+    inside = 0
+
+    def note(who: int, i: int) -> None:
+        nonlocal inside
+        inside += 1
+        assert inside == 1
+        time.sleep(0.0)  # lets another thread in, if it could come
+        seen.append((who, i))
+        inside -= 1
+
+    def bring(who: int) -> None:
+        for i in range(2000):
+            (inbox.handle if i % 3 else inbox.put)(lambda i=i: note(who, i))
+
+    with Serving() as inbox:
+        threads = [threading.Thread(target=bring, args=(who,)) for who in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    for who in range(2):
+        assert [i for by, i in seen if by == who] == list(range(2000))
+
+
+def test_a_timer_set_by_who_handles_for_the_server_is_in_time() -> None:
+    with Serving() as inbox:
+        rang, start = threading.Event(), now()
+        inbox.handle(lambda: inbox.at(now() + 0.02, rang.set))
+        assert rang.wait(5.0)
+        assert 0.02 <= now() - start
+
+
+def test_what_goes_wrong_in_another_thread_ends_the_server() -> None:
+    seen: list[str] = []
+    with pytest.raises(ZeroDivisionError), Serving() as inbox:
+        inbox.handle(lambda: print(1 / 0))
+        inbox.handle(lambda: seen.append("after"))
+    assert seen == []
+
+
+def test_without_a_server_who_brings_something_leaves_it() -> None:
+    inbox, seen = Inbox(), []
+    inbox.handle(lambda: seen.append(1))
+    assert seen == []
+    inbox.spin(now() + 10.0, lambda: bool(seen))
+    assert seen == [1]

@@ -1,0 +1,38 @@
+"""How a process finds its router."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from services.common.session import open_client, open_router, short_way
+from tests.services.harness import free_endpoint, wait_for
+
+
+def test_a_router_is_found_by_its_short_way_and_by_its_endpoint() -> None:
+    endpoint, heard = free_endpoint(), []
+    with short_way() as way, open_router(endpoint, short_way=way), open_client(way) as near, open_client(endpoint) as far:
+        far.declare_subscriber("what", lambda sample: heard.append(sample.payload.to_string()))
+        publisher = near.declare_publisher("what")
+        wait_for(lambda: publisher.matching_status.matching, "the subscriber")
+        publisher.put("this")
+        wait_for(lambda: heard == ["this"], "the message")
+
+
+def test_nobody_else_may_use_the_short_way_and_nothing_of_it_is_left() -> None:
+    with short_way() as way:
+        folder = Path(way.removeprefix("unixsock-stream/")).parent
+        with open_router(free_endpoint(), short_way=way):
+            assert folder.stat().st_mode & 0o077 == 0
+            assert os.listdir(folder)
+    assert not folder.exists()
+
+
+def test_there_is_no_short_way_where_its_name_would_be_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    deep = tmp_path / ("deep" * 25)
+    deep.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(deep))
+    with short_way() as way:
+        assert way == ""
