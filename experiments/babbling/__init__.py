@@ -24,8 +24,8 @@ from experiments.babbling.moved import ROBOT
 from experiments.babbling.results import summarise, verdict
 from experiments.babbling.table import as_table
 from experiments.babbling.trial import TrialFailed, run_trial
-from experiments.options import positive_number
-from experiments.progress import Progress
+from experiments.kit.options import positive_number
+from experiments.kit.progress import Progress
 from mobee import load_robot
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from experiments.records import read_records
+from experiments.kit.records import read_records
 
 APART = 0.2  # s for which a pair must be apart, so that its next contact is another event
 COLUMNS = ("k", "pair", "depth")

@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.babbling.modes import TITLES
 from experiments.babbling.results import DEEPEST, OUTCOMES, share
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 
 COLORS = {"off": "tab:red", "one": "tab:orange", "two": "tab:blue"}
 OUTCOME_COLORS = ("tab:green", "tab:olive", "0.7")

@@ -12,7 +12,7 @@ from pathlib import Path
 from experiments.babbling.command_log import COMMANDS
 from experiments.babbling.measured import POSITIONS, SUMMARY
 from experiments.babbling.modes import scenario
-from experiments.launched import free_endpoint, stop
+from experiments.kit.live import free_endpoint, stop
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 

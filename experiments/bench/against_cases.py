@@ -133,7 +133,7 @@ def _chapter_8() -> Work:
 
 def _lockstep() -> Work:
     """All services, without their start."""
-    from experiments.launched import summary_of
+    from experiments.kit.live import summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

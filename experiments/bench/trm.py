@@ -14,7 +14,7 @@ from experiments.bench import calibration, requirement
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.requirement import judged
 from experiments.bench.rounds import some_cores
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from experiments.trm import pregrasp
 from experiments.trm.coverage import coverage, reachable, valid
 from experiments.trm.example import Example

@@ -24,8 +24,8 @@ from experiments.clauses.figure import draw
 from experiments.clauses.search import Search, keep, load, search
 from experiments.control.margins import clause_label
 from experiments.control.ride import GAINS
-from experiments.options import positive_whole
-from experiments.progress import Progress
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
 from mobee import load_robot
 
 NAME = "clauses"

@@ -15,7 +15,7 @@ from experiments.control.colors import COLORS
 from experiments.control.margins import clause_label, clause_violations
 from experiments.control.models import icub_at_table
 from experiments.control.ride import GAINS
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from mobee import Gains
 from mobee.errors import InvalidValue
 

@@ -24,9 +24,9 @@ from experiments.flood.endurance import endure
 from experiments.flood.figure import draw, draw_endurance
 from experiments.flood.rates import SHORTEST, rates
 from experiments.flood.records import COLUMNS, Record, read_flood
-from experiments.options import positive_number, positive_whole
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 
 NAME = "flood"
 CLAIM = "the model evaluates hundreds of poses a second while its world is flooded with edits"

@@ -18,8 +18,8 @@ from experiments.flood.editor import SHARED, Editor, out_of_order
 from experiments.flood.memory import resident_mb, slope_mb_per_minute
 from experiments.flood.tearing import Reference, WatchedWorld, other_objects, torn_table
 from experiments.flood.threads import MovingModel, Oscillator, quick_hand_over
-from experiments.progress import Progress
-from experiments.records import Records
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records
 from mobee import Model, load_robot
 from mobee.model import Pose
 

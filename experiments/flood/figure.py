@@ -7,7 +7,7 @@ from pathlib import Path
 
 from experiments.flood.rates import binned
 from experiments.flood.records import Record
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 
 COLORS = {"katana": "tab:orange", "icub": "tab:blue"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypedDict
 
-from experiments.records import read_records
+from experiments.kit.records import read_records
 
 
 class Record(TypedDict):

@@ -26,9 +26,9 @@ from experiments.graze.approach import Table
 from experiments.graze.figure import draw
 from experiments.graze.records import as_record, read_trials
 from experiments.graze.trial import COLUMNS, VARIANTS, Trial, run_trial
-from experiments.options import positive_number, positive_whole
-from experiments.progress import Progress
-from experiments.records import Records
+from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records
 
 NAME = "graze"
 CLAIM = "rewinding fails the more often the flatter the hand comes into contact; MoBeE 2.0 slides and settles at every angle"

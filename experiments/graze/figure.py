@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.graze.trial import Trial
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 
 COLORS = {"off": "0.6", "naive": "tab:red", "mended": "tab:orange", "2.0": "tab:blue"}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from experiments.graze.trial import COLUMNS, Trial
-from experiments.records import read_records
+from experiments.kit.records import read_records
 
 _TYPES = get_type_hints(Trial)
 

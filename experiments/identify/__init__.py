@@ -28,9 +28,9 @@ from experiments.identify.recording import load, postures, record, save
 from experiments.identify.report import csv_table, summary, toml_data
 from experiments.identify.reproduce import reproduce
 from experiments.identify.signals import fitted_signal, held_out_signal
-from experiments.options import positive_whole, whole_from_two
-from experiments.progress import Progress
-from experiments.run_folder import write
+from experiments.kit.options import positive_whole, whole_from_two
+from experiments.kit.progress import Progress
+from experiments.kit.run_folder import write
 from mobee import Model, World, load_robot
 from mobee.robot.robot import Robot
 

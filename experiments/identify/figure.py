@@ -12,7 +12,7 @@ import numpy as np
 from experiments.identify.fitting import respond
 from experiments.identify.recording import load
 from experiments.identify.signals import DT, PRELOAD
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Robot
 from mobee.simulation.motors import MotorParameters

@@ -18,9 +18,10 @@ from typing import Any
 
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.nes_workload import FUNCTIONS, MOST, STRATEGIES, trial
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.nes.figure import draw
 from experiments.nes.findings import CLAIMS, DIMENSIONS, findings
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 
 NAME = "nes"
 CLAIM = "natural evolution strategies are comparable to CMA-ES, and outperform it on some tasks"

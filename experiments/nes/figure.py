@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
-from experiments.drawn import draw_curve
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_curve, new_figure
 from experiments.nes.findings import NAMES, evaluations, tasks
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
-from experiments.claims import Claim
-from experiments.statistics import decides, interval, ratio, ratio_interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interval, ratio, ratio_interval, told
 from mobee.robot.robot import Array
 
 DIMENSIONS = (10, 20, 41)

@@ -22,9 +22,10 @@ import numpy as np
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.ik_solvers import Solve, library, rival, timed
 from experiments.bench.ik_workload import MOTORS, scene, targets
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.ngik.figure import draw
 from experiments.ngik.findings import CLAIMS, FEW, NES, RIVALS, WHOLE, findings
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import Model
 
 NAME = "ngik"

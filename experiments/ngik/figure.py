@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from experiments.bench.ik_solvers import MOST
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.ngik.findings import FEW, NES, OURS, RIVALS, WHOLE
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MOST)  # evaluations

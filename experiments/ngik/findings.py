@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from experiments.bench import ik_solvers
-from experiments.claims import Claim
-from experiments.statistics import decides, ratio, ratio_interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, ratio, ratio_interval, told
 from mobee.robot.robot import Array
 
 FEW, WHOLE = 10, 41  # motors

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.options import positive_whole
-from experiments.progress import Progress
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
 from experiments.replanning.figure import draw
 from experiments.replanning.findings import CLAIMS, findings
 from experiments.replanning.job import Job

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.drawing.filmstrip import Strip, filmstrip
 from experiments.drawing.motion import Motion
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.replanning.findings import SOON
 from experiments.replanning.measured import POSES, Measured
 from experiments.replanning.scene import BALL, LEFT, MARKER, RIGHT, model, new_map, robot

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.claims import Claim
 from experiments.replanning.measured import Measured
 from experiments.replanning.scene import ABOVE, LEFT
 

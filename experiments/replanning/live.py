@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from experiments.jobs import write_job
+from experiments.kit.live import write_job
 from experiments.replanning.job import Job
 from experiments.replanning.scene import RATE, SIMULATED, SPEED, WORLD
 from experiments.walking.live import launch

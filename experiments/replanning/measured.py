@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from experiments.babbling.contacts import read_touches
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.jobs import read_done
+from experiments.kit.live import read_done
 from experiments.replanning.job import Crossing
 from experiments.replanning.scene import BALL, LEFT, PART, RATE, new_map, robot
 from mobee.robot.robot import Array

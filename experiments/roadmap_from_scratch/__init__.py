@@ -19,11 +19,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.roadmap_from_scratch.figure import draw
 from experiments.roadmap_from_scratch.findings import CLAIMS, findings
 from experiments.roadmap_from_scratch.live import finish, read_live
 from experiments.roadmap_from_scratch.trial import explored
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee.roadmap.ompl import require_ompl
 
 NAME = "roadmap-from-scratch"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.roadmap_from_scratch.settings import MARKER, SAMPLES, joints, robot
-from experiments.sweep import CellResult
 from mobee import Model
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array

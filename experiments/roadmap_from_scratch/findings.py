@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import told
 from experiments.roadmap_from_scratch.settings import DEEP, SAMPLES
-from experiments.statistics import told
-from experiments.sweep import CellResult
 
 CLAIMS = (
     Claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes"),

@@ -22,9 +22,9 @@ import numpy as np
 from experiments.control.models import icub
 from experiments.control.ride import GAINS
 from experiments.control.steps import postures
-from experiments.options import positive_number, positive_whole
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.settle.figure import draw
 from experiments.settle.responses import Response, responses
 from mobee.errors import UnknownName

@@ -12,7 +12,7 @@ from experiments.control.colors import COLORS
 from experiments.control.models import icub
 from experiments.control.ride import PERIOD
 from experiments.control.steps import motor_step, step_ride
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.settle.responses import Response
 from mobee import Gains
 from mobee.errors import InvalidValue

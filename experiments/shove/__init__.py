@@ -16,8 +16,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.shove.figure import draw
 from experiments.shove.shoving import DIRECTIONS, FORCES, LAWS, Shoved, shove
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.control.colors import COLORS
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.shove.shoving import DIRECTIONS, FORCES, Shoved
 from mobee.errors import InvalidValue
 

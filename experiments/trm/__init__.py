@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.trm.building import METHODS, built
 from experiments.trm.coverage import reachable
 from experiments.trm.examples import EXAMPLES

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from experiments.drawing.sheet import write_sheet
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
 from experiments.trm.building import rebuilt
 from experiments.trm.examples import EXAMPLES
 from experiments.trm.findings import NAMES, REACH

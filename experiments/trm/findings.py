@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
-from experiments.statistics import told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import told
 from experiments.trm.coverage import coverage
 from experiments.trm.examples import EXAMPLES
 from mobee.robot.robot import Array

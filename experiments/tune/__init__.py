@@ -17,9 +17,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from experiments.options import positive_whole
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.tune.figure import draw
 from experiments.tune.search import COLUMNS, Tried, search
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.tune.criteria import WANTED
 from experiments.tune.search import TUNED, Tried
 from mobee.errors import InvalidValue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from experiments.launched import summary_of
+from experiments.kit.live import summary_of
 
 PATIENCE = 60.0  # s for a tick of lockstep: a way is looked for in one
 

@@ -17,8 +17,8 @@ from typing import Any
 
 from experiments.control.ride import GAINS
 from experiments.control.walls import WALLS
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.wall.drawn import DRAWN, Drawn, draw_hand
 from experiments.wall.figure import draw
 from experiments.wall.pressing import Pressed, press

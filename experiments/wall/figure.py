@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.control.colors import COLORS
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.wall.drawn import DRAWN, Drawn, Way
 from experiments.wall.pressing import LEVELS, Pressed
 from mobee.errors import InvalidValue

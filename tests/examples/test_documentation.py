@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.launched import stop
+from experiments.kit.live import stop
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

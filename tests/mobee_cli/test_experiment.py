@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from experiments.kit.run_folder import held
 from experiments.registry import EXPERIMENTS
-from experiments.run_folder import held
 from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main
 

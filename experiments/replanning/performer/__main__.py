@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
-from experiments.jobs import append_done, read_job
+from experiments.kit.live import append_done, read_job
 from experiments.replanning.job import Crossing, Job
 from experiments.replanning.performer.config import Config
 from experiments.replanning.performer.crosser import Crosser

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
+from experiments.kit.run_folder import read, write
 from experiments.roadmap_from_scratch.live import DONE, JOB
 from experiments.roadmap_from_scratch.performer.config import Config
 from experiments.roadmap_from_scratch.settings import PART, explorer
-from experiments.run_folder import read, write
 from mobee import ActionInterrupted, load_robot
 from mobee.roadmap.adaptive.map_store import MapStore
 from services.common.bus_plant import BusPlant

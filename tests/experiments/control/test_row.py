@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from experiments.control.row import Row
-from experiments.records import Records, read_records
+from experiments.kit.records import Records, read_records
 
 
 @dataclass(frozen=True, slots=True)

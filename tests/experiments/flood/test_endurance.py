@@ -11,7 +11,7 @@ from experiments.flood.editor import Editor, out_of_order, witnesses
 from experiments.flood.endurance import endure
 from experiments.flood.memory import slope_mb_per_minute
 from experiments.flood.tearing import Reference, WatchedWorld, other_objects, torn_table
-from experiments.records import read_records
+from experiments.kit.records import read_records
 from mobee.collision.snapshot import changed
 
 

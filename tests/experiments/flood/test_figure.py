@@ -8,7 +8,7 @@ import pytest
 import mobee
 from experiments import flood
 from experiments.flood.endurance import endure
-from experiments.matplotlib_figure import MatplotlibMissing, new_figure
+from experiments.kit.plots import MatplotlibMissing, new_figure
 
 HEAD = "robot,objects,edits,seconds,evaluations\n"
 

@@ -10,7 +10,7 @@ from experiments.graze import figure, holds, results
 from experiments.graze.approach import Table, Way
 from experiments.graze.records import as_record, read_trials
 from experiments.graze.trial import COLUMNS, VARIANTS, Control, Trial, run_trial
-from experiments.records import Records
+from experiments.kit.records import Records
 from mobee.errors import InvalidValue
 
 CLEAN = Trial("naive", 90.0, 0, 0, 0.01, 0.0, 0.5, 1.0, 0.0, 3, False, False, False, False, False, False, 0.05)

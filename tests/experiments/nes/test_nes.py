@@ -7,9 +7,9 @@ import pytest
 
 from experiments import nes
 from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
+from experiments.kit.cells import Cell
 from experiments.nes.findings import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
-from experiments.sweep import Cell
-from tests.experiments.learning.cells import finished
+from tests.experiments.finished_cells import finished
 
 TASKS = [(function, d) for function in FUNCTIONS for d in DIMENSIONS]
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments import ngik
 from experiments.ngik.findings import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
-from tests.experiments.learning.cells import finished
+from tests.experiments.finished_cells import finished
 
 SEEDS = 6
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.jobs import append_done, read_job, write_job
+from experiments.kit.live import append_done, read_job, write_job
 from experiments.replanning.figure import draw
 from experiments.replanning.findings import CLAIMS, findings
 from experiments.replanning.job import Acted, Crossing, Job

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from experiments import trm
-from experiments.sweep import Cell
+from experiments.kit.cells import Cell
 from experiments.trm.building import METHODS, build, built, rebuilt
 from experiments.trm.examples import EXAMPLES
 from experiments.trm.findings import CLAIMS, COLUMNS, GRAPH, MAPS, NAMES, PREGRASP, SIZE, SOON, VALID, findings, judged, maps
 from experiments.trm.pictures import cloud_panel, planned, told
 from mobee.roadmap.roadmap import Roadmap
-from tests.experiments.learning.cells import finished
+from tests.experiments.finished_cells import finished
 
 
 @pytest.fixture(scope="module")
