@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import Any, Self, TextIO
 
 
 class Records:
@@ -49,3 +50,24 @@ def _whole(file: TextIO) -> int:
     length = file.read().rfind("\n") + 1
     file.seek(length)
     return length
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A record as a dataclass, to be derived from: its fields are texts, floats and booleans."""
+
+    @classmethod
+    def columns(cls) -> tuple[str, ...]:
+        """Of the file."""
+        return tuple(field.name for field in fields(cls))
+
+    def record(self) -> dict[str, object]:
+        """For the file, or as the values of a cell; numbers to six places."""
+        values = {name: getattr(self, name) for name in self.columns()}
+        return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
+
+    @classmethod
+    def of_record(cls, row: Mapping[str, str]) -> Self:
+        """From the file."""
+        read: dict[str, Any] = {"float": float, "bool": "True".__eq__, "str": str}
+        return cls(**{field.name: read[str(field.type)](row[field.name]) for field in fields(cls)})

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.control.listed import is_listed
-from experiments.control.ride import place
+from experiments.kit.control_runs import place
+from experiments.kit.safety_measures import is_listed
 from experiments.roadmap_from_scratch.settings import PART, explorer, offline_plant
 from mobee import AdaptiveRoadmap, MobeeError, OfflinePlant
 from mobee.roadmap.adaptive.walker import NEAR

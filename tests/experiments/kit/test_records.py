@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 
-from experiments.kit.records import Records, read_records
+from experiments.kit.records import Records, Row, read_records
 
 COLUMNS = ("robot", "objects")
 
@@ -28,3 +30,18 @@ def test_a_record_that_a_kill_has_cut_is_dropped_and_the_next_is_whole(tmp_path,
     with Records(path, COLUMNS) as records:
         records.append({"robot": "icub", "objects": 30})
     assert [record["objects"] for record in read_records(path, COLUMNS)] == ["10", "30"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sample(Row):
+    name: str
+    depth: float
+    is_good: bool
+
+
+def test_rows_come_back_from_their_file(tmp_path) -> None:
+    rows = [Sample("a, b", 0.125, True), Sample("c", -3.0, False)]
+    with Records(tmp_path / "rows.csv", Sample.columns()) as records:
+        for row in rows:
+            records.append(row.record())
+    assert [Sample.of_record(row) for row in read_records(tmp_path / "rows.csv", Sample.columns())] == rows
