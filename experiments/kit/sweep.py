@@ -55,6 +55,10 @@ def no_options(parser: argparse.ArgumentParser) -> None:
     """Add nothing to what all sweeps have."""
 
 
+def nothing_required() -> None:
+    """For trials that need no package besides those of mobee."""
+
+
 @dataclass(frozen=True)
 class Sweep:
     """A method: one trial under each condition with each seed.
@@ -67,6 +71,7 @@ class Sweep:
         plot: their figure, a matplotlib Figure; see experiments.kit.plots.
         seeds: how many there are unless --seeds says otherwise.
         add_options: adds options of its own.
+        require: raises, before anything is begun, where a package is missing that the trials need.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -75,6 +80,7 @@ class Sweep:
     plot: Callable[[Cells], Any]
     seeds: int = 10
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
+    require: Callable[[], object] = nothing_required
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Options of the sweep."""
@@ -88,6 +94,7 @@ class Sweep:
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the trials that the folder does not hold yet."""
+        self.require()
         run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
         return self.findings(load_cells(folder))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.cells import Cell, CellResult
+from experiments.kit.sweep import Trial
 
 
 def finished(work: Callable[[Cell], dict[str, Any]], cells: Iterable[Cell]) -> dict[str, CellResult]:
@@ -15,3 +16,7 @@ def finished(work: Callable[[Cell], dict[str, Any]], cells: Iterable[Cell]) -> d
         found[cell.name] = CellResult(cell, 1.0, Path())
         vars(found[cell.name])["values"] = work(cell)  # where the property keeps what it has read
     return found
+
+
+def finished_trials(trial: Trial, cells: Iterable[Cell]) -> dict[str, CellResult]:
+    return finished(lambda cell: trial(cell.settings, cell.seed), cells)

@@ -1,15 +1,14 @@
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 import pytest
 
-from experiments import nes
 from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
+from experiments.claims.ch3_roadmaps import nes
+from experiments.claims.ch3_roadmaps.nes import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
 from experiments.kit.cells import Cell
-from experiments.nes.findings import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
-from tests.experiments.finished_cells import finished
+from tests.experiments.finished_cells import finished_trials
+from tests.experiments.small_run import options_of
 
 TASKS = [(function, d) for function in FUNCTIONS for d in DIMENSIONS]
 
@@ -47,11 +46,11 @@ def test_claims_stay_open_until_every_task_has_as_many_runs():
 
 
 def test_a_quick_cell_finds_or_counts_with_all_it_had():
-    quick = nes.cells(argparse.Namespace(seed=3, seeds=1, quick=True))
+    quick = nes.EXPERIMENT.method.cells(options_of(nes.EXPERIMENT, "--seed", "3", "--seeds", "1", "--quick"))
     assert {cell.settings["dimensions"] for cell in quick} == {10} and len(quick) == len(FUNCTIONS) * len(STRATEGIES)
     ours = next(cell for cell in quick if cell.name == "nes-sphere-10-s3")
     hard = Cell("snes-cigar-s3", 3, {"strategy": "snes", "function": "cigar 1e6", "dimensions": 10, "most": 500})
-    found = finished(nes.work, [ours, hard])
+    found = finished_trials(nes.trial, [ours, hard])
     assert found[ours.name].values["found"] and 500 < found[ours.name].values["evaluations"] < 5000
     assert not found[hard.name].values["found"] and found[hard.name].values["evaluations"] == 500
     results = findings(found)
@@ -59,7 +58,7 @@ def test_a_quick_cell_finds_or_counts_with_all_it_had():
     assert evaluations(found)["snes", ("cigar 1e6", 10)].tolist() == [500.0]
 
 
-def test_what_is_done_can_be_drawn(tmp_path):
+def test_what_is_done_can_be_drawn():
     pytest.importorskip("matplotlib")
-    found = finished(nes.work, [Cell("a", 1, {"strategy": "nes", "function": "sphere", "dimensions": 10, "most": 200})])
-    assert nes.draw(found, tmp_path / "nes.png").stat().st_size > 1000
+    found = finished_trials(nes.trial, [Cell("a", 1, {"strategy": "nes", "function": "sphere", "dimensions": 10, "most": 200})])
+    assert len(nes.plot(found).axes) == len(FUNCTIONS)

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 import pytest
 
-from experiments import ngik
-from experiments.ngik.findings import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
-from tests.experiments.finished_cells import finished
+from experiments.claims.ch3_roadmaps import ngik
+from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
+from tests.experiments.finished_cells import finished_trials
+from tests.experiments.small_run import options_of
 
 SEEDS = 6
 
@@ -29,15 +28,15 @@ def test_without_41_motors_all_is_open():
     assert judged({(name, FEW): solver(1000.0) for name in (NES, *RIVALS)}) == list(CLAIMS)
 
 
-def test_a_quick_sweep_holds_every_solver_and_a_cell_solves_its_own_targets(tmp_path):
-    quick = ngik.cells(argparse.Namespace(seed=5, seeds=1, quick=True))
+def test_a_quick_sweep_holds_every_solver_and_a_cell_solves_its_own_targets():
+    quick = ngik.EXPERIMENT.method.cells(options_of(ngik.EXPERIMENT, "--seed", "5", "--seeds", "1", "--quick"))
     assert {(cell.settings["solver"], cell.settings["motors"]) for cell in quick} == {
         (name, motors) for name in (NES, *RIVALS) for motors in (FEW, WHOLE)
     }
     chosen = [cell for cell in quick if cell.name in ("nes-10-s5", "particles-10-s5")]
-    found = finished(ngik.work, chosen)
+    found = finished_trials(ngik.trial, chosen)
     for cell in chosen:
         values = found[cell.name].values
         assert values["reached"].all() and (values["evaluations"] < 20_000).all() and len(values["ms"]) == 2
     pytest.importorskip("matplotlib")
-    assert ngik.draw(found, tmp_path / "ngik.png").stat().st_size > 1000
+    assert len(ngik.plot(found).axes) == 2
