@@ -19,7 +19,7 @@ EXPERIMENTS = {
     "decay": "experiments.claims.ch7_learning.decay",
     "either-alone": "experiments.either_alone",
     "flood": "experiments.flood",
-    "graze": "experiments.graze",
+    "graze": "experiments.claims.ch4_reflex.graze",
     "hypercube": "experiments.hypercube",
     "identify": "experiments.identify",
     "kail": "experiments.kail",

@@ -1,4 +1,4 @@
-"""Straight ways of the hand into the table's field, at any angle, as postures."""
+"""Straight paths of the hand into the table's field, at any angle, as postures, and a client that drives along one."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from mobee.model import Model
 from mobee.robot.load import load_robot, load_world
 from mobee.robot.robot import Array, Robot
 
+SPEED = 0.2  # of the motors' top speed, as in the thesis
 MARKER = "left_palm"
 MOTORS = ("torso_*", "l_shoulder_*", "l_elbow", "l_wrist_*")  # that move the hand
 HAND = ("l_hand", "l_palm", "l_fingers", "l_thumb")  # how the names of its shapes begin
 ASIDE = {"r_shoulder_roll": 70.0, "r_elbow": 90.0}  # degrees, so that the other hand is not in the way
-BEFORE, BEHIND, LIFT = 0.06, 0.04, 0.04  # m of the way before and behind the first contact, and above its start
+BEFORE, BEHIND, LIFT = 0.06, 0.04, 0.04  # m of the path before and behind the first contact, and above its start
 TOP = 0.1  # m below the root, the table's top
-STEP = 0.002  # m between two postures of a way
+STEP = 0.002  # m between two postures of a path
 SAMPLED = (0.3, 0.7)  # share of the motors' ranges from which postures are drawn
 TORSO = np.deg2rad([[0.0, 0.0], [0.0, 0.0], [0.0, 25.0]])  # rad, range of yaw, roll and pitch from which they are drawn
 PRECISE, DAMPING = 2e-4, 1e-5  # of the inverse kinematics: m and rad; m^2
@@ -30,7 +31,7 @@ HIGHEST_START = 0.15  # m, of the palm
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """Where the hand just touches the table's field, and where it is going there."""
+    """Where the hand just touches the table's field, and its heading there."""
 
     q: Array  # (n,) rad
     position: Array  # (3,) m, of the palm
@@ -39,7 +40,7 @@ class Spot:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
+class HandPath:
     """Postures (w, n) rad, from above the start over the start into the field; `start` is the index of the start."""
 
     postures: Array
@@ -47,7 +48,7 @@ class Way:
 
 
 class Table:
-    """The iCub at its table, and how its left hand gets about there."""
+    """The iCub at its table, and the paths of its left hand there."""
 
     def __init__(self) -> None:
         self.robot: Robot = load_robot("icub")
@@ -66,12 +67,12 @@ class Table:
             self._home[self.robot.motor_index(name)] = np.deg2rad(degrees)
 
     def spots(self, number: int, seed: int) -> list[Spot]:
-        """So many spots from which the hand can leave in every direction that the experiment takes."""
+        """So many random spots that have a path at 90, 45 and 0 degrees."""
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
         while len(found) < number:
             spot = self._touch(rng)
-            if spot is not None and all(self.way(spot, np.deg2rad(angle)) is not None for angle in (90.0, 45.0, 0.0)):
+            if spot is not None and all(self.path(spot, np.deg2rad(angle)) is not None for angle in (90.0, 45.0, 0.0)):
                 found.append(spot)
         return found
 
@@ -110,8 +111,8 @@ class Table:
         direction = np.array([np.cos(heading), np.sin(heading), 0.0])
         return Spot(q, np.array([*position[:2], high]), rotation, direction)
 
-    def way(self, spot: Spot, angle: float) -> Way | None:
-        """The way into the spot at an angle to the table's top, rad; None where the arm cannot go it."""
+    def path(self, spot: Spot, angle: float) -> HandPath | None:
+        """The path into the spot at an angle to the table's top, rad; None where the arm cannot follow it."""
         direction = np.cos(angle) * spot.heading - np.array([0.0, 0.0, np.sin(angle)])
         into = self._line(spot.q, spot, [spot.position + s * direction for s in np.arange(STEP, BEHIND + 1e-9, STEP)])
         back = self._line(spot.q, spot, [spot.position - s * direction for s in np.arange(STEP, BEFORE + 1e-9, STEP)])
@@ -122,10 +123,10 @@ class Table:
         if up is None or self.watch.look(self.model.evaluate(up[-1])):
             return None
         postures = np.array([*reversed(up), *reversed(back), spot.q, *into])
-        return Way(postures, len(up))
+        return HandPath(postures, len(up))
 
     def _line(self, q: Array, spot: Spot, positions: list[Array]) -> list[Array] | None:
-        """Postures on a line of positions, the hand turned as at the spot; None where it cannot go on without another contact."""
+        """Postures on a line of positions, the hand turned as at the spot; None where there is no posture, or another contact."""
         found = []
         for position in positions:
             solved = self._solve(q, position, spot.rotation)
@@ -154,5 +155,47 @@ class Table:
 
 
 def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> bool:
-    """Whether nothing is wrong but that shapes whose names begin so touch the table."""
+    """Whether all violations are contacts of shapes whose names begin so with the table."""
     return all(v.kind == "contact" and v.what.endswith(" - table") and v.what.startswith(touching) for v in violations)
+
+
+class Client:
+    """Position references along a path, tick by tick; when it failed, once more from the beginning."""
+
+    def __init__(self, robot: Robot, path: HandPath, dt: float) -> None:
+        fastest = SPEED * np.array([motor.max_velocity for motor in robot.motor_table])
+        steps = np.abs(np.diff(path.postures, axis=0)) / fastest  # s, the slowest motor of each step sets the pace
+        times = np.concatenate([[0.0], np.cumsum(steps.max(axis=1))])
+        self._ticks = np.arange(0.0, times[-1], dt)
+        self._references = np.array([np.interp(self._ticks, times, column) for column in path.postures.T]).T
+        self.begin = int(np.searchsorted(self._ticks, times[path.start]))  # index of the reference at the start
+        self._next = 0
+        self.runs = 0  # times that it has left the start
+
+    @property
+    def start(self) -> Array:
+        """Where the robot stands before it begins: above the start."""
+        start: Array = self._references[0]
+        return start
+
+    @property
+    def leaves_start(self) -> bool:
+        """Whether the next reference is the start, from which on the path is a position command of its own."""
+        return self._next == self.begin
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last reference was commanded."""
+        return self._next >= len(self._references)
+
+    def next(self) -> Array:
+        """The next reference (n,) rad; behind the end the last one."""
+        self.runs += self.leaves_start
+        reference: Array = self._references[min(self._next, len(self._references) - 1)]
+        self._next += 1
+        return reference
+
+    def retry(self, q: Array) -> None:
+        """Go on from whichever is nearer to q (n,) rad: the beginning above the start, or the start."""
+        places = (0, self.begin)
+        self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))
