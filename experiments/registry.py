@@ -18,7 +18,7 @@ EXPERIMENTS = {
     "coverage": "experiments.coverage",
     "decay": "experiments.claims.ch7_learning.decay",
     "either-alone": "experiments.either_alone",
-    "flood": "experiments.flood",
+    "flood": "experiments.claims.ch2_model.flood",
     "graze": "experiments.claims.ch4_reflex.graze",
     "hypercube": "experiments.hypercube",
     "identify": "experiments.identify",

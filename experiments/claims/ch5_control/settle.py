@@ -30,6 +30,7 @@ from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.errors import UnknownName
 from mobee.robot.robot import Array
+from mobee.simulation import OfflinePlant
 
 PERIODS = (1.0, 2.0, 5.0, 10.0, 20.0)  # ms
 QUICK_PERIODS = (10.0, 20.0)  # ms
@@ -70,7 +71,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every gain set, period and step; motors that the gain set never moves are left out.  Raises UnknownName."""
+    """Every gain set, period and step; motors that the gain set never moves are left out.
+
+    Raises UnknownName, and InvalidValue for a period at which the law is not stable.
+    """
     known, periods, chosen, count = icub().robot.motors, arguments.periods, arguments.motors, arguments.postures
     if arguments.quick:
         periods, chosen, count = [p for p in periods if p in QUICK_PERIODS], chosen or QUICK_MOTORS, min(count, QUICK_POSTURES)
@@ -83,6 +87,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
         steps = [motor for i, motor in enumerate(known) if weight[i] and (chosen is None or motor in chosen)]
         steps += [f"{POSTURE}{number}" for number in range(count)]
         for period in periods:
+            OfflinePlant(icub(), gains=Gains.named(gains), dt=period / 1e3)  # refuses an unstable period before anything is run
             for step in steps:
                 name = f"{gains}-{period:g}-{step.replace(' ', '-')}"
                 found.append(Condition(name, {"gains": gains, "period_ms": period, "step": step}, 1.0 / period))

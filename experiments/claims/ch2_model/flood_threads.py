@@ -1,4 +1,4 @@
-"""The two threads of figure 2.3 beside the sensory one: one moves every joint, one evaluates the model as fast as it can."""
+"""The threads of thesis figure 2.3 beside the sensory one, of which one moves every joint and one evaluates the model; and random boxes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
 from mobee import Model
+from mobee.collision import Geometry, box
+from mobee.kinematics.quaternion import to_matrix
 from mobee.model import Pose
 from mobee.robot.robot import Array, Robot
 
@@ -18,6 +21,11 @@ CONTROL_PERIOD = 0.01  # s (thesis 2.4)
 FREQUENCIES = (0.1, 0.5)  # Hz, one a motor, so that the whole pose never comes again
 # Python lets a thread wait 5 ms for one that computes in Python, as the flooding one does; that would be measured instead.
 HAND_OVER = 5e-5  # s
+
+SPACE = 1.0  # m, edge of the cube that holds the centres
+EDGES = (0.02, 0.1)  # m
+# Middle of that cube: where the robot reaches.
+MIDDLE = {"icub": (-0.5, 0.0, 0.1), "katana": (0.0, 0.0, 0.0)}
 
 
 class Oscillator:
@@ -36,7 +44,7 @@ class Oscillator:
 
 
 class MovingModel:
-    """While entered, the robot moves and the model evaluates, each in its own thread; what went wrong there is raised at the end.
+    """While entered, the robot moves and the model evaluates, each in its own thread; `check` raises what went wrong there.
 
     `watch` is called by the model's thread with every pose.
     """
@@ -93,3 +101,23 @@ def quick_hand_over() -> Iterator[None]:
         yield
     finally:
         sys.setswitchinterval(before)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """Arguments of `World.add`."""
+
+    shape: Geometry
+    position: Array  # (3,) m
+    rotation: Array  # (3, 3)
+
+
+def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:
+    """Boxes of random edges, positions in the cube, and orientations."""
+    middle = np.array(MIDDLE[robot])
+    boxes = []
+    for _ in range(count):
+        quaternion = rng.normal(size=4)
+        place = middle + rng.uniform(-SPACE / 2.0, SPACE / 2.0, 3)
+        boxes.append(Box(box(*rng.uniform(*EDGES, 3)), place, to_matrix(quaternion / np.linalg.norm(quaternion))))
+    return boxes
