@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from experiments.kit.live import TABLE as WORLD
 from services.common.session import NAMESPACE
 
 MODES = ("off", "one", "two")
 TITLES = {"off": "without MoBeE", "one": "MoBeE 1.0", "two": "MoBeE 2.0"}
-WORLD = Path(__file__).with_name("table.xml")
 RATE = 50.0  # Hz, the published control period
 FILTERED = "icub_filtered"  # namespace of the robot that MoBeE 1.0 offers
 SPEED = 0.2  # of the motors' top speed, thesis 4.1.1

@@ -22,6 +22,7 @@ from mobee.errors import MobeeError
 
 _STARTS, _ENDS = 120.0, 30.0  # s
 _LOOK = 0.5  # s between two calls of who watches
+TABLE = Path(__file__).with_name("table.xml")  # a world: the iCub's table with nothing on it
 
 
 class LaunchFailed(MobeeError):

@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.babbling.measured import POSITIONS
 from experiments.kit.options import positive_whole
 from experiments.kit.progress import Progress
+from experiments.kit.recordings import POSITIONS
 from experiments.live_reach.figure import draw
 from experiments.live_reach.findings import CLAIMS, claims, misses, table
 from experiments.live_reach.held_off import nearest_reach

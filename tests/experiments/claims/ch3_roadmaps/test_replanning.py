@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from experiments.babbling.measured import CONTACTS, POSITIONS
+from experiments.claims.ch3_roadmaps import replanning
+from experiments.claims.ch3_roadmaps.replanning import CLAIMS, findings, keep_poses, measure, read_measured
+from experiments.claims.ch3_roadmaps.replanning_scene import ABOVE, LEFT, PART, RIGHT, Acted, Crossing, Job, ball, model, new_map, robot
 from experiments.kit.live import append_done, read_job, write_job
-from experiments.replanning.figure import draw
-from experiments.replanning.findings import CLAIMS, findings
-from experiments.replanning.job import Acted, Crossing, Job
-from experiments.replanning.measured import keep_poses, measure, read_measured
-from experiments.replanning.scene import ABOVE, LEFT, PART, RIGHT, ball, model, new_map, robot
+from experiments.kit.recordings import CONTACTS, POSITIONS
 
 ARM = robot().parts[PART].slice
 BUMP, TURN, END = 40, 52, 120
@@ -26,7 +23,7 @@ def acted(vertex: int, asked: int, bump: int, ended: int) -> Acted:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The arm goes straight for the left, until tick 52, and from there back."""
+    """The arm moves straight to the left vertex until tick 52, and then back."""
     space = new_map().space
     way = space.target(LEFT) - space.target(RIGHT)
     q = np.repeat(robot().home[None], END, axis=0)
@@ -59,7 +56,7 @@ def test_few_crossings_leave_the_claims_open_and_slow_ones_refute_them(folder: P
     assert verdicts == ["confirmed", "confirmed", "confirmed"] and len(verdicts) == len(CLAIMS)
 
 
-def test_the_short_way_leads_through_the_ball_and_the_long_one_beside_it() -> None:
+def test_the_short_path_leads_through_the_ball_and_the_long_one_beside_it() -> None:
     roadmap, known = new_map(), model()
     assert roadmap.plan(RIGHT, LEFT) == (RIGHT, LEFT)
     roadmap.observe(RIGHT, 0, RIGHT)
@@ -76,8 +73,12 @@ def test_the_short_way_leads_through_the_ball_and_the_long_one_beside_it() -> No
     assert np.allclose(ball(), known.world.objects["ball"].position)
 
 
-def test_the_picture_is_drawn(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["experiments.replanning.figure"], "filmstrip", lambda strips, path, height: path)
+def test_the_pictures_are_drawn(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(replanning, "filmstrip", lambda strips, path, height: path)
+    measure(folder)
     keep_poses(folder)
-    assert draw([folder], measure(folder), folder / "replanning.png").name == "replanning.png"
-    assert (folder / "replanning-times.png").exists()
+    folder.rename(folder.with_name("launch-000"))
+    run = folder.parent
+    assert replanning.EXPERIMENT.method.figure(run).name == "replanning.png"
+    assert (run / "replanning-times.png").exists()

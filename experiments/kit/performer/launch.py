@@ -1,4 +1,4 @@
-"""A service that walks on a map, on the live robot with PyBullet."""
+"""Launches the live robot with PyBullet and a performer."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 from experiments.kit.live import summary_of
 
-PATIENCE = 60.0  # s for a tick of lockstep: a way is looked for in one
+PATIENCE = 60.0  # s for a tick of lockstep: the performer plans in one
 
-_SCENARIO = """# Written by an experiment of thesis 4.3.
+_SCENARIO = """# Written by an experiment.
 title = "{title}"
 
 [shared]
@@ -29,16 +29,16 @@ world = "{world}"
 [services.controller]
 speed_scale = {speed:g}
 
-[services.{who}]
-module = "{module}"
+[services.performer]
+module = "experiments.kit.performer"
+perform = "{perform}"
 run_dir = "{folder}"
 """
 
 
 def launch(
     folder: Path,
-    who: str,
-    module: str,
+    perform: str,
     *,
     title: str,
     world: str,
@@ -49,16 +49,16 @@ def launch(
     lockstep: bool = True,
     simulated: str = "",
 ) -> dict[str, Any]:
-    """Launch the system with that service, which ends it; its record is left in the folder, and its summary returned.
+    """Launch the system with a performer; its recording is left in the folder, and its summary returned.
 
-    `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time, after which it is ended; `simulated`: the simulator's world
-    where it is not the model's.  Raises LaunchFailed.
+    `perform`: the performer's function, see `Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time,
+    after which the system ends; `simulated`: the simulator's world where it is not the model's.  Raises LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
-    told: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
-    told |= {"rate": rate, "speed": speed, "who": who, "module": module}
-    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **told))
+    values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
+    values |= {"rate": rate, "speed": speed, "perform": perform}
+    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)

@@ -5,17 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.roadmap_from_scratch.figure import draw
-from experiments.roadmap_from_scratch.findings import CLAIMS, findings, unreached
-from experiments.roadmap_from_scratch.settings import SAMPLES
-from experiments.roadmap_from_scratch.trial import explored
+from experiments.claims.ch3_roadmaps.roadmap_from_scratch import CLAIMS, findings, plot, trial, unreached
+from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import SAMPLES
 
 pytest.importorskip("ompl")
 
 
 @pytest.fixture(scope="module")
 def values() -> dict:
-    return explored(3, most=6)
+    return trial({"most": 6}, 3)
 
 
 def result(values: dict, seed: int = 0, **other: object) -> SimpleNamespace:
@@ -40,7 +38,8 @@ def test_what_finished_counts_and_a_live_run_decides_about_contacts(values: dict
     assert deep["claims"][3]["verdict"] == "refuted"
 
 
-def test_the_map_is_drawn_before_and_after(values: dict, tmp_path) -> None:
-    assert draw({"a": result(values)}, None, tmp_path / "map.png").exists()
+def test_the_map_is_drawn_before_and_after(values: dict) -> None:
+    pytest.importorskip("matplotlib")
+    assert plot({"a": result(values)}).axes[1].get_title() == "explored offline"
     live = values | {"hours": 0.1, "edges": int(np.sum(values["tried"] > 0))}
-    assert draw({"a": result(values)}, live, tmp_path / "live.png").exists()
+    assert plot({"a": result(values)}, live).axes[1].get_title() == "explored live"
