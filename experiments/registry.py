@@ -21,7 +21,7 @@ EXPERIMENTS = {
     "flood": "experiments.claims.ch2_model.flood",
     "graze": "experiments.claims.ch4_reflex.graze",
     "hypercube": "experiments.hypercube",
-    "identify": "experiments.identify",
+    "identify": "experiments.claims.ch5_control.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
     "live-reach": "experiments.live_reach",

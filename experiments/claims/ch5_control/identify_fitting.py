@@ -1,6 +1,8 @@
-"""Fits the motor model (mobee.simulation.motors) to responses: lag, delay, backlash, friction and encoder noise of every motor.
+"""Fits of the motor model (mobee.simulation.motors) to responses, and a check with simulated motors.
 
-The model itself is run, all motors at once: they do not touch each other in it.  Where a signal starts does not matter to the
+Fitted are lag, delay, backlash, friction and encoder noise of every motor.
+
+The model itself is run, all motors at once: they do not influence each other in it.  Where a signal starts does not matter to the
 model, so each response is compared without its mean.
 """
 
@@ -8,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 
-from experiments.identify.recording import Responses
-from experiments.identify.signals import DT, PRELOAD
+from experiments.claims.ch5_control.identify_recording import DT, PRELOAD, Responses, fitted_signal, held_out_signal
 from mobee.robot.robot import Array, Robot
+from mobee.simulation.identified import FITTED
 from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 
 SHAPED = ("lag", "backlash", "friction")  # fitted at a fixed delay, which the model rounds to substeps
@@ -25,6 +28,10 @@ AWAY = 0.05  # times SCALE, from zero: where a fit starts, steps of a derivative
 LONGEST = 0.05  # s of delay
 FLAT = 1e-6  # change of chi-square, relative, with which a fit is over
 INFORMED = 1e-3  # step of a derivative, times SCALE: shorter ones fall between the kinks of play and friction
+
+NOISE = np.deg2rad(0.1)  # rad at a tick of NOISE_PERIOD
+UNLIKELY = 5.0  # standard deviations
+UNIT = {"lag": ("s", 1.0), "delay": ("s", 1.0), "backlash": ("deg", 180.0 / np.pi), "friction": ("deg/s", 180.0 / np.pi)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,16 +72,16 @@ def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Arra
 
 
 def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
-    """What the model's encoders would say without noise, rad, (n, ticks), when every motor is told the signal (ticks,) rad/s."""
+    """The model's encoder positions without noise, rad, (n, ticks), when every motor is commanded the signal (ticks,) rad/s."""
     motors = Motors(robot, parameters, 0, robot.limits.mean(axis=1))
     substeps = parameters.substeps(DT)
     q = np.empty((len(signal), len(robot.motors)))
-    told = None
+    commanded = None
     for tick, speed in enumerate(signal.tolist()):
         q[tick] = motors.q
-        if speed != told:
+        if speed != commanded:
             motors.command(slice(None), "velocity", np.full(q.shape[1], speed))
-            told = speed
+            commanded = speed
         for _ in range(substeps):
             motors.drive(DT / substeps)
             motors.integrate()
@@ -82,7 +89,7 @@ def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
 
 
 class _Problem:
-    """Mean responses in units of their noise, and what the model says of them."""
+    """Residuals of the model from mean responses, in units of their noise."""
 
     def __init__(self, robot: Robot, signal: Array, measured: Array, sigma: Array) -> None:
         self._robot, self._signal, self._measured, self._sigma = robot, signal, measured, sigma
@@ -157,7 +164,7 @@ def _centred(q: Array) -> Array:
 
 
 def _noise(*responses: Array) -> float:
-    """Standard deviation of repetitions around their mean in a posture, rad, where each starts being its own affair."""
+    """Standard deviation of repetitions around their mean in a posture, rad, each without its own mean."""
     squares, freedom = 0.0, 0
     for each in responses:
         kept = each[:, :, PRELOAD:]
@@ -174,3 +181,41 @@ def _delay_deviation(squares: Array, best: Array) -> Array:
     curvature = squares[middle - 1, motors] + squares[middle + 1, motors] - 2.0 * squares[middle, motors]
     deviation: Array = _substep() * np.sqrt(2.0 / curvature)
     return deviation
+
+
+def known_motors(count: int, seed: int) -> MotorParameters:
+    """Random parameters over their whole range, every third motor without friction, every fifth without play."""
+    rng = np.random.default_rng([seed, 1])
+    lag, delay = rng.uniform(0.01, 0.1, count), 0.005 * rng.integers(0, 9, count)
+    backlash, friction = np.deg2rad(rng.uniform(0.0, 0.8, count)), np.deg2rad(rng.uniform(0.0, 2.0, count))
+    friction[::3], backlash[::5] = 0.0, 0.0
+    values = {"lag": lag, "delay": delay, "backlash": backlash, "friction": friction}
+    return MotorParameters(encoder_noise=0.0, **{name: value.tolist() for name, value in values.items()})
+
+
+def synthetic(
+    robot: Robot, parameters: MotorParameters, signals: tuple[Array, Array], shape: tuple[int, int], seed: int
+) -> list[Responses]:
+    """Responses of motors with these parameters, with encoder noise; `shape`: postures, repetitions."""
+    rng = np.random.default_rng([seed, 2])
+    sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)
+    clean = [respond(robot, parameters, signal) for signal in signals]
+    return [
+        Responses(*(each[motor] + sigma * rng.standard_normal((*shape, each.shape[1])) for each in clean))
+        for motor in range(len(robot.motors))
+    ]
+
+
+def check_method(robot: Robot, postures: int, repetitions: int, seed: int) -> dict[str, Any]:
+    """The largest errors over as many motors as the robot has, absolute and in their standard deviations."""
+    signals = fitted_signal(), held_out_signal(np.random.default_rng(seed))
+    known = known_motors(len(robot.motors), seed)
+    found = fit(robot, synthetic(robot, known, signals, (postures, repetitions), seed), signals)
+    table = {name: _errors(name, known, found) for name in FITTED}
+    return {"passed": all(row["in_deviations"] < UNLIKELY for row in table.values()), **table}
+
+
+def _errors(name: str, known: MotorParameters, found: Fit) -> dict[str, Any]:
+    unit, factor = UNIT[name]
+    error = np.abs(np.subtract(getattr(found.parameters, name), getattr(known, name)))
+    return {"largest": float(error.max() * factor), "unit": unit, "in_deviations": float((error / found.deviation[name]).max())}
