@@ -45,7 +45,7 @@ EXPERIMENTS = {
     "simultaneous": "experiments.simultaneous",
     "table": "experiments.table",
     "transfer": "experiments.transfer",
-    "trm": "experiments.trm",
+    "trm": "experiments.claims.ch3_roadmaps.trm",
     "tune": "experiments.claims.ch5_control.tune",
     "uniformity": "experiments.uniformity",
     "unmodelled": "experiments.unmodelled",

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
-    from experiments.trm.building import build
+    from experiments.kit.roadmap_task import build
 
     known = "nothing"
     with Progress() as bar:

@@ -98,6 +98,12 @@ def test_the_readers_own_robot_gets_a_map_of_its_own_task(tmp_path: Path) -> Non
     run(tmp_path, "-m", "mobee_cli", "reach", "--offline", *robot, "--world", "desk.xml", "--object", "ball")
 
 
+def test_the_task_file_to_copy_builds_a_map(tmp_path: Path) -> None:
+    blocks("docs/roadmaps.md", tmp_path)
+    summary = run(tmp_path, "-m", "mobee_cli", "roadmap", "build", "own_task.py", "--method", "least_squares")
+    assert re.match(r"own_task\.npz: [1-9]\d+ poses", summary)
+
+
 @pytest.mark.system
 def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None:
     blocks("docs/robots.md", tmp_path)

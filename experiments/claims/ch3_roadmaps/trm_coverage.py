@@ -1,4 +1,4 @@
-"""How much of what can be reached a map covers, told by other means than those that built it, and whether its poses are valid."""
+"""The share of the reachable task space that a map covers, by other means than those that built it, and the validity of its poses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OFF = 0.05  # spacings that a pose may be off such a point
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """What of the reachable task space is near a vertex.
+    """The distance of the reachable task space from the vertices.
 
     `reachable`: task points (R, m) that were reached.  `far`: (R,), how far the nearest vertex is from each, in spacings.
     """
@@ -57,7 +57,7 @@ def reachable(
     """Task points (R, m) that can be reached, densely.
 
     They are what a flood of half the spacing (m,) reaches, with far more starts a point than a map gets, and what random starts reach
-    at random points, which knows of no neighbours.
+    at random points, independently of neighbours.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
@@ -85,7 +85,7 @@ def valid(
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
     low, high = model.robot.limits.T
-    good = ((q >= low) & (q <= high)).all(axis=1)
+    good: NDArray[np.bool_] = ((q >= low) & (q <= high)).all(axis=1)
     there = task.of(pose)
     good &= (np.abs(there - y) <= 1e-9).all(axis=1) & ((there >= task.box[:, 0]) & (there <= task.box[:, 1])).all(axis=1)
     problem = Problem(model, costs, start, motors)
