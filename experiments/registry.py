@@ -10,7 +10,7 @@ from mobee.errors import UnknownName
 
 EXPERIMENTS = {
     "accuracy": "experiments.accuracy",
-    "babbling": "experiments.babbling",
+    "babbling": "experiments.claims.ch4_reflex.babbling",
     "change": "experiments.change",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "clauses": "experiments.claims.ch5_control.clauses",

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.babbling.contacts import Touch, depth_histogram, read_touches, touches
+from experiments.kit.recordings import Touch, read_touches, touches
 
 HAND, ELBOW = "l_hand table", "chest l_elbow"
 
@@ -20,9 +20,3 @@ def test_pairs_are_events_of_their_own_in_order_of_time() -> None:
 def test_a_record_is_read_but_not_what_a_kill_has_cut(tmp_path: Path) -> None:
     (tmp_path / "contacts.csv").write_text(f"k,pair,depth\n3,{HAND},0.001\n9,{ELBOW},0.002\n91,l_ha")
     assert read_touches(tmp_path / "contacts.csv", dt=0.02) == [Touch(HAND, 3, 3, 0.001), Touch(ELBOW, 9, 9, 0.002)]
-
-
-def test_every_event_is_in_one_range_of_the_histogram() -> None:
-    depths = [0.00005, 0.00015, 0.0002, 0.0007, 0.0015, 0.02]
-    histogram = depth_histogram(Touch(HAND, i, i, depth) for i, depth in enumerate(depths))
-    assert histogram == {"<0.1": 1, "0.1-0.2": 1, "0.2-0.5": 1, "0.5-1": 1, "1-2": 1, ">2": 1}

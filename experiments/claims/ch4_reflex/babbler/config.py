@@ -1,4 +1,4 @@
-"""What the babbler is told."""
+"""Settings of the babbler."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The babbler's settings; its seed is that of the postures."""
 
     at: Literal["drives", "goals"] = "drives"
-    """Whom it commands: the drives of the robot, or the goals of the controller."""
+    """What it commands: the drives of the robot, or the goals of the controller."""
     robot_of: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
     """Namespace of the robot that it commands: the robot's own, or that of a filter in front of it."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.2
