@@ -262,8 +262,8 @@ def plot(records: Sequence[Record]) -> Any:
             continue
         flooded = list(binned([record for record in mine if record["edits"]], BIN))
         still = list(binned([record for record in mine if not record["edits"]], 0.0))
-        said = "flooded" if flooded else "flooded: too short for a rate"
-        axes.plot(*_columns(flooded), "-s" if len(flooded) == 1 else "-", color=color, label=f"{LABELS[robot]}, {said}")
+        label = "flooded" if flooded else "flooded: too short for a rate"
+        axes.plot(*_columns(flooded), "-s" if len(flooded) == 1 else "-", color=color, label=f"{LABELS[robot]}, {label}")
         axes.plot(*_columns(still), "--o", color=color, markersize=3.0, linewidth=0.8, label=f"{LABELS[robot]}, no edits")
     axes.set(xlabel="objects in the workspace", ylabel="evaluations per second", yscale="log", xlim=(0.0, 1.03 * most))
     axes.set_title("Thesis figure 2.4: model evaluations while the world is flooded with edits")

@@ -1,4 +1,4 @@
-"""Endurance of the model: several threads edit one world in every way while it evaluates, and every evaluation is checked."""
+"""Endurance of the model: several threads make all kinds of edits in one world while it evaluates, and every evaluation is checked."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
-APART = 500_000_000  # ns for which an object must not be felt, so that it is touched anew: at a field's border noise decides
+APART = 500_000_000  # ns without a force of an object before its next touch: at a field's border noise decides
 AWAY = [0.6, 0.9, 0.6]  # m, where the simulator's ball is out of reach
 
 

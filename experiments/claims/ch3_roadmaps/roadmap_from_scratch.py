@@ -65,7 +65,7 @@ CLAIMS = (
     Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0"),
 )
 AGREE = 0.95
-STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not come to": ("0.75", 0.6)}
+STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not tried": ("0.75", 0.6)}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -185,7 +185,7 @@ def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
     _edges(before, values, exists & (np.arange(len(exists)) < SAMPLES)[:, None] & (values["goals"] < SAMPLES), places, "0.4", 0.8)
     before.set_title(f"{SAMPLES} random poses, nothing verified")
     kinds = {
-        "not come to": exists & (values["tried"] == 0),
+        "not tried": exists & (values["tried"] == 0),
         "failed": (values["tried"] > 0) & ~values["feasible"],
         "feasible": values["feasible"],
     }

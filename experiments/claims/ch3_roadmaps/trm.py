@@ -90,7 +90,7 @@ def work(cell: Cell) -> dict[str, Any]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Do what is left of the sweep."""
+    """Build the maps that the folder does not hold yet."""
     importlib.import_module("mobee.collision.fcl_engine")  # raises NotInstalled before anything is begun
     run_cells(work, cells(arguments), folder, arguments)
     return findings(load_cells(folder))

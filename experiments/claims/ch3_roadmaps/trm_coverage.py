@@ -81,7 +81,7 @@ def valid(
     motors: Sequence[str] | None = None,
     start: Array | None = None,
 ) -> NDArray[np.bool_]:
-    """Which poses q (V, n) are, by the reference engine, within all tolerances, their limits and the box, and where y (V, m) says, (V,)."""
+    """Whether poses q (V, n) are, by the reference engine, within all tolerances, their limits and the box, and at y (V, m): (V,)."""
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
     low, high = model.robot.limits.T

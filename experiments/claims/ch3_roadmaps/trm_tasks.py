@@ -278,7 +278,7 @@ def push_over() -> Example:
 def reach_into() -> Example:
     """Reach into a box that is open above (thesis fig. 3.8).
 
-    Nothing is asked of the hand but to touch nothing; the task space is its place, in the box and above it.  For picking from the box and
+    The only constraint is that nothing is touched; the task space is its place, in the box and above it.  For picking from the box and
     placing into it.
     """
     x, y, floor = -0.27, 0.17, -0.22  # m, of the box

@@ -45,7 +45,7 @@ from mobee.robot.robot import Robot
 
 TRIAL = "trial.json"
 SEEDS = 10_000  # trials a seed
-TRIES = 3  # of a trial in which somebody was late for a tick, which the robot does not forgive
+TRIES = 3  # of a trial in which a process was late for a tick
 
 OUTCOMES: tuple[Outcome, ...] = ("completed", "deflected", "returned")
 DEEPEST = 2e-3  # m, allowed with MoBeE 2.0
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
-    """Run a trial until nobody was late for a tick; raises TrialFailed."""
+    """Repeat a trial until no process was late for a tick; raises TrialFailed."""
     for _ in range(TRIES):
         run_trial(place, mode, robot, seed, ticks, show)
         trial = measure(place, robot, 1.0 / RATE)

@@ -87,13 +87,13 @@ def _quoted(path: Path) -> str:
 
 
 class TrialFailed(MobeeError):
-    """A trial that did not come to its end; the message names its logs."""
+    """A trial that did not end in order; the message names its logs."""
 
 
 def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
     """Leave commands, positions and contacts in the folder; `show` is called with the share that is done.  Raises TrialFailed."""
     folder.mkdir(parents=True, exist_ok=True)
-    for left in (COMMANDS, POSITIONS):  # of a trial that was broken off
+    for left in (COMMANDS, POSITIONS):  # of an interrupted trial
         (folder / left).unlink(missing_ok=True)
     file = folder / f"{mode}.toml"
     file.write_text(scenario(mode, folder.resolve(), seed, ticks))

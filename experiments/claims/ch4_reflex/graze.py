@@ -9,8 +9,8 @@ A client drives the left hand along a straight path through the surface of the t
 and tries again whenever it gets control back, for 12 s.  Motors with lag, delay, play and encoder noise, ticks of 10 ms.  Variants:
 off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
 are attractors of the controller.  The first recovery of each trial counts.  It is a success when the hand ends out of contact, has not come
-into contact again nor gone deeper on the way back, and the reflex does not come again within 0.3 s; it is clean when besides the reflex
-saw nothing of the contact any more on the way back.
+into contact again nor gone deeper while it moved back, and the reflex does not come again within 0.3 s; it is clean when besides the reflex
+saw nothing of the contact any more meanwhile.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ QUICK_ANGLES, QUICK_SPOTS, QUICK_REPEAT = (60.0, 2.0), 2, 1
 
 DT = 0.01  # s
 SECONDS = 12.0
-RELAPSE = 0.3  # s after control is back; the way from the start to the contact takes longer
+RELAPSE = 0.3  # s after control is back; the motion from the start to the contact takes longer
 UNLIMITED = 1e6  # rad/s: the velocity of the naive reflex has no limit
 SETTINGS = {"naive": ReflexSettings.naive(), "mended": ReflexSettings()}
 VARIANTS = ("off", *SETTINGS, "2.0")
 
 STOPPING = 30  # ticks in which the robot comes to a stop
-MORE = 1e-3  # m by which a way back must be deeper than the stop to count as such
+MORE = 1e-3  # m by which the motion back must be deeper than the stop to count as deeper
 
 COLORS = {"off": "0.6", "naive": "tab:red", "mended": "tab:orange", "2.0": "tab:blue"}
-LABELS = {"off": "nobody steps in", "naive": "1.0, naive", "mended": "1.0, filter and dead time", "2.0": "2.0"}
+LABELS = {"off": "no reflex", "naive": "1.0, naive", "mended": "1.0, filter and dead time", "2.0": "2.0"}
 DEPTHS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # mm, marked
 SWITCHING = ("naive", "mended")
 
@@ -170,9 +170,9 @@ class Trial:
     again: bool  # the first recovery: contact came back, by the encoders
     came_back: bool  # the same, by the joints
     never: bool  # control came back, or never did, while the hand was in contact
-    deeper: bool  # the way back went deeper than the stop
+    deeper: bool  # the motion back went deeper than the stop
     relapse: bool  # the second reflex came as soon as control was back
-    settled: bool  # 2.0: the controller says so
+    settled: bool  # 2.0: by the controller's test
     progress: float  # m, from the start to where the hand was farthest along the table
 
     @property
@@ -182,7 +182,7 @@ class Trial:
 
     @property
     def clean(self) -> bool:
-        """1.0: besides, the encoders saw nothing of the contact on the way back."""
+        """1.0: besides, the encoders saw nothing of the contact during the motion back."""
         return self.recovered and not self.again
 
 

@@ -42,7 +42,7 @@ class Fit:
     deviation: dict[str, Array]  # lag, delay s; backlash rad; friction rad/s
     noise: Array  # rad, of the encoders at a tick of NOISE_PERIOD
     chi_square: Array  # of the fitted responses, a degree of freedom: 1 if only encoder noise is left
-    misfit: Array  # rad, rms of what is left of the mean fitted response beyond the noise
+    misfit: Array  # rad, rms residual of the mean fitted response beyond the noise
     held_out_chi_square: Array
     held_out_misfit: Array
 

@@ -35,14 +35,14 @@ SOLID, CLAUSE = 2.0, 2.0  # mm, degrees: allowed with the default gains
 OSCILLATION, DEAD = 1.0, 0.3  # mm at rest; s without motion before it is at rest
 
 LEVELS = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # N/kg at a marker; rad/s^2 at a motor; before the squash
-QUICK_LEVELS = LEVELS[::3]
+QUICK_LEVELS, QUICK_CASES = LEVELS[::3], 3  # walls and targets
 LEVEL_SECONDS, LEVEL_REST = 3.0, 2.0  # a level lasts; its end, in which restlessness is measured
 INSIDE = np.deg2rad(1.0)  # only motors that are so far within their limits at home are judged by them; some stand at theirs
 SAMPLING = 0.02  # s between two postures whose contacts are evaluated
 PALMS = ("left_palm", "right_palm")
 
 MARKER, ARM = "left_palm", "left_arm"
-DRAWN_SECONDS, QUICK_DRAWN_SECONDS, DRAWN_REST = 60.0, 10.0, 3.0  # the run; its end, in which oscillation is measured
+DRAWN_SECONDS, DRAWN_REST = 60.0, 3.0  # s, the run; its end, in which oscillation is measured
 # m/s, s, m: slower than this over that time, farther than that from where it comes to rest, the hand has stopped dead.
 SLOW, WINDOW, NEAR = 2e-4, 0.5, 0.01
 
@@ -113,15 +113,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """With each gain set every wall, then every target."""
-    levels, seconds = (QUICK_LEVELS, QUICK_DRAWN_SECONDS) if arguments.quick else (LEVELS, DRAWN_SECONDS)
+    """With each gain set every wall, then every target; --quick: the first of them, with few levels of force."""
+    levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
     found = []
     for gains in arguments.gains:
-        for wall in arguments.walls:
+        for wall in arguments.walls[:cases]:
             settings = {"gains": gains, "wall": wall, "levels": list(levels)}
             found.append(Condition(f"{gains}-{wall}", settings, LEVEL_SECONDS * len(levels)))
-        for target in arguments.targets:
-            found.append(Condition(f"{gains}-drawn-{target}", {"gains": gains, "target": target, "seconds": seconds}, seconds))
+        for target in arguments.targets[:cases]:
+            found.append(Condition(f"{gains}-drawn-{target}", {"gains": gains, "target": target}, DRAWN_SECONDS))
     return found
 
 
@@ -129,7 +129,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Press into a wall: "pressed", a record a level; or draw the hand to a target: "drawn", and its path (times, distances)."""
     if "wall" in settings:
         return {"pressed": [one.record() for one in press(settings["gains"], settings["wall"], settings["levels"], seed)]}
-    drawn, times, distances = draw_hand(settings["gains"], settings["target"], settings["seconds"], seed)
+    drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
     return {"drawn": drawn.record(), "times": times, "distances": distances}
 
 
@@ -163,7 +163,7 @@ def _worst(angles: Array) -> float:
     return float(np.rad2deg(angles.max()))
 
 
-def draw_hand(gains: str, name: str, seconds: float, seed: int) -> tuple[Drawn, Array, Array]:
+def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
     """Draw the hand to the targets of a goal, each for its share of the time; also times (T,) s and distances from the target (T,) m."""
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
@@ -173,7 +173,7 @@ def draw_hand(gains: str, name: str, seconds: float, seed: int) -> tuple[Drawn, 
     place(plant, start)
     home = icub().evaluate(robot.home).position(MARKER)
     targets = [home + np.array(target) for target in goal.targets]
-    ticks = round(seconds / plant.dt / len(targets))
+    ticks = round(DRAWN_SECONDS / plant.dt / len(targets))
     reacher = Reacher(plant.controller, MARKER, targets[0])
 
     def pull(tick: int) -> None:
