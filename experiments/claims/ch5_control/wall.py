@@ -221,9 +221,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _worst_of(pressed: Sequence[Pressed]) -> dict[str, Any]:
-    columns = ("solid_mm", "field_mm", "clause_deg", "limit_deg", "restless_mm")
-    pair = max(pressed, key=lambda p: p.solid_mm).pair or "none"
-    return {"pair": pair, **{name: max(getattr(p, name) for p in pressed) for name in columns}}
+    deepest_solid = max(pressed, key=lambda p: p.solid_mm)
+    others = ("field_mm", "clause_deg", "limit_deg", "restless_mm")
+    worst = {name: max(getattr(p, name) for p in pressed) for name in others}
+    return {"solid_mm": deepest_solid.solid_mm, "pair": deepest_solid.pair or "none", **worst}
 
 
 def _pressed(found: Cells) -> list[Pressed]:
