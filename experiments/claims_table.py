@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.claims import LEAST_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.claims import LEAST_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, load_experiment
-from experiments.run_folder import CONFIG, RESULTS, VERSIONS, read
 from mobee.errors import InvalidValue
 
 HERE = Path(__file__).parent
@@ -48,7 +48,7 @@ choice, not the draw of the graph, and what the numbers say may be a property of
 def stated() -> Rows:
     """The claims that the experiments list, without our numbers; those of chapter 7 first, in its order."""
     names = dict.fromkeys((*CHAPTER7, *BEYOND, *EXPERIMENTS))
-    return [(name, claim) for name in names for claim in getattr(load_experiment(name), "CLAIMS", ())]
+    return [(name, claim) for name in names for claim in load_experiment(name).claims]
 
 
 def recorded() -> Recorded:

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.claims import Claim, open_with_few_seeds
 from experiments.claims_table import better, claims_text, finished_runs, found_in, recorded, rows, write_page
-from experiments.matplotlib_figure import MatplotlibMissing
-from experiments.registry import EXPERIMENTS, Experiment, load_experiment
-from experiments.run_folder import (
+from experiments.kit.claims import Claim, open_with_few_seeds
+from experiments.kit.experiment import Experiment
+from experiments.kit.plots import MatplotlibMissing
+from experiments.kit.run_folder import (
     RESULTS,
     discard_unused,
     experiment_of,
@@ -26,7 +26,8 @@ from experiments.run_folder import (
     options_of,
     write,
 )
-from experiments.sweep import CellsFailed
+from experiments.kit.sweep import CellsFailed
+from experiments.registry import EXPERIMENTS, load_experiment
 from mobee.errors import InvalidValue, MobeeError, NotInstalled
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
 from mobee_cli.results_text import results_text
@@ -79,22 +80,22 @@ def run(arguments: argparse.Namespace) -> int:
 def _list(arguments: argparse.Namespace) -> int:
     found = [load_experiment(name) for name in EXPERIMENTS]
     if arguments.json:
-        print(json.dumps([{"name": e.NAME, "claim": e.CLAIM, "source": e.SOURCE} for e in found], indent=2))
+        print(json.dumps([{"name": e.name, "claim": e.claim, "source": e.source} for e in found], indent=2))
         return 0
     columns = shutil.get_terminal_size().columns  # 80 in a pipe
     for experiment in found:
-        text = f"{experiment.CLAIM} ({experiment.SOURCE})"
-        print(textwrap.fill(text, columns, initial_indent=f"{experiment.NAME:<12} ", subsequent_indent=" " * 13, break_on_hyphens=False))
+        text = f"{experiment.claim} ({experiment.source})"
+        print(textwrap.fill(text, columns, initial_indent=f"{experiment.name:<12} ", subsequent_indent=" " * 13, break_on_hyphens=False))
     return 0
 
 
 def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser], given: Sequence[str]) -> argparse.Namespace:
     """Options of the run; those of a run that is resumed are its own unless they are given again."""
-    notes = _wrapped((experiment.__doc__ or "").strip())
+    notes = _wrapped(experiment.notes.strip())
     parser = make_parser(
-        prog=f"mobee experiment run {experiment.NAME}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=f"mobee experiment run {experiment.name}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    experiment.add_arguments(parser)
+    experiment.method.add_arguments(parser)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
     parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the run's folder is made (default: runs)")
     parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="go on with a run, or with the newest")
@@ -102,8 +103,8 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     options = parser.parse_args(given)
     if options.resume is None:
         return options
-    run = newest_run(options.runs, experiment.NAME) if options.resume == _NEWEST else options.resume
-    begun = options_of(run, experiment.NAME)
+    run = newest_run(options.runs, experiment.name) if options.resume == _NEWEST else options.resume
+    begun = options_of(run, experiment.name)
     parser.set_defaults(**begun)
     options = parser.parse_args(given)
     options.resume, seed = run, begun.get("seed")
@@ -123,23 +124,23 @@ def _wrapped(notes: str) -> str:
 def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     try:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
-        folder = options.resume or new_run(options.runs, experiment.NAME, own)
+        folder = options.resume or new_run(options.runs, experiment.name, own)
         with held(folder):
             if options.resume:
-                keep_options(folder, experiment.NAME, own)
+                keep_options(folder, experiment.name, own)
             results = _results(experiment, options, folder)
             write(folder / RESULTS, results)
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
     except CellsFailed as error:
-        raise UserError(f"{error}\nTry them again with `mobee experiment run {experiment.NAME} --resume {folder}`", FAILED) from None
+        raise UserError(f"{error}\nTry them again with `mobee experiment run {experiment.name} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:
-        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.NAME} --resume {folder}`", INTERRUPTED) from None
+        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.name} --resume {folder}`", INTERRUPTED) from None
     if options.json:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:
         print(f"run: {folder}")
-        claims = [(experiment.NAME, Claim(**claim)) for claim in results.pop("claims", [])]
+        claims = [(experiment.name, Claim(**claim)) for claim in results.pop("claims", [])]
         print(results_text(results, shutil.get_terminal_size().columns))  # 80 in a pipe
         if claims:
             print(claims_text(claims, shutil.get_terminal_size().columns))
@@ -148,7 +149,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 
 def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     try:
-        return open_with_few_seeds(experiment.run(options, folder), vars(options))
+        return open_with_few_seeds(experiment.method.run(options, folder), vars(options))
     except MobeeError:
         if options.resume is None:
             discard_unused(folder)
@@ -175,6 +176,6 @@ def _figure(arguments: argparse.Namespace) -> int:
     if folder is None and name not in EXPERIMENTS and Path(name).is_dir():
         name, folder = experiment_of(Path(name)), Path(name)
     experiment = load_experiment(name)
-    path = experiment.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))
+    path = experiment.method.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0

@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from experiments.recorded_transitions import records
+from experiments.kit.recorded_transitions import records
 from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
 from mobee_cli.reach_table import write_reaches

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from experiments.recorded_transitions import Record
+from experiments.kit.recorded_transitions import Record
 from mobee_cli.errors import ENVIRONMENT, UserError
 
 COLUMNS = ("source", "agent", "n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched", "time")

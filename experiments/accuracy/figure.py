@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.accuracy.findings import errors, looks
 from experiments.accuracy.worlds import WORLDS
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from experiments.bench import requirement
 from experiments.bench.requirement import all_passed, judged
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from mobee.errors import MobeeError
 
 HERE = Path(__file__).resolve().parents[2]

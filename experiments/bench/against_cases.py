@@ -133,7 +133,7 @@ def _chapter_8() -> Work:
 
 def _lockstep() -> Work:
     """All services, without their start."""
-    from experiments.launched import summary_of
+    from experiments.kit.live import summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -194,10 +194,10 @@ def _inverse_kinematics(method: Any, count: int) -> Work:
 
 
 def _roadmap(method: Any, spacing: float) -> Work:
-    from experiments.trm.building import build
-    from experiments.trm.pregrasp import example
+    from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp
+    from experiments.kit.roadmap_task import build
 
-    wanted = replace(example(), margin=0.0, spacing=spacing)
+    wanted = replace(pregrasp(), margin=0.0, spacing=spacing)
 
     def work() -> Done:
         found: list[Any] = []

@@ -15,7 +15,7 @@ from experiments.bench.calibration import Calibration
 from experiments.bench.edges_workload import MARKER, palm_map
 from experiments.bench.requirement import judged
 from experiments.bench.rounds import one_core
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from mobee.roadmap.edge_watch import EdgeWatch
 from mobee.roadmap.edges import STEP, Flags, between, checked
 from mobee.roadmap.ik.solids import solid_model

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from experiments.trm.body import RIGHT
-from experiments.trm.building import build
-from experiments.trm.pregrasp import example
+from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp
+from experiments.kit.roadmap_task import RIGHT, build
 from mobee import Roadmap
 
 MARKER = RIGHT
@@ -15,4 +14,4 @@ NEIGHBOURS = 8
 
 def palm_map(spacing: float) -> Roadmap:
     """The map with that spacing [m], up to the motors' limits, each pose joined to the nearest 8."""
-    return build(replace(example(), spacing=spacing, margin=0.0), "least_squares", neighbours=NEIGHBOURS)
+    return build(replace(pregrasp(), spacing=spacing, margin=0.0), "least_squares", neighbours=NEIGHBOURS)

@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any
 
 from experiments.bench.calibration import Calibration, Crew
-from experiments.launched import summary_of
-from experiments.progress import Progress
+from experiments.kit.live import summary_of
+from experiments.kit.progress import Progress
 
 
 @dataclass(frozen=True, slots=True)

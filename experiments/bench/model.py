@@ -26,7 +26,7 @@ from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.random_robots import MAKERS, MIXED, PLAIN
 from experiments.bench.requirement import all_passed, judged
 from experiments.bench.rounds import Contestant, one_core, rates
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from mobee.model import Model
 from mobee.robot.robot import Array, Robot
 

@@ -15,7 +15,7 @@ from experiments.bench.mujoco_stepper import us_per_tick
 from experiments.bench.plant_workload import DT, Pace, arm_plant, one_arm, one_arm_reaching, three_agents, trajectory_hash
 from experiments.bench.requirement import judged
 from experiments.bench.rounds import one_core
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 
 # Name, which run, which number of it in the standard machine's time, at least, aim.
 REQUIREMENTS = (

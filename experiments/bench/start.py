@@ -21,8 +21,8 @@ import numpy as np
 from experiments.bench import calibration, requirement
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.requirement import judged
-from experiments.launched import summary_of
-from experiments.progress import Progress
+from experiments.kit.live import summary_of
+from experiments.kit.progress import Progress
 
 NUMPY, IMPORT, POSE = "import numpy", "import mobee", "first pose"
 _NUMPY_SECONDS = 0.08  # of processor time, on the standard machine

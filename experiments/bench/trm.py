@@ -14,10 +14,10 @@ from experiments.bench import calibration, requirement
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.requirement import judged
 from experiments.bench.rounds import some_cores
-from experiments.progress import Progress
-from experiments.trm import pregrasp
-from experiments.trm.coverage import coverage, reachable, valid
-from experiments.trm.example import Example
+from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
+from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
+from experiments.kit.progress import Progress
+from experiments.kit.roadmap_task import Example
 from mobee.roadmap.building.build import LONGEST
 from mobee.roadmap.neighbours import nearest, short
 from mobee.roadmap.roadmap import Roadmap
@@ -46,7 +46,7 @@ VERTICES = 4000
 class Settings:
     """The spacing [m], the seeds of each method, how many vertices there must be, and the methods."""
 
-    spacing: float = pregrasp.SPACING
+    spacing: float = PREGRASP_SPACING
     seeds: int = 1
     vertices: int = VERTICES
     methods: Sequence[str] = (LEAST_SQUARES, NES, HYBRID)
@@ -57,7 +57,7 @@ QUICK = Settings(spacing=0.03, vertices=300)
 
 def measure(settings: Settings) -> dict[str, Any]:
     """All numbers, for people and scripts; of several seeds the worst."""
-    example = replace(pregrasp.example(), margin=0.0)  # all that can be reached
+    example = replace(pregrasp(), margin=0.0)  # all that can be reached
     spacing = np.full(len(example.task.names), settings.spacing)
     rows: dict[str, dict[str, float]] = {}
     with Progress() as progress:

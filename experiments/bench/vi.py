@@ -14,7 +14,7 @@ from experiments.bench.requirement import judged
 from experiments.bench.rounds import Contestant, one_core, rates
 from experiments.bench.vi_peers import QUANTECON, Problem, load_quantecon
 from experiments.bench.vi_workload import Tables, Work, at_random, at_work, of_size
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.value_iteration import METHODS, value_iteration
 from mobee.robot.robot import Array

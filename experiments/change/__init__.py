@@ -28,11 +28,12 @@ from experiments.change.figure import draw
 from experiments.change.findings import CLAIMS, findings
 from experiments.change.runs import BEFORE, CONDITIONS, EVERY
 from experiments.change.worlds import CHANGES, groups, measure_outcomes, plant_of
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.model_error import l1
 from experiments.learning.published import arm_space
 from experiments.learning.trial import explore
 from experiments.learning.truth import Truth, truth_of
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
 from mobee.errors import InvalidValue
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.change.runs import CONDITIONS, EVERY, Run, runs_of
 from experiments.change.worlds import CHANGES
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from experiments.change.runs import BEFORE, CONDITIONS, EVERY, RELEARNED, Key, Run, runs_of
 from experiments.change.worlds import CHANGES
-from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interquartile_mean, interval, told
 
 VALUE = Claim("thesis 7.2.6", "the value of actions that suddenly end elsewhere shoots up: over that before", "shot up")
 TRIED = Claim("thesis 7.2.6", "the agent becomes interested in them: tries over the mean of all in the next 500", "a few times")

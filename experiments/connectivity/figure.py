@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.connectivity.findings import direct, groups, length
-from experiments.matplotlib_figure import new_figure
-from experiments.statistics import interquartile_mean, interval
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import interquartile_mean, interval
 from mobee.errors import InvalidValue
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
-from experiments.statistics import decides, interquartile_mean, interval, ratio_interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, ratio_interval, told
 
 GRAPHS: tuple[int | str, ...] = (4, 6, 8, 12, 16, 24, 32, "equidistant")
 PUBLISHED = 16

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from experiments.coverage.findings import EARLY, covered, groups
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 
 COLORS = {

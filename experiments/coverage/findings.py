@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
-from experiments.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval
 from mobee.robot.robot import Array
 
 EARLY = 220  # transitions, before which the published figure shows no difference in actions

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from experiments.drawing.picture import Picture
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 
 DPI = 100
 GAP, MARGIN = 8, 10  # pixels

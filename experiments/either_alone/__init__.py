@@ -30,8 +30,9 @@ from experiments.either_alone.cases import SCENES, make_cases
 from experiments.either_alone.figure import draw
 from experiments.either_alone.findings import CLAIMS, LAWS, claims, summary
 from experiments.either_alone.trial import WAYS, attempt, trained
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.reaching.scene import LEARNED
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 
 NAME = "either-alone"
 CLAIM = "a coarse planner with a reactive reach does more than either alone"

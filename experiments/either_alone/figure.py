@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.drawn import draw_bars
 from experiments.either_alone.cases import SCENES
 from experiments.either_alone.findings import LAWS, MEASURE, measured
 from experiments.either_alone.trial import WAYS
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_bars, new_figure
 from mobee.errors import InvalidValue
 
 COLORS = {"planner": "tab:blue", "reach": "tab:orange", "both": "tab:red"}

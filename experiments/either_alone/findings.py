@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
 from experiments.either_alone.cases import SCENES
 from experiments.either_alone.trial import WAYS
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interval, told
 from experiments.reaching.targets import GOOD
-from experiments.statistics import interval, told
-from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
 TOLD = {

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from experiments.control.ride import place
 from experiments.either_alone.cases import Case
+from experiments.kit.control_runs import place
 from experiments.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent, touchable_targets
 from experiments.reaching.course import Course
 from experiments.reaching.targets import GOOD

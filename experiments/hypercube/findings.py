@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interquartile_mean, interval, told
 from mobee.robot.robot import Array
 
 DISCOUNTS = (0.5, 0.9, 0.99)

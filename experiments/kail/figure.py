@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.kail.findings import DIVERGENCES, at_constraints, groups
 from experiments.kail.on_paper import KINDS, TRIES, rewards
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
 
 TITLES = {"kail": "'Kail'", "kl": "plain KL, uniform prior"}

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
 from experiments.kail.on_paper import told_apart
 from experiments.kail.spaces import space_of
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interquartile_mean, interval, told
 from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
 from experiments.learning.explored import Explored, Groups, explored
-from experiments.statistics import interquartile_mean, interval, told
-from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
 DIVERGENCES = ("kail", "kl")

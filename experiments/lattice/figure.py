@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.lattice.groups import FAILING, HARD, Run, groups
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 

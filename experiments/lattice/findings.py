@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, ratio_interval, told
 from experiments.lattice.groups import ENTERING, FAILING, HARD, Key, Run, groups
-from experiments.statistics import decides, interquartile_mean, interval, ratio_interval, told
-from experiments.sweep import CellResult
 
 DISCOUNTS = (0.5, 0.9, 0.99)
 INITIAL = ("50-50", "60-40")

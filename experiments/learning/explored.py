@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from experiments.kit.cells import CellResult
 from experiments.learning.outcomes import exists_in, failures_of, tries_of, visits_of
-from experiments.sweep import CellResult
 from mobee import Lattice
 from mobee.robot.robot import Ints
 

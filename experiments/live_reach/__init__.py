@@ -27,7 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.babbling.measured import POSITIONS
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.recordings import POSITIONS
 from experiments.live_reach.figure import draw
 from experiments.live_reach.findings import CLAIMS, claims, misses, table
 from experiments.live_reach.held_off import nearest_reach
@@ -37,9 +39,7 @@ from experiments.live_reach.measured import BLOCK, Block, measure, read_block, w
 from experiments.live_reach.problems import fresh_problems, grid_problems, grid_targets, moving_problems, touchable
 from experiments.live_reach.settings import AIM, GOOD, RATE, belief, offline_plant
 from experiments.live_reach.training import TRANSITIONS, train
-from experiments.options import positive_whole
 from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
-from experiments.progress import Progress
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.store import STORE

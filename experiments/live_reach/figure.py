@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.kit.plots import new_figure
 from experiments.live_reach.findings import TOLD, WHO, tries_of
 from experiments.live_reach.measured import Block
 from experiments.live_reach.problems import FRESH, GRID
 from experiments.live_reach.settings import GOOD
-from experiments.matplotlib_figure import new_figure
 
 COLORS = {"learner": "tab:red", "peer": "tab:blue"}
 TITLES = {GRID: "of the 27, those that can be reached", FRESH: "fresh random targets"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from experiments.claims import Claim
+from experiments.kit.claims import Claim
 from experiments.live_reach.measured import Block, Judged
 from experiments.live_reach.problems import FRESH, GRID, OBSTACLE_MOVES, TARGET_MOVES
 

@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from experiments.control.ride import place
+from experiments.kit.control_runs import place
 from experiments.live_reach.problems import grid_targets, touchable
 from experiments.live_reach.settings import GOOD, MARKER, PART, belief, offline_plant, space
 from mobee.reach import ReachTarget

@@ -1,4 +1,4 @@
-"""What the performer is given to do, and what it says of it: see `experiments.jobs`."""
+"""What the performer is given to do, and what it says of it: see `experiments.kit.live`."""
 
 from __future__ import annotations
 

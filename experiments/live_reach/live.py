@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.jobs import write_job
-from experiments.launched import summary_of
+from experiments.kit.live import summary_of, write_job
 from experiments.live_reach.job import Job
 from experiments.live_reach.settings import GAINS, RATE, ROBOT, WORLD
 

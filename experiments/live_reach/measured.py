@@ -8,9 +8,8 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from experiments.babbling.contacts import Touch, read_touches
-from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.jobs import read_done
+from experiments.kit.live import read_done
+from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_touches
 from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.settings import DEEP, GOOD, MARKER, PART, robot
 from mobee import Model

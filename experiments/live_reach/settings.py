@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from experiments.babbling.modes import WORLD
+from experiments.kit.live import TABLE as WORLD
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.scene import MARKER, PART
 from mobee import Gains, Lattice, Model, MotorParameters, OfflinePlant, World, load_robot, load_world

@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
-from experiments.options import positive_whole
-from experiments.progress import Progress
-from experiments.sweep import Cell, run_cells, sweep_arguments
+from experiments.kit.cells import Cell
+from experiments.kit.claims import Claim
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.transfer import work
 from experiments.transfer.figure import draw
 from experiments.transfer.live import learn

@@ -19,11 +19,11 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.options import positive_whole
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.originals.checkouts import Original, find_originals
 from experiments.originals.table import COLUMNS, RECORDS, TABLE, write_table
-from experiments.progress import Progress
-from experiments.records import Records, read_records
 from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.check import check_file
 from mobee.robot.load import load_robot, load_world

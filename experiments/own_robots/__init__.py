@@ -20,10 +20,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.own_robots.measure import Measured, measure
 from experiments.own_robots.robots import ROBOTS, examples_folder, robot_file
-from experiments.progress import Progress
-from experiments.records import Records, read_records
 from mobee import Model, OfflinePlant, load_robot
 from mobee.errors import RobotFileError
 

@@ -19,10 +19,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.pregrasp.figure import draw
 from experiments.pregrasp.findings import CLAIMS, findings
 from experiments.pregrasp.trial import queried
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 
 NAME = "pregrasp"
 CLAIM = "bumps adapt a map to things that were put on the table; the denser the map, the more of them it takes"

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import interquartile_mean, interval
 from experiments.pregrasp.findings import groups, numbers
 from experiments.pregrasp.trial import MODES
-from experiments.statistics import interquartile_mean, interval
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 COLORS = {"edge": "tab:red", "around": "tab:blue"}

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interval, told
 from experiments.pregrasp.trial import MODES
-from experiments.statistics import interval, told
-from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
 CLAIMS = (

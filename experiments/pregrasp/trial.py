@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.trm.body import RIGHT
-from experiments.trm.building import build
-from experiments.trm.pregrasp import example
+from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp as example
+from experiments.kit.roadmap_task import RIGHT, build
 from mobee import MobeeError, Model, Roadmap, World, cylinder
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.playback import play

@@ -20,7 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.claims import Claim
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.published import arm_plant
 from experiments.prm_vs_mdp.belief import BELIEFS, believed
 from experiments.prm_vs_mdp.figure import draw
@@ -30,7 +32,6 @@ from experiments.prm_vs_mdp.queries import answer
 from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Rival, Straight
 from experiments.prm_vs_mdp.scene import Scene, make_scene, space, world_of
 from experiments.prm_vs_mdp.summary import Row, Summary, summarise
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent, Lattice
 
 NAME = "prm-vs-mdp"

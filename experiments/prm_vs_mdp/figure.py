@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.prm_vs_mdp.belief import BELIEFS
 from experiments.prm_vs_mdp.summary import BLOCK, Row, Summary
 from mobee.errors import InvalidValue

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.control.ride import place
+from experiments.kit.control_runs import place
 from experiments.learning.arm_poses import JOINTS, PART, columns, whole
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_plant, arm_space, robot
 from mobee import Lattice, Model, OfflinePlant, World, sphere

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.statistics import interquartile_mean, interval
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.statistics import interquartile_mean, interval
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 

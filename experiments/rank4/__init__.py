@@ -19,13 +19,14 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.published import arm_plant, arm_space
 from experiments.learning.trial import begin_anywhere, explore
 from experiments.rank4.felt_plant import FeltPlant, SelfContact
 from experiments.rank4.figure import draw
 from experiments.rank4.findings import CLAIMS, findings
 from experiments.rank4.runs import ACTIONS, LEVELS
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
 
 NAME = "rank4"

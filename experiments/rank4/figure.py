@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.learning.outcomes import tries_of
-from experiments.matplotlib_figure import new_figure
 from experiments.rank4.runs import ACTIONS, LEVELS, Run, runs_of
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interquartile_mean, interval, told
 from experiments.learning.outcomes import ends_of, outcome_counts
 from experiments.rank4.runs import ACTIONS, ASIDE, HARDLY, NEVER, Run, runs_of
-from experiments.statistics import interquartile_mean, interval, told
-from experiments.sweep import CellResult
 
 MOST_VISITS, LEAST_ASIDE, HANDFUL = 10, 100, 10
 MANY = 0.01  # of the actions, for self-contacts to be many

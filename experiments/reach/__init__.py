@@ -19,14 +19,15 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.options import positive_number
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.options import positive_number
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.reach.figure import draw
 from experiments.reach.findings import CLAIMS, findings
 from experiments.reach.runs import LOOKS, STRATEGIES
 from experiments.reaching.looks import learn
 from experiments.reaching.scene import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.reaching.targets import grid, targets_at
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
 

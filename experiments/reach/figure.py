@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import interquartile_mean, interval
 from experiments.reach.poses import draw_poses
 from experiments.reach.runs import Runs, runs_of
-from experiments.statistics import interquartile_mean, interval
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 COLORS = {"intrinsic": "tab:red", "greedy": "tab:blue", "random": "0.4"}

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, told
 from experiments.reach.rules import all_hold, better, changes, published_ratio, rises
 from experiments.reach.runs import STRATEGIES, Runs, runs_of
-from experiments.statistics import decides, interquartile_mean, interval, told
-from experiments.sweep import CellResult
 
 RIVALS = STRATEGIES[1:]
 JUDGED = (800, 1600, 3200, 6400)  # problem-tries at which intrinsic motivation is compared

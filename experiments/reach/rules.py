@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.claims import Claim
-from experiments.statistics import (
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import (
     decides,
     improvement_interval,
     interquartile_mean,

@@ -20,7 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.options import positive_number
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.options import positive_number
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.reach_predictors.figure import draw
 from experiments.reach_predictors.findings import CLAIMS, findings
 from experiments.reach_predictors.learners import LEARNERS, LOOKS, ORACLE, TRUTH
@@ -29,7 +31,6 @@ from experiments.reaching.oracle import oracle
 from experiments.reaching.scene import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.reaching.targets import between, grid, targets_at
 from experiments.reaching.truth import TRIES, Truth, measure, truth_of
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.robot.robot import Array

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import interquartile_mean, interval
 from experiments.reach_predictors.findings import AIMS, BETWEEN, GRID, fractions, looks
 from experiments.reach_predictors.learners import LEARNERS, PUBLISHED, RECOMMENDED
-from experiments.statistics import interquartile_mean, interval
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array
 

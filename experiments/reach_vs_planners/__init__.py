@@ -29,6 +29,8 @@ import numpy as np
 
 from experiments.either_alone.cases import Case, make_cases
 from experiments.either_alone.trial import EVERY, Attempt, attempt, begun, trained
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.reach_vs_planners.figure import draw
 from experiments.reach_vs_planners.findings import CLAIMS, SCENES, claims, summary
@@ -38,7 +40,6 @@ from experiments.reaching.judged_plant import JudgedPlant
 from experiments.reaching.planner_peer import PlannerPeer
 from experiments.reaching.scene import LEARNED, PART
 from experiments.reaching.targets import GOOD
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import MotorParameters
 from mobee.reach import reward_of
 

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.drawn import draw_bars
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_bars, new_figure
 from experiments.reach_vs_planners.findings import FEASIBLE, SCENES, TOLD, WHO, of_cases
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 COLORS = {"learner": "tab:red", "peer": "tab:blue"}

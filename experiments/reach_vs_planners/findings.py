@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, told
 from experiments.reaching.targets import GOOD
-from experiments.statistics import decides, interquartile_mean, interval, told
-from experiments.sweep import CellResult
 from mobee.robot.robot import Array
 
 SCENES = ("perfect", "noise", "moving")

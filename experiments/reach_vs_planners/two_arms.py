@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.control.ride import place
+from experiments.kit.control_runs import place
 from experiments.reaching.arm import body
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import approach

@@ -20,12 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.published import arm_space
 from experiments.learning.trial import begin_anywhere, newest
 from experiments.sensitivity.figure import draw
 from experiments.sensitivity.findings import ACTIONS, CLAIMS, LEVELS, findings
 from experiments.sensitivity.variants import VARIANTS
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from mobee import CuriousAgent
 
 NAME = "sensitivity"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.rank4.runs import NEVER
 from experiments.sensitivity.findings import MOST, RARE, SOME, Row, rows_of
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 
 GOOD, BAD, PLAIN = "#d5f0d5", "#f6cccc", "white"

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
 from experiments.learning.outcomes import ends_of, outcome_counts, visits_of
 from experiments.learning.published import RANK3, RANK4, arm_space
 from experiments.rank4.runs import ASIDE, HARDLY, NEVER
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS
-from experiments.sweep import CellResult
 from mobee.robot.robot import Ints
 
 LEVELS = {"rank4": RANK4, "rank3": RANK3}

@@ -21,13 +21,14 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.truth import walk
 from experiments.reach_predictors.learners import LEARNERS
 from experiments.reaching.scene import reach_plant, reach_space
 from experiments.simultaneous.figure import draw
 from experiments.simultaneous.findings import CLAIMS, findings
 from experiments.simultaneous.trial import WAYS, trial
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 
 NAME = "simultaneous"
 CLAIM = "transitions and reaches can be learned at the same time, if contact tells whose fault a failure is"

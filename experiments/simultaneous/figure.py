@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.drawn import draw_curve
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_curve, new_figure
 from experiments.simultaneous.findings import runs_of
-from experiments.sweep import CellResult
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints
 

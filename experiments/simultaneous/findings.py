@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interval, told
 from experiments.learning.model_error import l1
 from experiments.learning.truth import Truth, truth_of
 from experiments.reaching.scene import reach_space
 from experiments.simultaneous.trial import CONTACT, FIRST, WAYS
-from experiments.statistics import decides, interval, told
-from experiments.sweep import CellResult
 from mobee import TransitionModel
 from mobee.robot.robot import Array, Ints
 

@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.published import table_agents, table_plant
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
 from experiments.table.figure import draw
 from experiments.table.findings import CLAIMS, findings
 from experiments.table.runs import ARMS, EXPLORERS, TRANSITIONS, WORLDS

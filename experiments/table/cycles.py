@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.statistics import interval
+from experiments.kit.statistics import interval
 from experiments.table.interest import autocorrelation
 from experiments.table.runs import Run
 from mobee.robot.robot import Array

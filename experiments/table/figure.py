@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.table.dependence import LEARNERS, judged
 from experiments.table.findings import outcome_numbers
 from experiments.table.interest import autocorrelation, by_goal, of_arms

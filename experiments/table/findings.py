@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.claims import Claim
-from experiments.statistics import interquartile_mean, interval, told
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import interquartile_mean, interval, told
 from experiments.table.cycles import at_second_peak, correlations, is_cyclic, second_peak
 from experiments.table.dependence import LEARNERS, SCORES, judged
 from experiments.table.interest import agreement, by_goal, of_arms, share_of_top

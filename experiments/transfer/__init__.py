@@ -24,11 +24,12 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from experiments.claims import Claim
-from experiments.options import positive_whole
-from experiments.progress import Progress
-from experiments.run_folder import read, write
-from experiments.sweep import Cell, load_cells, run_cells, sweep_arguments
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.claims import Claim
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.run_folder import read, write
+from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.table.session import explore_together
 from experiments.transfer.comparing import Distance
 from experiments.transfer.figure import draw

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.transfer.comparing import shares
 from experiments.transfer.live import ROBOTS
 from experiments.transfer.records import Compared

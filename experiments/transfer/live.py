@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from experiments.launched import LaunchFailed, summary_of
+from experiments.kit.live import LaunchFailed, summary_of
 from experiments.transfer.settings import GAINS, JOINTS, RATE, ROBOT, TASKS
 from mobee.store import STORE, TransitionStore
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.sweep import load_cells
+from experiments.kit.cells import load_cells
 from experiments.transfer.comparing import Counts, Distance, counts_of, distance, mean
 from experiments.transfer.live import ROBOTS
 from experiments.transfer.settings import ROBOT, TASKS, space

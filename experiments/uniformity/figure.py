@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
-from experiments.sweep import CellResult
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import new_figure
 from experiments.uniformity.findings import EXPLORERS, at_constraints, groups
 from mobee.errors import InvalidValue
 

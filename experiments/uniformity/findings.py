@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
 from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
 from experiments.learning.explored import Explored, Groups, explored
 from experiments.learning.published import ARM_NEIGHBOURS, arm_space
 from experiments.learning.spread import gini, relative_spread
-from experiments.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
-from experiments.sweep import CellResult
 from mobee import Lattice
 from mobee.robot.robot import Array
 

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.drawn import draw_curve
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_curve, new_figure
+from experiments.kit.statistics import interquartile_mean
 from experiments.reaching.planner_peer import MEMORIES
-from experiments.statistics import interquartile_mean
-from experiments.sweep import CellResult
 from experiments.unmodelled.findings import EQUAL_BY, crossover, success
 from experiments.unmodelled.scene import WRONG
 from mobee.errors import InvalidValue

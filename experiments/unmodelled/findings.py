@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims import Claim
+from experiments.kit.cells import CellResult
+from experiments.kit.claims import Claim
+from experiments.kit.statistics import decides, interval, told
 from experiments.reaching.planner_peer import MEMORIES
-from experiments.statistics import decides, interval, told
-from experiments.sweep import CellResult
 from experiments.unmodelled.contestants import FATES
 from experiments.unmodelled.scene import WRONG
 from mobee.robot.robot import Array

@@ -20,9 +20,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.options import positive_whole
-from experiments.progress import Progress
-from experiments.records import Records, read_records
+from experiments.kit.options import positive_whole
+from experiments.kit.progress import Progress
+from experiments.kit.records import Records, read_records
 from experiments.urdf_files.figure import draw
 from experiments.urdf_files.looked_at import LookedAt, look_at
 from experiments.urdf_files.table import numbers, write_table

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.matplotlib_figure import new_figure
+from experiments.kit.plots import new_figure
 from experiments.urdf_files.looked_at import LookedAt
 
 ALLOWED = 1e-9

@@ -7,7 +7,7 @@ import json
 import sys
 
 from experiments.bench.against import LEAST
-from experiments.options import positive_whole
+from experiments.kit.options import positive_whole
 from mobee_cli.errors import FAILED
 
 

@@ -8,7 +8,7 @@ import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
-from experiments.options import positive_whole
+from experiments.kit.options import positive_whole
 from mobee_cli.errors import FAILED
 
 

@@ -30,7 +30,7 @@ def draw_costs(
     draw: Callable[[Any, dict[str, Any], Path], None],
 ) -> int:
     """Measure, draw into the file asked for, and print its name, or the numbers as JSON; returns the exit code."""
-    from experiments.matplotlib_figure import MatplotlibMissing
+    from experiments.kit.plots import MatplotlibMissing
 
     try:
         figure = empty_figure()  # before minutes of measuring

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from experiments.options import positive_number, positive_whole
+from experiments.kit.options import positive_number, positive_whole
 from mobee_cli.errors import FAILED
 
 _HIGHEST = 1000  # Hz, of robot_sim

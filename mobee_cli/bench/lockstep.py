@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from experiments.options import positive_number
+from experiments.kit.options import positive_number
 from mobee_cli.errors import FAILED
 
 

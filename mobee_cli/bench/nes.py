@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import replace
 
-from experiments.options import positive_whole
+from experiments.kit.options import positive_whole
 from mobee_cli.errors import FAILED
 
 

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from experiments.progress import Progress
+from experiments.kit.progress import Progress
 from mobee import Model
 from mobee.roadmap.ik.ngik import METHODS
 from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
-    from experiments.trm.building import build
+    from experiments.kit.roadmap_task import build
 
     known = "nothing"
     with Progress() as bar:

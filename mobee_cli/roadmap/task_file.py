@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from experiments.trm.example import Example
-from experiments.trm.examples import EXAMPLES
+from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
+from experiments.kit.roadmap_task import Example
 from mobee import Model
 from mobee.errors import MobeeError
 from mobee_cli.errors import BAD_INPUT, UserError
@@ -49,7 +49,7 @@ def task_named(name: str, options: Sequence[str], model: Callable[[], Model]) ->
         raise UserError(f"{path}: there is no such file", BAD_INPUT)
     found = _made(path, options, model)
     if not isinstance(found, Example):
-        raise UserError(f"{path}: {MAKER}() returned {type(found).__name__}; it must be an experiments.trm.example.Example", BAD_INPUT)
+        raise UserError(f"{path}: {MAKER}() returned {type(found).__name__}; it must be an experiments.kit.roadmap_task.Example", BAD_INPUT)
     return found
 
 
@@ -58,7 +58,7 @@ def _made(path: Path, options: Sequence[str], model: Callable[[], Model]) -> obj
     maker = getattr(_loaded(path), MAKER, None)
     if not callable(maker):
         raise UserError(
-            f"{path}: it has no function {MAKER}() that returns an experiments.trm.example.Example: see docs/roadmaps.md", BAD_INPUT
+            f"{path}: it has no function {MAKER}() that returns an experiments.kit.roadmap_task.Example: see docs/roadmaps.md", BAD_INPUT
         )
     parameters = len(inspect.signature(maker).parameters)
     if parameters > 1:

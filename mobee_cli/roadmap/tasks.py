@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List them."""
-    from experiments.trm.examples import EXAMPLES
+    from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
     from mobee_cli.roadmap.text import wrapped
 
     found = [(name, make()) for name, make in EXAMPLES.items()]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.launched import stop
+from experiments.kit.live import stop
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -101,6 +101,12 @@ def test_the_readers_own_robot_gets_a_map_of_its_own_task(tmp_path: Path) -> Non
     assert re.match(r"sweep\.npz: [1-9]\d+ poses", summary) and "(desk, ball)" in summary
     assert "tip" in run(tmp_path, "-m", "mobee_cli", "roadmap", "show", "sweep.npz", *robot)
     run(tmp_path, "-m", "mobee_cli", "reach", "--offline", *robot, "--world", "desk.xml", "--object", "ball")
+
+
+def test_the_task_file_to_copy_builds_a_map(tmp_path: Path) -> None:
+    blocks("docs/roadmaps.md", tmp_path)
+    summary = run(tmp_path, "-m", "mobee_cli", "roadmap", "build", "own_task.py", "--method", "least_squares")
+    assert re.match(r"own_task\.npz: [1-9]\d+ poses", summary)
 
 
 @pytest.mark.system

@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 from experiments import claims_table
-from experiments.claims import Claim
 from experiments.claims_table import better, claims_text, finished_runs, found_in, page, recorded, rows, stated
+from experiments.kit.claims import Claim
+from experiments.kit.run_folder import new_run, write
 from experiments.registry import BEYOND, CHAPTER7, load_experiment
-from experiments.run_folder import new_run, write
 from mobee.errors import InvalidValue
 
 REGENERATE = "run `mobee experiment claims --write` and check experiments/README.md and claims.json in"
@@ -24,7 +24,7 @@ def test_the_page_is_what_the_recorded_numbers_give():
 
 @pytest.mark.parametrize("name", (*CHAPTER7, *BEYOND))
 def test_an_experiment_of_chapter_7_states_claims_without_numbers(name):
-    claims = load_experiment(name).CLAIMS
+    claims = load_experiment(name).claims
     assert claims and len({claim.text for claim in claims}) == len(claims)
     assert all(claim.text and claim.source and claim.published and not claim.ours for claim in claims)
 
@@ -37,7 +37,7 @@ def finished(runs, name, claims, **options):
 
 @pytest.fixture
 def claim() -> Claim:
-    return load_experiment("coverage").CLAIMS[0]
+    return load_experiment("coverage").claims[0]
 
 
 def test_a_finished_run_fills_its_rows_and_no_others(tmp_path, claim):

@@ -9,9 +9,9 @@ from experiments.registry import EXPERIMENTS, load_experiment
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_an_experiment_states_its_claim_and_its_source(name):
     experiment = load_experiment(name)
-    assert name == experiment.NAME
-    assert all(text.strip() and "\n" not in text for text in (experiment.CLAIM, experiment.SOURCE))
-    notes = " ".join(experiment.__doc__.split())
+    assert name == experiment.name
+    assert all(text.strip() and "\n" not in text for text in (experiment.claim, experiment.source))
+    notes = " ".join(experiment.notes.split())
     assert all(part in notes for part in ("Claim:", "Source:", "Run time:"))
 
 

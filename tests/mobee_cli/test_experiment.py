@@ -5,12 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from experiments.claims.ch2_model import flood
+from experiments.kit.run_folder import held
 from experiments.registry import EXPERIMENTS
-from experiments.run_folder import held
 from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main
 
@@ -122,8 +124,13 @@ def test_a_wrong_option_of_an_experiment_is_said_in_one_line(option, capsys):
     assert said.startswith("mobee experiment run flood")
 
 
+def set_run(monkeypatch, run):
+    """Make this the `run` of the experiment flood."""
+    monkeypatch.setattr(flood, "EXPERIMENT", replace(flood.EXPERIMENT, method=replace(flood.EXPERIMENT.method, run=run)))
+
+
 def test_a_failed_verdict_fails_the_command(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("experiments.flood.run", lambda arguments, folder: {"passed": False, "torn": {"rows": 3}})
+    set_run(monkeypatch, lambda arguments, folder: {"passed": False, "torn": {"rows": 3}})
     assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 1
     assert "torn:\n  rows: 3\n" in capsys.readouterr().out
 
@@ -140,7 +147,7 @@ def test_a_run_refused_after_its_first_record_keeps_it(tmp_path, monkeypatch):
         (folder / "records.csv").write_text("depth\n1.0\n")
         raise InvalidValue("no more")
 
-    monkeypatch.setattr("experiments.flood.run", refuse)
+    set_run(monkeypatch, refuse)
     assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 2
     (folder,) = tmp_path.iterdir()
     assert (folder / "records.csv").read_text() == "depth\n1.0\n"

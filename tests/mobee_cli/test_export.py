@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.sweep.cell import Cell
-from experiments.sweep.cell_files import write_cell
+from experiments.kit.cells import Cell, write_cell
 from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Step

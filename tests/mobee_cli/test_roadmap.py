@@ -195,7 +195,7 @@ def test_a_task_file_that_cannot_be_used_is_told_with_its_line(say: Say, tmp_pat
 
 TASK = """
 import mobee
-from experiments.trm.example import Example
+from experiments.kit.roadmap_task import Example
 
 def example():
     model = mobee.Model(mobee.load_robot("icub"))
@@ -222,7 +222,7 @@ def test_a_map_of_a_task_of_ones_own_is_built_kept_and_played(say: Say, tmp_path
 
 TASK_OF_ANY_ROBOT = """
 import mobee
-from experiments.trm.example import Example
+from experiments.kit.roadmap_task import Example
 
 def example(model):
     task = mobee.tasks.motors({"joint_1": (0.5, 0.9), "joint_3": (0.7, 1.0)})
@@ -304,7 +304,7 @@ def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_
 
     monkeypatch.setattr(mobee, "build_roadmap", built, raising=False)
     path = tmp_path / "own.npz"
-    (tmp_path / "own.py").write_text("from experiments.trm.palm_down import example\n")
+    (tmp_path / "own.py").write_text("from experiments.claims.ch3_roadmaps.trm_tasks import palm_down as example\n")
     code, out, _ = say("build", tmp_path / "own.py", "-o", path, "--method", "nes", "--neighbours", 8, "--longest", 0, "--seed", 4)
     assert code == 0 and out.startswith(f"{path}"[:20])
     assert (given["method"], given["neighbours"], given["longest"], given["seed"], given["file"]) == ("nes", 8, None, 4, path)

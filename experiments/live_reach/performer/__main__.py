@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from experiments.jobs import read_job
+from experiments.kit.live import read_job
 from experiments.live_reach.job import Job
 from experiments.live_reach.performer.config import Config
 from experiments.live_reach.performer.mover import Mover

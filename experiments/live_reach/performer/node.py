@@ -9,7 +9,7 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
-from experiments.jobs import append_done
+from experiments.kit.live import append_done
 from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.performer.contestants import Ended, contestant
 from experiments.live_reach.performer.hand import Hand

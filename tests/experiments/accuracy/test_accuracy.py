@@ -8,7 +8,7 @@ from experiments.accuracy.findings import CLAIMS, error_curve, findings, looks
 from experiments.accuracy.worlds import WALKS, half_space_plant, space_of, truths
 from experiments.learning.model_error import model_error
 from mobee import CuriousAgent
-from tests.experiments.learning.cells import Cell, finished
+from tests.experiments.finished_cells import Cell, finished
 
 
 def half_space_cells(explorers, seeds=(1,)):

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, report, verdict
-from experiments.trm import coverage
+from experiments.claims.ch3_roadmaps import trm_coverage as coverage
 from mobee.roadmap.building.flood import Patience
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from experiments import change
 from experiments.change.runs import EVERY
+from experiments.kit.cells import Cell
 from experiments.learning.model_error import l1
 from experiments.learning.published import arm_space
 from experiments.learning.truth import truth_of
-from experiments.sweep import Cell
 from mobee import TransitionModel
 from mobee.errors import InvalidValue
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from experiments import connectivity
 from experiments.connectivity.findings import GRAPHS, findings
-from tests.experiments.learning.cells import Cell, finished
+from tests.experiments.finished_cells import Cell, finished
 
 
 def test_a_sparser_graph_is_learnt_sooner_and_its_ways_are_longer():

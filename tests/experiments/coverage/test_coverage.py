@@ -4,7 +4,7 @@ import argparse
 
 from experiments import coverage
 from experiments.coverage.postman import postman_floor
-from experiments.sweep import Cell
+from experiments.kit.cells import Cell
 
 
 def arguments(*given: str) -> argparse.Namespace:

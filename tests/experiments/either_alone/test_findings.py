@@ -6,7 +6,7 @@ import pytest
 from experiments.either_alone.cases import SCENES
 from experiments.either_alone.findings import CLAIMS, LAWS, better, claims, summary
 from experiments.either_alone.trial import WAYS
-from experiments.sweep import Cell
+from experiments.kit.cells import Cell
 
 
 class Done:

@@ -5,7 +5,7 @@ import pytest
 
 from experiments import hypercube
 from experiments.hypercube.findings import CLAIMS, dispersion, findings
-from experiments.sweep import Cell, CellResult
+from experiments.kit.cells import Cell, CellResult
 
 
 def test_a_random_choice_has_dispersion_one_and_equal_tries_none():

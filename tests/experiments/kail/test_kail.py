@@ -6,7 +6,7 @@ import pytest
 from experiments import kail
 from experiments.kail.findings import CLAIMS, DIVERGENCES, PARTS, findings
 from experiments.kail.on_paper import failing, rewards, sound, told_apart
-from tests.experiments.learning.cells import Cell, finished
+from tests.experiments.finished_cells import Cell, finished
 
 
 def test_rewards_on_paper_are_those_of_the_tables():

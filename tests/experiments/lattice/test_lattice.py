@@ -5,7 +5,7 @@ import numpy as np
 from experiments.lattice.findings import CLAIMS, DISCOUNTS, INITIAL, findings
 from experiments.lattice.groups import ENTERING, FAILING
 from experiments.learning.published import arm_space
-from tests.experiments.learning.cells import Cell, finished
+from tests.experiments.finished_cells import Cell, finished
 
 SPACE = arm_space()
 

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 
 import mobee
+from experiments.kit.cells import Cell
 from experiments.learning.explored import explored
-from experiments.sweep import Cell
-from tests.experiments.learning.cells import finished
+from tests.experiments.finished_cells import finished
 
 SPACE = mobee.Lattice(mobee.load_robot("icub"), ["l_elbow", "l_shoulder_yaw"], neighbours="equidistant")  # 0 has the goals 1 and 3
 SEEN = np.array([[0, 0, 1], [0, 0, 4], [0, 1, 3]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.babbling.contacts import Touch
+from experiments.kit.recordings import Touch
 from experiments.live_reach.figure import draw
 from experiments.live_reach.findings import CLAIMS, claims, enough, misses, share, table
 from experiments.live_reach.measured import Block, Judged

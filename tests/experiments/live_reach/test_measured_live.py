@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.babbling.measured import CONTACTS, POSITIONS
-from experiments.jobs import append_done, read_done, read_job, write_job
+from experiments.kit.live import append_done, read_done, read_job, write_job
+from experiments.kit.recordings import CONTACTS, POSITIONS
 from experiments.live_reach.job import Job, Tried
 from experiments.live_reach.measured import measure, read_block, write_block
 from experiments.live_reach.problems import FRESH, Problem

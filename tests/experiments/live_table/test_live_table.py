@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments import live_table
-from experiments.sweep.cell_files import write_cell
+from experiments.kit.cells import write_cell
 from experiments.transfer.settings import TASKS, space
 from mobee import load_robot
 from mobee.store import STORE, Transition, TransitionStore

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+from experiments.kit.cells import Cell, load_cells, write_cell
 from experiments.planner.findings import ENTERS, ROADMAPS, claims, summary
-from experiments.sweep import Cell, load_cells
-from experiments.sweep.cell_files import write_cell
 
 AFTER = [0, 1000]
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.kit.roadmap_task import RIGHT
 from experiments.pregrasp import SPACINGS
 from experiments.pregrasp.figure import draw
 from experiments.pregrasp.findings import CLAIMS, findings
 from experiments.pregrasp.trial import APART, MODES, Query, built, draw_query, walked
-from experiments.trm.body import RIGHT
 from mobee import Model, Roadmap, World, load_robot
 from mobee.roadmap.edges import check_edges
 

@@ -5,10 +5,9 @@ import argparse
 import numpy as np
 import pytest
 
+from experiments.kit.cells import Cell, load_cells, write_cell
 from experiments.prm_vs_mdp import _claims, add_arguments, cells, figure
 from experiments.prm_vs_mdp.summary import BLOCK, summarise
-from experiments.sweep import Cell, load_cells
-from experiments.sweep.cell_files import write_cell
 from mobee.errors import InvalidValue
 
 HARD = np.tile([True, False], BLOCK)

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 import mobee
+from experiments.kit.cells import Cell
 from experiments.reach.figure import draw
 from experiments.reach.runs import LOOKS
-from experiments.sweep import Cell
 from tests.experiments.reach.test_findings import runs
 
 

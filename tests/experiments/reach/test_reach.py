@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from experiments import reach
+from experiments.kit.cells import Cell
 from experiments.reaching import scene
 from experiments.reaching.scene import reach_plant
-from experiments.sweep import Cell
 
 
 @pytest.fixture

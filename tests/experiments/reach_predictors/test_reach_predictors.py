@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from experiments import reach_predictors
+from experiments.kit.cells import Cell
 from experiments.reach_predictors.findings import BETWEEN, GRID, fractions, judged
 from experiments.reach_predictors.learners import LEARNERS, LOOKS, ORACLE, PUBLISHED, RECOMMENDED
-from experiments.sweep import Cell
 from mobee.learning.reaching.failures import FAILURES
 from mobee.learning.reaching.predictors import PREDICTORS
 from mobee.learning.reaching.strategies import STRATEGIES

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit.cells import Cell
 from experiments.reach_vs_planners.findings import SCENES, WHO, claims, summary
-from experiments.sweep import Cell
 
 
 class Done:

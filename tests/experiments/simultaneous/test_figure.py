@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import mobee
+from experiments.kit.cells import Cell
 from experiments.reaching.scene import reach_space
 from experiments.simultaneous.figure import draw
 from experiments.simultaneous.findings import findings
 from experiments.simultaneous.trial import WAYS
-from experiments.sweep import Cell
 
 LOOKS = [1000, 2000]
 

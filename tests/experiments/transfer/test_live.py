@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.launched import LaunchFailed
-from experiments.sweep import Cell
-from experiments.sweep.cell_files import write_cell
+from experiments.kit.cells import Cell, write_cell
+from experiments.kit.live import LaunchFailed
 from experiments.transfer import live
 from experiments.transfer.live import ROBOTS, learn
 from experiments.transfer.records import compared

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.sweep import Cell
+from experiments.kit.cells import Cell
 from experiments.transfer import _bound, _claim, work
 from experiments.transfer.comparing import Distance
 from experiments.transfer.records import Compared

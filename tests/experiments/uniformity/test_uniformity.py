@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from experiments import uniformity
 from experiments.uniformity.findings import CLAIMS, EXPLORERS, GRAPHS, findings
-from tests.experiments.learning.cells import Cell, finished
+from tests.experiments.finished_cells import Cell, finished
 
 
 def test_a_short_exploration_by_everybody_gives_all_claims_a_number():

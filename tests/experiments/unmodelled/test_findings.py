@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.sweep import Cell
+from experiments.kit.cells import Cell
 from experiments.unmodelled.findings import ABOVE, CLAIMS, EVEN, claims, crossover, summary, verdict
 
 TRIES = [100, 200, 800]

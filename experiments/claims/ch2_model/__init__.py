@@ -1,0 +1,1 @@
+"""Thesis chapter 2: the model of robot and world."""

@@ -1,0 +1,123 @@
+"""The threads of thesis figure 2.3 beside the sensory one, of which one moves every joint and one evaluates the model; and random boxes."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee import Model
+from mobee.collision import Geometry, box
+from mobee.kinematics.quaternion import to_matrix
+from mobee.model import Pose
+from mobee.robot.robot import Array, Robot
+
+CONTROL_PERIOD = 0.01  # s (thesis 2.4)
+FREQUENCIES = (0.1, 0.5)  # Hz, one a motor, so that the whole pose never comes again
+# Python lets a thread wait 5 ms for one that computes in Python, as the flooding one does; that would be measured instead.
+HAND_OVER = 5e-5  # s
+
+SPACE = 1.0  # m, edge of the cube that holds the centres
+EDGES = (0.02, 0.1)  # m
+# Middle of that cube: where the robot reaches.
+MIDDLE = {"icub": (-0.5, 0.0, 0.1), "katana": (0.0, 0.0, 0.0)}
+
+
+class Oscillator:
+    """A d-dimensional oscillator that drives every motor through its whole range."""
+
+    def __init__(self, robot: Robot, rng: np.random.Generator) -> None:
+        low, high = robot.limits.T
+        self._middle, self._amplitude = (low + high) / 2.0, (high - low) / 2.0
+        self._rate = 2.0 * np.pi * rng.uniform(*FREQUENCIES, len(low))
+        self._phase = rng.uniform(0.0, 2.0 * np.pi, len(low))
+
+    def at(self, t: float) -> Array:
+        """The posture (n,) rad at t [s]."""
+        posture: Array = self._middle + self._amplitude * np.sin(self._rate * t + self._phase)
+        return posture
+
+
+class MovingModel:
+    """While entered, the robot moves and the model evaluates, each in its own thread; `check` raises what went wrong there.
+
+    `watch` is called by the model's thread with every pose.
+    """
+
+    def __init__(self, model: Model, oscillator: Oscillator, watch: Callable[[Pose], None] = lambda _: None) -> None:
+        self.evaluations = 0
+        self.error: BaseException | None = None
+        self._model, self._oscillator, self._watch = model, oscillator, watch
+        self._q = oscillator.at(0.0)
+        self._end = threading.Event()
+        self._threads = [threading.Thread(target=self._guarded, args=(work,), daemon=True) for work in (self._move, self._evaluate)]
+
+    def __enter__(self) -> MovingModel:
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+        for thread in self._threads:
+            thread.join()
+
+    def check(self) -> None:
+        """Raise what has ended a thread."""
+        if self.error is not None:
+            raise self.error
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except BaseException as error:  # raised again by `check` in the thread that waits for it
+            self.error = error
+            self._end.set()
+
+    def _move(self) -> None:
+        begin = time.perf_counter()
+        while not self._end.wait(CONTROL_PERIOD):
+            self._q = self._oscillator.at(time.perf_counter() - begin)
+
+    def _evaluate(self) -> None:
+        while not self._end.is_set():
+            pose = self._model.evaluate(self._q)
+            _ = pose.table
+            self.evaluations += 1
+            self._watch(pose)
+
+
+@contextmanager
+def quick_hand_over() -> Iterator[None]:
+    """Threads that compute in Python give way to each other every HAND_OVER seconds."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(HAND_OVER)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """Arguments of `World.add`."""
+
+    shape: Geometry
+    position: Array  # (3,) m
+    rotation: Array  # (3, 3)
+
+
+def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:
+    """Boxes of random edges, positions in the cube, and orientations."""
+    middle = np.array(MIDDLE[robot])
+    boxes = []
+    for _ in range(count):
+        quaternion = rng.normal(size=4)
+        place = middle + rng.uniform(-SPACE / 2.0, SPACE / 2.0, 3)
+        boxes.append(Box(box(*rng.uniform(*EDGES, 3)), place, to_matrix(quaternion / np.linalg.norm(quaternion))))
+    return boxes

@@ -1,0 +1,1 @@
+"""Thesis chapters 3 and 4.3: poses and roadmaps from cost functions, and what they learn from contacts."""

@@ -1,0 +1,172 @@
+"""NES: evaluations that natural evolution strategies need, beside CMA-ES.
+
+Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.
+Run time: 3 minutes on 2 cores.
+
+A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
+rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  Counted are the evaluations until f < 1e-8;
+a run that never comes there counts with 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
+default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
+tasks": on one of the twelve at most .95 of CMA-ES's evaluations; "comparable": at most 1.5 times as many, median of the tasks.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from experiments.bench.cma_peer import load_cma
+from experiments.bench.nes_workload import FUNCTIONS, MOST, STRATEGIES
+from experiments.bench.nes_workload import trial as search
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment
+from experiments.kit.plots import draw_curve, new_figure
+from experiments.kit.statistics import decides, interval, ratio, ratio_interval, told
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee.robot.robot import Array
+
+DIMENSIONS = (10, 20, 41)
+QUICK_MOST = 20_000  # evaluations
+COSTS = {"nes": 1.0, "cma": 6.0, "xnes": 4.0, "snes": 8.0}  # beside each other
+FEWER, COMPARABLE, REQUIRED = 0.95, 1.5, 1.05  # evaluations over those of CMA-ES
+NAMES = {"nes": "the library's default", "cma": "CMA-ES", "xnes": "xNES as published", "snes": "SNES as published"}
+
+_THESIS = "thesis 3.1"
+BETTER = {
+    name: Claim(_THESIS, f"NES outperforms CMA on some tasks: {NAMES[name]}", "no number, some tasks") for name in ("xnes", "snes", "nes")
+}
+AS_GOOD = {
+    name: Claim(_THESIS, f"NES is in many ways comparable to CMA (at most {COMPARABLE} x the evaluations): {NAMES[name]}", "no number")
+    for name in ("xnes", "snes", "nes")
+}
+AIM = Claim(
+    "aim of this reproduction", "the default NES needs at most 1.05 x CMA-ES's evaluations, median of the tasks", f"at most {REQUIRED}"
+)
+CLAIMS = (*BETTER.values(), *AS_GOOD.values(), AIM)
+
+Task = tuple[str, int]  # function and dimensions
+Runs = Mapping[tuple[str, Task], Array]  # evaluations (seeds,) of every strategy and task
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every strategy on every task; --quick: 10 dimensions and 20 000 evaluations."""
+    dimensions, most = (DIMENSIONS[:1], QUICK_MOST) if arguments.quick else (DIMENSIONS, MOST)
+    return [
+        Condition(
+            f"{strategy}-{function.replace(' ', '-')}-{d}",
+            {"strategy": strategy, "function": function, "dimensions": d, "most": most},
+            COSTS[strategy] * d,
+        )
+        for d in dimensions
+        for function in FUNCTIONS
+        for strategy in STRATEGIES
+    ]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Search once."""
+    most = settings["most"]
+    evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)
+    return {"evaluations": min(evaluations, most), "found": evaluations <= most, "us": us}
+
+
+def evaluations(found: Cells) -> dict[tuple[str, Task], Array]:
+    """Evaluations of every strategy and task, (seeds,), in the order of the seeds."""
+    runs: dict[tuple[str, Task], list[float]] = {}
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        settings = result.cell.settings
+        task = settings["function"], settings["dimensions"]
+        runs.setdefault((settings["strategy"], task), []).append(float(result.values["evaluations"]))
+    return {key: np.array(values) for key, values in runs.items()}
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """A row a task, and the claims."""
+    runs = evaluations(found)
+    return {
+        "evaluations": {
+            f"{function}, {d}": {NAMES[s]: told(runs[s, (function, d)], 0) for s in STRATEGIES if (s, (function, d)) in runs}
+            for function, d in tasks(runs)
+        },
+        "found": {NAMES[name]: _share(found, name) for name in STRATEGIES},
+        "claims": [claim.record() for claim in judged(runs)],
+    }
+
+
+def tasks(runs: Runs) -> list[Task]:
+    """The tasks of which there are runs, in the order of the functions."""
+    return [(function, d) for function in FUNCTIONS for d in DIMENSIONS if any(task == (function, d) for _, task in runs)]
+
+
+def judged(runs: Runs) -> list[Claim]:
+    """The claims with our numbers; open unless every strategy has run on every task with as many seeds."""
+    everything = [(name, (function, d)) for name in STRATEGIES for function in FUNCTIONS for d in DIMENSIONS]
+    if any(key not in runs for key in everything) or len({len(runs[key]) for key in everything}) > 1:
+        return list(CLAIMS)
+    medians = {name: _medians(runs, name) for name in BETTER}
+    told_medians = {name: f"{told(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
+    return [
+        *(_better(runs, name, claim) for name, claim in BETTER.items()),
+        *(c.measured(told_medians[name], decides(interval(medians[name]), most=COMPARABLE)) for name, c in AS_GOOD.items()),
+        AIM.measured(told_medians["nes"], decides(interval(medians["nes"]), most=REQUIRED)),
+    ]
+
+
+def _medians(runs: Runs, name: str) -> Array:
+    """Evaluations over those of CMA-ES from the same start, median of the tasks, (seeds,)."""
+    ratios = [runs[name, task] / runs["cma", task] for task in tasks(runs)]
+    medians: Array = np.median(ratios, axis=0)
+    return medians
+
+
+def _better(runs: Runs, name: str, claim: Claim) -> Claim:
+    """It holds if one task's interval lies below the bound, and does not if all lie above it."""
+    pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
+    spans = {task: ratio_interval(*pair) for task, pair in pairs.items()}
+    fewer = [task for task, span in spans.items() if span[1] <= FEWER]
+    best = min(pairs, key=lambda task: ratio(*pairs[task]))
+    low, high = spans[best]
+    text = (
+        f"fewer than {FEWER} x CMA-ES's evaluations on {len(fewer)} of {len(pairs)} tasks; at best"
+        f" {ratio(*pairs[best]):.2f} x [{low:.2f}, {high:.2f}] ({best[0]}, {best[1]} dimensions)"
+    )
+    return claim.measured(text, True if fewer else False if all(span[0] > FEWER for span in spans.values()) else None)
+
+
+def _share(found: Cells, strategy: str) -> str:
+    """How many of its runs came to the target."""
+    mine = [result.values["found"] for result in found.values() if result.cell.settings["strategy"] == strategy]
+    return f"{sum(mine)} of {len(mine)}"
+
+
+def plot(found: Cells) -> Any:
+    """Evaluations against dimensions, a panel a function: interquartile means and 95 % intervals."""
+    runs = evaluations(found)
+    drawing = new_figure(12.0, 3.4)
+    for axes, function in zip(drawing.subplots(1, len(FUNCTIONS), sharey=True), FUNCTIONS, strict=True):
+        for number, name in enumerate(STRATEGIES):
+            at = [d for other, d in tasks(runs) if other == function and (name, (function, d)) in runs]
+            if at:
+                seeds = min(len(runs[name, (function, d)]) for d in at)
+                values = np.array([runs[name, (function, d)][:seeds] for d in at]).T
+                draw_curve(axes, at, values, f"C{number}", NAMES[name])
+        axes.set(title=function, xlabel="dimensions", xscale="log", yscale="log")
+        axes.set_xticks([10, 20, 41], ["10", "20", "41"])
+        axes.minorticks_off()
+        axes.grid(alpha=0.2)
+    drawing.axes[0].set_ylabel("evaluations until f < 1e-8")
+    drawing.axes[0].legend(fontsize=7)
+    return drawing
+
+
+EXPERIMENT = Experiment(
+    name="nes",
+    claim="natural evolution strategies are comparable to CMA-ES, and outperform it on some tasks",
+    source="thesis 3.1",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, require=load_cma),
+    claims=CLAIMS,
+)

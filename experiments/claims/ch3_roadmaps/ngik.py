@@ -1,0 +1,155 @@
+"""NGIK: evaluations of natural gradient inverse kinematics, beside the optimisers that others used.
+
+Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.
+Source: thesis 3.1.1.  Published: no numbers.  Run time: 3 minutes on 2 cores.
+
+The right palm goes to poses (place and rotation) of random postures among 100 boxes: 5 mm, 5 degrees, no contact; all 41 motors may
+move, or torso and arm, 10.  Same cost for all; each ends at its first good pose, restarts by its own criterion where it is stuck, and
+gives up after 20 000 evaluations.  NES as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a
+generation at once); simulated annealing; a particle filter.  Counted are the evaluations a target, those without success with all they
+took: "outperforms" needs fewer than the rival's.  Each seed has targets of its own.  Times are processor time of one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from experiments.bench import ik_solvers
+from experiments.bench.cma_peer import load_cma
+from experiments.bench.ik_solvers import MOST, Solve, library, rival, timed
+from experiments.bench.ik_workload import MOTORS, scene, targets
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import decides, ratio, ratio_interval, told
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import Model
+from mobee.robot.robot import Array
+
+TARGETS, QUICK_TARGETS = 20, 2  # a seed
+FEW, WHOLE = 10, 41  # motors
+NES, XNES = "nes", "xnes"
+RIVALS = {
+    XNES: ik_solvers.XNES,
+    "cma": ik_solvers.CMA_BATCHED,
+    "annealing": ik_solvers.ANNEALING,
+    "particles": ik_solvers.PARTICLES,
+}
+THEIRS = {"cma": "CMA-ES", "annealing": "simulated annealing", "particles": "a particle filter"}  # of thesis 3.1.1
+OURS = {NES: "NES (the library's)", XNES: "NES (xNES as published)"}
+OUTPERFORMS = {
+    (ours, theirs): Claim(
+        "thesis 3.1.1", f"{OURS[ours]} outperforms {THEIRS[theirs]} at inverse kinematics with 41 motors: fewer evaluations", "no number"
+    )
+    for ours in OURS
+    for theirs in THEIRS
+}
+CLAIMS = tuple(OUTPERFORMS.values())
+
+LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MOST)  # evaluations, of the figure
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every solver with either number of motors; --quick: two targets a seed."""
+    count = QUICK_TARGETS if arguments.quick else TARGETS
+    return [
+        Condition(f"{name}-{motors}", {"solver": name, "motors": motors, "targets": count}, motors)
+        for motors in (WHOLE, FEW)
+        for name in (NES, *RIVALS)
+    ]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Solve the targets of a seed, one after another."""
+    model, name, count = _model(), settings["solver"], settings["targets"]
+    motors = MOTORS if settings["motors"] == FEW else None
+    solve: Solve = library(model, "nes", motors) if name == NES else rival(model, RIVALS[name], motors)
+    aims, first = targets(model, count, seed), seed * count
+    solve(aims[0], first)  # caches and lazy set-up
+    reached, evaluations, ms = zip(*(timed(solve, aim, number) for number, aim in enumerate(aims, first)), strict=True)
+    return {"reached": np.array(reached), "evaluations": np.array(evaluations), "ms": np.array(ms)}
+
+
+@cache
+def _model() -> Model:
+    return scene()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solver:
+    """Results of one solver and one number of motors: means over the targets of a seed, (seeds,)."""
+
+    reached: Array
+    evaluations: Array
+    ms: Array
+
+    def __str__(self) -> str:
+        return f"{told(self.reached)} reached, {told(self.evaluations, 0)} evaluations, {told(self.ms, 0)} ms"
+
+
+def solvers(found: Cells) -> dict[tuple[str, int], Solver]:
+    """By name and motors, the seeds in their order."""
+    runs: dict[tuple[str, int], list[list[float]]] = {}
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        values, settings = result.values, result.cell.settings
+        means = [float(values[key].mean()) for key in ("reached", "evaluations", "ms")]
+        runs.setdefault((settings["solver"], settings["motors"]), []).append(means)
+    return {key: Solver(*np.array(means).T) for key, means in runs.items()}
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """A row a solver and number of motors, and the claims."""
+    known = solvers(found)
+    rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}
+    return {"solvers": rows, "claims": [claim.record() for claim in judged(known)]}
+
+
+def judged(known: Mapping[tuple[str, int], Solver]) -> list[Claim]:
+    """The claims with our numbers; open where one of the two has not run."""
+    return [
+        _judged(claim, known[ours, WHOLE], known[theirs, WHOLE]) if {(ours, WHOLE), (theirs, WHOLE)} <= known.keys() else claim
+        for (ours, theirs), claim in OUTPERFORMS.items()
+    ]
+
+
+def _judged(claim: Claim, ours: Solver, theirs: Solver) -> Claim:
+    low, high = ratio_interval(theirs.evaluations, ours.evaluations)
+    text = f"the rival needs {ratio(theirs.evaluations, ours.evaluations):.2f} x [{low:.2f}, {high:.2f}]: NES {ours}; rival {theirs}"
+    return claim.measured(text, decides((low, high), least=1.0))
+
+
+def plot(found: Cells) -> Any:
+    """The share of the targets of all seeds reached against evaluations, a panel a number of motors."""
+    drawing = new_figure(10.5, 3.6)
+    for axes, motors in zip(drawing.subplots(1, 2, sharey=True), (WHOLE, FEW), strict=True):
+        for number, (name, label) in enumerate({NES: OURS[NES], **RIVALS}.items()):
+            settings = {"solver": name, "motors": motors}
+            mine = [result.values for result in found.values() if settings.items() <= result.cell.settings.items()]
+            if mine:
+                reached = np.concatenate([values["reached"] for values in mine])
+                needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
+                shares = np.arange(len(needed) + 1) / len(reached)
+                axes.stairs(shares, [LEAST, *needed, MOST], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(LEAST, MOST), ylim=(0.0, 1.02))
+        axes.set_xticks(TICKS, [f"{tick}" for tick in TICKS])
+        axes.minorticks_off()
+        axes.grid(alpha=0.2)
+    drawing.axes[0].set_ylabel("targets reached")
+    drawing.legend(*drawing.axes[1].get_legend_handles_labels(), loc="outside right upper", fontsize=7)
+    return drawing
+
+
+EXPERIMENT = Experiment(
+    name="ngik",
+    claim="NES outperforms the other optimisers at solving inverse kinematics for the iCub's 41 motors",
+    source="thesis 3.1.1",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, require=load_cma),
+    claims=CLAIMS,
+)

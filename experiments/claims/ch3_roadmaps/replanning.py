@@ -1,0 +1,278 @@
+"""Replanning: the time to a new path when a ball turns solid before the hand that moves through it.
+
+Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2,
+fig. 4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.
+Run time: 6 minutes on 2 cores, in real time.
+
+The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
+shorter through the ball than over it.  The real processes with PyBullet, in free mode, ticks of 10 ms, the default law at full speed.
+Each crossing begins on a map as it was made; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
+simulator.  Bump: the first tick at which the model says that the arm touches the ball, fields included; the motion ends there, the edge
+is out, and the arm goes on to the next vertex of the new path at once.  Under way: the first tick in which a command is in force that was
+formed after the new goal.  Besides, when the joints come no nearer to the old goal, which depends on the law.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from experiments.claims.ch3_roadmaps.replanning_scene import (
+    ABOVE,
+    BALL,
+    LEFT,
+    MARKER,
+    PART,
+    RATE,
+    RIGHT,
+    SIMULATED,
+    SPEED,
+    WORLD,
+    Crossing,
+    Job,
+    model,
+    new_map,
+    robot,
+)
+from experiments.drawing.filmstrip import Strip, filmstrip
+from experiments.drawing.motion import Motion
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.live import read_done, write_job
+from experiments.kit.options import positive_whole
+from experiments.kit.performer.launch import launch
+from experiments.kit.plots import new_figure
+from experiments.kit.progress import Progress
+from experiments.kit.recordings import CONTACTS, POSITIONS, read_positions, read_touches
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array
+
+SOONEST, LATEST = 0.1, 1.2  # s after the start of a crossing
+PIECE = 5  # crossings of a launch
+QUICK_CROSSINGS = 2
+LONGEST = 60.0  # s for a crossing
+PERFORM = "experiments.claims.ch3_roadmaps.replanning_performer:perform"
+MEASURED, POSES = "measured.json", "poses.npz"
+EVERY = 5  # ticks, of the poses that are kept for pictures
+VIEW = (20.0, 35.0)  # azimuth and elevation, degrees
+STEPS = 40
+
+SOON = 200.0  # ms
+FEW = 10  # crossings with a bump: of fewer no verdict is made
+CLAIMS = (
+    Claim("thesis 4.3.2, fig. 4.7", "when the ball turns solid the hand finds the way around it, to the other side", "immediately"),
+    Claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms"),
+    Claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0"),
+)
+DEEP = 2e-3  # m
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="how many (default: 20)")
+    parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same on any machine, however busy")
+    parser.add_argument("--quick", action="store_true", help="a short version that shows whether it works")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Do the crossings that are not there yet."""
+    count = QUICK_CROSSINGS if arguments.quick else arguments.crossings
+    after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, count)
+    pieces = [after[i : i + PIECE].tolist() for i in range(0, len(after), PIECE)]
+    with Progress() as progress:
+        for number, piece in enumerate(pieces):
+            place = folder / f"launch-{number:03}"
+            progress.show(number / len(pieces), f"launch {number + 1} of {len(pieces)}")
+            if not (place / MEASURED).exists():
+                cross(place, Job(piece), arguments.seed + number, arguments.lockstep)
+                keep_poses(place)
+                measure(place)
+                for name in (POSITIONS, CONTACTS):
+                    (place / name).unlink()
+    return findings(_crossings(folder))
+
+
+def cross(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[str, Any]:
+    """Launch a system that does a job; its recording is left in the folder.  Raises LaunchFailed."""
+    write_job(folder, job)
+    worlds = {"world": str(WORLD), "simulated": str(SIMULATED)}
+    seconds = LONGEST * (1 + len(job.after))
+    return launch(folder, PERFORM, title="Replanning", seed=seed, rate=RATE, speed=SPEED, seconds=seconds, lockstep=lockstep, **worlds)
+
+
+def _crossings(folder: Path) -> list[Measured]:
+    found = [one for path in sorted(folder.glob(f"launch-*/{MEASURED}")) for one in read_measured(path.parent)]
+    if not found:
+        raise InvalidValue(f"{folder} has no finished launch: it was stopped before the first was over.")
+    return found
+
+
+class Measured(Struct, frozen=True):
+    """A crossing."""
+
+    bumped: bool  # the ball was felt on the short path
+    command: float  # ms from the bump to the first command in force that was formed after the new goal
+    turn: float  # ms from the bump until the joints come no nearer to the old goal
+    on: list[int]  # its targets, vertices
+    arrived: bool
+    seconds: float  # from the start to the other side
+    deepest: float  # m, of a solid contact with the ball, by the simulator
+    thinking: float  # ms of processor time, from the end of the failed motion to the request
+
+
+def measure(folder: Path) -> list[Measured]:
+    """Measure the crossings of a launch, and write the measures into its folder."""
+    q = read_positions(folder, robot())
+    touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
+    found = []
+    for crossing in read_done(folder, Crossing):
+        first, last = crossing.motions[0].asked, crossing.motions[-1].ended
+        deep = [touch.depth for touch in touches if first <= touch.begin <= last]
+        found.append(_measured(crossing, q, max(deep, default=0.0)))
+    (folder / MEASURED).write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=1))
+    return found
+
+
+def read_measured(folder: Path) -> list[Measured]:
+    """The measures that `measure` wrote."""
+    return msgspec.json.decode((folder / MEASURED).read_bytes(), type=list[Measured])
+
+
+def keep_poses(folder: Path) -> None:
+    """Of the first crossing, keep poses and times for pictures: `q` (T, n) rad, `times` (T,) s, and those of `solid` and `bump`."""
+    q, crossing = read_positions(folder, robot()), read_done(folder, Crossing)[0]
+    ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)
+    solid, bump = ((tick - ticks[0]) / RATE for tick in (crossing.solid, _bump(crossing)))
+    np.savez_compressed(folder / POSES, q=q[ticks - 2], times=(ticks - ticks[0]) / RATE, solid=solid, bump=bump)
+
+
+def _bump(crossing: Crossing) -> int:
+    return next((motion.bump for motion in crossing.motions if motion.bump >= 0), -1)
+
+
+def _measured(crossing: Crossing, q: Array, deepest: float) -> Measured:
+    motions = crossing.motions
+    failed = next((number for number, motion in enumerate(motions[:-1]) if motion.bump >= 0), None)
+    common: dict[str, Any] = {"on": [motion.vertex for motion in motions], "arrived": motions[-1].vertex == LEFT and motions[-1].bump < 0}
+    common |= {"seconds": (motions[-1].ended - motions[0].asked) / RATE, "deepest": deepest}
+    if failed is None:
+        return Measured(False, -1.0, -1.0, **common, thinking=0.0)
+    bump, new = motions[failed].bump, motions[failed + 1]
+    turn = _turned(q, bump, motions[failed].vertex, new.ended)
+    command = 1e3 * (new.commanded - bump) / RATE
+    return Measured(True, command, 1e3 * turn / RATE, **common, thinking=1e3 * new.thinking)
+
+
+def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
+    """Ticks from a bump until the arm is nearest to a vertex; row k - 2 of q (T, n) rad is of the beginning of tick k."""
+    space = new_map().space
+    arm = q[:, robot().parts[PART].slice][:, space.columns]
+    return int(np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1).argmin())
+
+
+def findings(crossings: Sequence[Measured]) -> dict[str, Any]:
+    """The numbers and the claims."""
+    bumped = [one for one in crossings if one.bumped]
+    row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
+    if bumped:
+        for name in ("command", "turn", "thinking"):
+            values = np.array([getattr(one, name) for one in bumped])
+            row |= {f"{name}_ms_median": float(np.median(values)), f"{name}_ms_most": float(values.max())}
+        row |= {"at_once_around": sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)}
+    return {"live": row, "claims": [claim.record() for claim in _claims(crossings, bumped)]}
+
+
+def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[Claim]:
+    if not bumped:
+        return list(CLAIMS)
+    enough = len(bumped) >= FEW
+    command, turn = (np.array([getattr(one, name) for one in bumped]) for name in ("command", "turn"))
+    arrived = sum(one.arrived for one in bumped)
+    straight = sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)
+    seconds = float(np.median([one.seconds for one in bumped]))
+    deepest, clear = 1e3 * max(one.deepest for one in crossings), sum(one.deepest == 0.0 for one in crossings)
+    return [
+        CLAIMS[0].measured(
+            f"{arrived} of {len(bumped)} arrive, {straight} of them straight on; {seconds:.1f} s in all",
+            arrived == len(bumped) if enough else None,
+        ),
+        CLAIMS[1].measured(
+            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints come no nearer to the old goal"
+            f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
+            bool(command.max() <= SOON) if enough else None,
+        ),
+        CLAIMS[2].measured(
+            f"{deepest:.1f} mm; none at all in {clear} of {len(crossings)} crossings: the ball turns solid at any time, also about a hand"
+            " that is in it",
+            bool(deepest <= 1e3 * DEEP) if enough else None,
+        ),
+    ]
+
+
+def figure(folder: Path) -> Path:
+    """Two rows of pictures, through the ball and around it, as in thesis figure 4.7; the times are drawn into a file of their own."""
+    plot_times(_crossings(folder)).savefig(folder / "replanning-times.png", dpi=110)
+    kept = np.load(next(path for path in sorted(folder.glob("launch-*")) if (path / POSES).exists()) / POSES)
+    solid, bump = float(kept["solid"]), float(kept["bump"])
+
+    def caption(motion: Motion, moment: int) -> str:
+        t = motion.times[moment]
+        state = "" if t < solid else ", solid" if t < bump else ", on around it"
+        return f"{t:.1f} s{state}"
+
+    through, around = _motion(_through_ball(), np.linspace(0.0, 1.0, STEPS), np.inf), _motion(kept["q"], kept["times"], solid)
+    strips = [
+        Strip(through, MARKER, (VIEW,), 6, "the ball is a ghost: the short path leads through it", lambda motion, moment: ""),
+        Strip(around, MARKER, (VIEW,), 6, f"solid after {solid:.1f} s, felt after {bump:.1f} s: the hand goes around it", caption),
+    ]
+    return filmstrip(strips, folder / "replanning.png", height=260)
+
+
+def _through_ball() -> Array:
+    """The edge through the ball, (T, n) rad."""
+    space = new_map().space
+    q = np.repeat(robot().home[None], STEPS, axis=0)
+    shares = np.linspace(0.0, 1.0, STEPS)[:, None]
+    q[:, robot().parts[space.part].slice] = space.target(RIGHT) + shares * (space.target(LEFT) - space.target(RIGHT))
+    return q
+
+
+def _motion(q: Array, times: Array, solid: float) -> Motion:
+    """Poses and times, with the ball solid from a time on."""
+    known, poses, objects = model(), [], []
+    for row, t in zip(q, times, strict=True):
+        if t >= solid and known.world.objects[BALL].role == "ghost":
+            known.world.set_role(BALL, "obstacle")
+        poses.append(known.evaluate(row))
+        objects.append(poses[-1].objects)
+    return Motion(tuple(poses), np.asarray(times), tuple(objects))
+
+
+def plot_times(crossings: Sequence[Measured]) -> Any:
+    """The share of crossings in which the new path was under way so soon."""
+    drawing = new_figure(6.0, 3.4)
+    axes = drawing.subplots()
+    for name, label in (("command", "a command of the new path is in force"), ("turn", "the joints come no nearer to the old goal")):
+        values = np.sort([getattr(one, name) for one in crossings if one.bumped])
+        axes.step(values, np.arange(1, len(values) + 1) / max(len(values), 1), where="post", label=label)
+    axes.axvline(SOON, color="0.5", linestyle="--", linewidth=0.8)
+    axes.set(xlabel="ms from the bump, on robot_sim's clock", ylabel="share of crossings", xlim=(0.0, None), ylim=(0.0, 1.02))
+    axes.grid(alpha=0.2)
+    axes.legend(fontsize=8)
+    return drawing
+
+
+EXPERIMENT = Experiment(
+    name="replanning",
+    claim="when a ball turns solid on the way, the way around it is taken at once",
+    source="thesis 4.3.2, fig. 4.7",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+    claims=CLAIMS,
+)

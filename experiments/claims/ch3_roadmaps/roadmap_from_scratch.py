@@ -1,0 +1,257 @@
+"""Roadmap from scratch: random poses, joined without verification, and explored by the robot itself.
+
+Claim: a map of 20 random samples, each joined to its 10 nearest neighbours without verifying an edge, is explored by commands
+alone; infeasible edges are removed as they are met, until the feasible sub-graph is known.  Source: thesis 4.3.1, fig. 4.6.
+Published: "approximately 90 minutes" at 10 % of maximum velocity; "small, randomly generated graphs often contain unreachable
+vertices and edges".  Run time: a minute on 2 cores offline; `--live` about 15 minutes more.
+
+Seven joints of the right arm of `icub` at its table under the default law, at 10 % speed; on the offline plant with the identified
+motors, and with `--live` also by the real processes in lockstep with PyBullet.  A vertex is reached within 0.15 rad in every
+joint; where an edge failed the arm goes back.  Targets are drawn in proportion to untried edges; where no untried edge can
+be reached any more, RRT-Connect is asked for a single path to a vertex with some, up to three times a vertex.  Every edge that was tried is
+then tried once more from rest at its vertex, by another plant: whether both agree.  Solid contacts of the simulator's list of
+pairs: offline by the model, from the true joints every 0.1 s; live by PyBullet, every tick.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import (
+    DEEP,
+    DONE,
+    JOB,
+    MARKER,
+    PART,
+    RATE,
+    SAMPLES,
+    SPEED,
+    agreement,
+    explored,
+    explorer,
+    joints,
+    offline_plant,
+    outcome,
+    robot,
+)
+from experiments.kit.cells import load_cells
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.live import TABLE
+from experiments.kit.performer.launch import launch
+from experiments.kit.plots import new_figure
+from experiments.kit.recordings import CONTACTS, POSITIONS, read_touches
+from experiments.kit.run_folder import read, write
+from experiments.kit.statistics import told
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import Model
+from mobee.errors import InvalidValue
+from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.ompl import require_ompl
+from mobee.robot.robot import Array
+
+QUICK = 30  # edges
+STORE, LONGEST = "map.sqlite", 8 * 3600.0  # of the live run; s of robot time
+PERFORM = "experiments.claims.ch3_roadmaps.roadmap_from_scratch_performer:perform"
+CLAIMS = (
+    Claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes"),
+    Claim("thesis 4.3.1", "small, randomly generated graphs often contain unreachable vertices", "often"),
+    Claim("thesis 4.3.1", "rollback works robustly, so that what was found of an edge stands: tried again from rest it does the same", "-"),
+    Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0"),
+)
+AGREE = 0.95
+STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not tried": ("0.75", 0.6)}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The live run."""
+    parser.add_argument("--live", action="store_true", help="also explore the first seed's map by the real processes, in lockstep")
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """A map a seed; --quick: with few edges."""
+    return [Condition("quick-map" if arguments.quick else "map", {"most": QUICK if arguments.quick else None})]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Explore a map."""
+    return explored(seed, settings["most"])
+
+
+def explore_live(folder: Path, seed: int, most: int | None) -> None:
+    """Explore the map of a seed on the live robot, or go on: observations are in the store, each launch has a folder for its recording."""
+    folder.mkdir(exist_ok=True)
+    if (folder / DONE).exists():
+        return
+    number = len(list(folder.glob("launch-*")))
+    place = folder / f"launch-{number:03}"
+    place.mkdir()
+    write(place / JOB, {"seed": seed, "most": most, "store": str((folder / STORE).resolve())})
+    summary = launch(place, PERFORM, title="Roadmap from scratch", world=str(TABLE), seed=seed, rate=RATE, speed=SPEED, seconds=LONGEST)
+    write(folder / DONE, {**read(place / DONE), "seed": seed, "repeatable": summary["lockstep"]["repeatable"]})
+
+
+def read_live(folder: Path) -> dict[str, Any] | None:
+    """The map and measures of the exploration, None if it was not finished."""
+    if not (folder / DONE).exists():
+        return None
+    done = read(folder / DONE)
+    with MapStore(folder / STORE, PART) as store:
+        search = explorer(offline_plant(done["seed"]), done["seed"], store)
+    places = sorted(folder.glob("launch-*"))
+    row = 8 * len(robot().motors)
+    ticks = sum((place / POSITIONS).stat().st_size // row for place in places if (place / POSITIONS).exists())
+    touches = [touch for place in places if (place / CONTACTS).exists() for touch in read_touches(place / CONTACTS, 1.0 / RATE)]
+    worst = max(touches, key=lambda touch: touch.depth, default=None)
+    found = outcome(search.roadmap, done["repairs"]) | {
+        "finished": done["finished"],
+        "hours": ticks / RATE / 3600.0,
+        "touches": len(touches),
+    }
+    found |= {"deepest": 0.0 if worst is None else worst.depth, "pair": "" if worst is None else worst.pair}
+    return found | {"agree": agreement(search.roadmap, done["seed"] + 1000), "edges": int(np.sum(search.roadmap.beliefs.tried > 0))}
+
+
+def unreached(values: Mapping[str, Any]) -> int:
+    """How many of the samples were never reached."""
+    goals, feasible = values["goals"], values["feasible"]
+    reached = np.zeros(len(goals), dtype=bool)
+    reached[goals[feasible]] = True
+    reached[np.flatnonzero((values["tried"] > 0).any(axis=1))] = True
+    return int((~reached[:SAMPLES]).sum())
+
+
+def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """A row a map, and the claims."""
+    results = sorted(found.values(), key=lambda result: result.cell.seed)
+    rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
+    if live is not None:
+        rows["live"] = _row({**live, "minutes": [60.0 * live["hours"]]})
+    return {"maps": rows, "claims": [claim.record() for claim in _claims([result.values for result in results], live)]}
+
+
+def _row(values: Mapping[str, Any]) -> dict[str, Any]:
+    tried = int((values["tried"] > 0).sum())
+    return {
+        "finished": bool(values["finished"]),
+        "minutes": round(float(values["minutes"][-1]), 1) if len(values["minutes"]) else 0.0,
+        "edges": int((values["goals"] >= 0).sum()),
+        "tried": tried,
+        "feasible": int(values["feasible"].sum()),
+        "samples_not_come_to": unreached(values),
+        "repairs": int(values["repairs"]),
+        "agree": round(float(np.mean(values["agree"])), 3) if len(values["agree"]) else None,
+        "deepest_mm": round(1e3 * float(values["deepest"]), 2),
+    }
+
+
+def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[Claim]:
+    done = [values for values in maps if values["finished"]]
+    if not done:
+        return list(CLAIMS)
+    minutes = [float(values["minutes"][-1]) for values in done]
+    agree = [float(np.mean(values["agree"])) for values in done]
+    with_gaps = sum(unreached(values) > 0 for values in done)
+    deepest = max(1e3 * float(values["deepest"]) for values in maps)
+    share = told([float(values["feasible"].sum() / (values["tried"] > 0).sum()) for values in done])
+    explored = f"{told(minutes, 0)} minutes; {share} of the edges tried are feasible"
+    lived, holds = "not run live", None
+    if live is not None:
+        lived = f"live {1e3 * live['deepest']:.1f} mm in {live['hours']:.1f} h and {live['touches']} touches"
+        explored += f"; live {60.0 * live['hours']:.0f} minutes"
+        holds = live["deepest"] <= DEEP if live["finished"] else None
+    agrees = bool(np.mean(agree) >= AGREE)
+    return [
+        CLAIMS[0].measured(explored, len(done) == len(maps)),
+        CLAIMS[1].measured(f"{with_gaps} of {len(done)} maps of seven joints", 2 * with_gaps > len(done)),
+        CLAIMS[2].measured(f"{told(agree, 3)} of the edges", agrees),
+        CLAIMS[3].measured(f"{lived}; offline, by the model, {deepest:.1f} mm", holds),
+    ]
+
+
+def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
+    """Three panels: the map as it was joined, the explored map, edges over time."""
+    results = sorted(found.values(), key=lambda result: result.cell.seed)
+    drawing = new_figure(15.0, 4.8)
+    before, after, course = drawing.subplots(1, 3)
+    values = results[0].values if live is None else live
+    places = _places(values["samples"])
+    exists = values["goals"] >= 0
+    _edges(before, values, exists & (np.arange(len(exists)) < SAMPLES)[:, None] & (values["goals"] < SAMPLES), places, "0.4", 0.8)
+    before.set_title(f"{SAMPLES} random poses, nothing verified")
+    kinds = {
+        "not tried": exists & (values["tried"] == 0),
+        "failed": (values["tried"] > 0) & ~values["feasible"],
+        "feasible": values["feasible"],
+    }
+    for kind, which in kinds.items():
+        _edges(after, values, which, places, *STYLES[kind], label=f"{kind}: {int(which.sum())}")
+    after.set_title("explored " + ("offline" if live is None else "live"))
+    after.plot(*places[SAMPLES:].T, "o", color="tab:orange", markersize=3, zorder=3, label="joined by single queries")
+    after.legend(fontsize=7, loc="upper left")
+    for axes in (before, after):
+        axes.plot(*places[:SAMPLES].T, "o", color="black", markersize=4, zorder=3)
+        axes.set(xlabel="palm, y [m]", ylabel="palm, z [m]", aspect="equal")
+    for result in results:
+        minutes = result.values["minutes"]
+        course.plot(minutes, np.arange(1, len(minutes) + 1), linewidth=1.0, label=f"seed {result.cell.seed}")
+    if live is not None:
+        course.plot([60.0 * live["hours"]], [live["edges"]], "k*", markersize=10, label="live (edges known at the end)")
+    course.axvline(90.0, color="0.5", linestyle="--", linewidth=0.8)
+    course.set(xlabel="robot time [min] (dashed: thesis)", ylabel="motions along edges", xlim=(0.0, None), ylim=(0.0, None))
+    course.grid(alpha=0.2)
+    course.legend(fontsize=7)
+    return drawing
+
+
+def _places(samples: Array) -> Array:
+    """Where the palm is in each pose, seen from the front, (V, 2) m."""
+    whole = np.repeat(robot().home[None], len(samples), axis=0)
+    whole[:, [robot().motor_index(joint) for joint in joints()]] = samples
+    places: Array = Model(robot()).evaluate(whole).position(MARKER)[:, 1:]
+    return places
+
+
+def _edges(axes: Any, values: Mapping[str, Any], which: Array, places: Array, color: str, width: float, label: str = "") -> None:
+    from matplotlib.collections import LineCollection
+
+    states, actions = np.nonzero(which)
+    lines = np.stack([places[states], places[values["goals"][states, actions]]], axis=1)
+    axes.add_collection(LineCollection(list(lines), colors=color, linewidths=width, label=label))
+    axes.autoscale_view()
+
+
+SWEEP = Sweep(conditions, trial, findings, plot, add_options=add_options, require=require_ompl)
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Explore the maps that the folder does not hold yet, and with --live the first also on the live robot."""
+    SWEEP.run(arguments, folder)
+    if arguments.live:
+        explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)
+    return findings(load_cells(folder), read_live(folder / "live"))
+
+
+def figure(folder: Path) -> Path:
+    """Draw the maps; raises InvalidValue if there are none."""
+    found = load_cells(folder)
+    if not found:
+        raise InvalidValue(f"{folder} has no finished cells: it was stopped before the first.")
+    path = folder / "figure.png"
+    plot(found, read_live(folder / "live")).savefig(path, dpi=110)
+    return path
+
+
+EXPERIMENT = Experiment(
+    name="roadmap-from-scratch",
+    claim="a map that nobody verified is explored by the robot until its feasible part is known, without harm",
+    source="thesis 4.3.1, fig. 4.6",
+    notes=__doc__,
+    method=Steps(SWEEP.add_arguments, run, figure),
+    claims=CLAIMS,
+)

@@ -1,0 +1,227 @@
+"""TRM: coverage and validity of the task-relevant roadmaps of thesis figures 3.1 to 3.11 and 4.8, by evolution and by least squares.
+
+Claim: the framework produces maps for all these tasks: poses that meet the task's constraints, spread over its task space, in one graph.
+Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed
+on 2 cores.
+
+The tasks are in trm_tasks.py.  The part of a task's box that can be reached at all is found by other means: a flood of half the spacing
+with many starts a point, and random starts at random points.  A map covers of it what is within a spacing of a vertex.  Every pose is
+checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
+from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
+from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
+from experiments.drawing.sheet import write_sheet
+from experiments.kit.cells import Cell, CellResult, load_cells
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.roadmap_task import Example, Method, build
+from experiments.kit.statistics import told
+from experiments.kit.sweep import Cells, run_cells, sweep_arguments
+from mobee.errors import InvalidValue
+from mobee.roadmap.edges import check_edges
+from mobee.roadmap.neighbours import nearest_before
+from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.robot import Array
+
+METHODS: tuple[Method, ...] = ("nes", "least_squares")
+COSTS = {"nes": 15.0, "least_squares": 2.0}  # beside each other
+QUICK = ("inspect", "push-over", "unscrew")
+SHEET_COLUMNS, HEIGHT = 4, 240  # panels; pixels of one
+
+REACH = "reach"
+NES, LEAST_SQUARES = "nes", "least_squares"
+NAMES = {NES: "evolution", LEAST_SQUARES: "least squares"}
+COVERED, LARGEST, SECONDS = 0.95, 120.0, 2.0  # share of the reachable task space; s by evolution; s by least squares, median
+PREGRASP, MANY = "pregrasp", (4000, 6000)
+COLUMNS = ("vertices", "processor_s", "evaluations_a_vertex", "coverage", "largest_hole", "valid", "kept", "free", "connected")
+
+MAPS = Claim(
+    "thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only"
+)
+VALID = Claim("thesis 3.3", "the task's constraints are built into the map: poses that meet all of them, by python-fcl", "all")
+GRAPH = Claim("thesis 3.3", "a traversable graph: share of the poses in its largest connected part, least of all tasks", "all")
+SIZE = Claim("thesis 4.3.3, fig. 4.8", "the pre-grasp map: so many poses", "approximately 5,000")
+SOON = Claim("aim of this reproduction", "every other map by evolution within 2 minutes of processor time", f"at most {LARGEST:.0f} s")
+CLAIMS = (MAPS, VALID, GRAPH, SIZE, SOON)
+
+Key = tuple[str, str]  # task and method
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    sweep_arguments(parser, seeds=5)
+    parser.add_argument("--tasks", nargs="+", choices=tuple(EXAMPLES), metavar="TASK", help=f"of {', '.join(EXAMPLES)}")
+
+
+def cells(arguments: argparse.Namespace) -> list[Cell]:
+    """The reachable part of every task, and its maps by every method with every seed; --quick: three small ones."""
+    tasks = arguments.tasks or (QUICK if arguments.quick else tuple(EXAMPLES))
+    seeds = range(arguments.seed, arguments.seed + arguments.seeds)
+    reach = [Cell(f"{task}-{REACH}", arguments.seed, {"task": task, "method": REACH}, 20.0) for task in tasks]
+    maps = [
+        Cell(f"{task}-{method}-s{seed}", seed, {"task": task, "method": method}, COSTS[method])
+        for task in tasks
+        for method in METHODS
+        for seed in seeds
+    ]
+    return [*reach, *maps]
+
+
+def work(cell: Cell) -> dict[str, Any]:
+    """One map with its measures, or the task points that can be reached."""
+    example, method = EXAMPLES[cell.settings["task"]](), cell.settings["method"]
+    if method == REACH:
+        spacing = np.broadcast_to(example.spacing, len(example.task.names)).astype(np.float64)
+        return {"points": reachable(example.model, example.costs, example.task, spacing, example.motors, example.start, example.margin)}
+    return built(example, method, cell.seed)
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Build the maps that the folder does not hold yet."""
+    importlib.import_module("mobee.collision.fcl_engine")  # raises NotInstalled before anything is begun
+    run_cells(work, cells(arguments), folder, arguments)
+    return findings(load_cells(folder))
+
+
+def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
+    """The measures of a map, and the map itself as arrays."""
+    start, wall = time.process_time(), time.perf_counter()
+    roadmap = build(example, method, seed)
+    wall, processor = time.perf_counter() - wall, time.process_time() - start
+    good = valid(example.model, example.costs, example.task, roadmap.q, roadmap.y, example.motors, example.start)
+    joined = nearest_before(roadmap.y, roadmap.spacing, len(roadmap.spacing))
+    free = check_edges(example.model, roadmap.q, roadmap.edges)
+    return {
+        "vertices": len(roadmap.q),
+        "evaluations": int(roadmap.settings["evaluations"]),
+        "processor_s": processor,
+        "wall_s": wall,
+        "valid": float(good.mean()),
+        "kept": len(roadmap.edges) / max(1, len(joined)),
+        "free": float(np.mean(free)) if len(free) else 1.0,
+        "connected": float((roadmap.graph.components == 0).mean()),
+        "q": roadmap.q,
+        "y": roadmap.y,
+        "edges": roadmap.edges,
+        "spacing": roadmap.spacing,
+    }
+
+
+def rebuilt(example: Example, values: Mapping[str, Any]) -> Roadmap:
+    """The map from the values of `built`."""
+    q, y, edges, spacing = (values[name] for name in ("q", "y", "edges", "spacing"))
+    return Roadmap(example.model, q, y, edges, spacing, {"names": list(example.task.names)})
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """The table, and the claims."""
+    runs = maps(found)
+    table: dict[str, dict[str, dict[str, str]]] = {}
+    for (task, method), columns in runs.items():
+        table.setdefault(task, {})[NAMES[method]] = {name: told(values, _digits(name)) for name, values in columns.items()}
+    return {"maps": table, "claims": [claim.record() for claim in judged(runs)]}
+
+
+def maps(found: Cells) -> dict[Key, dict[str, Array]]:
+    """The numbers of every map, (seeds,) each, in the order of the examples and the seeds; coverage where the reach is known."""
+    reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
+    built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
+    runs: dict[Key, dict[str, Array]] = {}
+    for task in EXAMPLES:
+        mine = [one for one in built if one.cell.settings["task"] == task]
+        for method in NAMES:
+            rows = [_row(one.values, _points(reach.get(task), mine, one)) for one in mine if one.cell.settings["method"] == method]
+            if rows:
+                runs[task, method] = {name: np.array([row[name] for row in rows]) for name in COLUMNS}
+    return runs
+
+
+def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
+    """The claims with our numbers; open unless every task was mapped by both methods."""
+    if any((task, method) not in runs for task in EXAMPLES for method in NAMES):
+        return list(CLAIMS)
+    figures = [task for task in EXAMPLES if task != PREGRASP]
+    covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in figures} for method in NAMES}
+    holds = all(share >= COVERED for share in covered[NES].values())
+    vertices = np.concatenate([runs[PREGRASP, method]["vertices"] for method in NAMES])
+    slowest = max(figures, key=lambda task: float(runs[task, NES]["processor_s"].max()))
+    most = float(runs[slowest, NES]["processor_s"].max())
+    sound = sum(float((one["valid"] * one["vertices"]).sum()) for one in runs.values())
+    poses = sum(float(one["vertices"].sum()) for one in runs.values())
+    return [  # of the map-making the thesis' own method decides
+        MAPS.measured("; ".join(f"{NAMES[method]}: {_least(shares)}" for method, shares in covered.items()), holds),
+        VALID.measured(f"{sound:.0f} of {poses:.0f} poses", round(sound) == round(poses)),
+        GRAPH.measured("; ".join(f"{NAMES[method]}: {_least(_connected(runs, method))}" for method in NAMES), _whole(runs)),
+        SIZE.measured(f"{vertices.min():.0f} to {vertices.max():.0f}", bool(MANY[0] <= vertices.min() and vertices.max() <= MANY[1])),
+        SOON.measured(f"at most {most:.0f} s ({slowest})", most <= LARGEST),
+    ]
+
+
+def _points(reach: Array | None, maps: Sequence[CellResult], own: CellResult) -> Array | None:
+    """The task points that the search or any other map reached, (R, m)."""
+    return None if reach is None else np.concatenate([reach, *(one.values["y"] for one in maps if one is not own)])
+
+
+def _row(values: Mapping[str, Any], points: Array | None) -> dict[str, float]:
+    row = {name: float(values[name]) for name in ("vertices", "processor_s", "valid", "kept", "free", "connected")}
+    row["evaluations_a_vertex"] = values["evaluations"] / max(1, values["vertices"])
+    known = None if points is None else coverage(points, values["y"], values["spacing"])
+    row["coverage"], row["largest_hole"] = (np.nan, np.nan) if known is None else (known.share, known.largest_hole)
+    return row
+
+
+def _connected(runs: Mapping[Key, Mapping[str, Array]], method: str) -> dict[str, float]:
+    return {task: float(runs[task, method]["connected"].min()) for task in EXAMPLES}
+
+
+def _whole(runs: Mapping[Key, Mapping[str, Array]]) -> bool:
+    return all(share == 1.0 for method in NAMES for share in _connected(runs, method).values())
+
+
+def _least(shares: Mapping[str, float]) -> str:
+    worst = min(shares, key=lambda task: shares[task])
+    return f"at least {100.0 * shares[worst]:.1f} % ({worst})"
+
+
+def _digits(column: str) -> int:
+    return 0 if column in ("vertices", "evaluations_a_vertex") else 1 if column == "processor_s" else 3
+
+
+def figure(folder: Path) -> Path:
+    """Draw the cloud of every task's first map, by evolution where there is one; raises InvalidValue if there is none."""
+    found = load_cells(folder)
+    finished = [one for one in found.values() if one.cell.settings["method"] != REACH]
+    finished.sort(key=lambda one: (list(NAMES).index(one.cell.settings["method"]), one.cell.seed), reverse=True)
+    chosen = {one.cell.settings["task"]: one for one in finished}
+    tasks = [task for task in EXAMPLES if task in chosen]
+    if not tasks:
+        raise InvalidValue(f"{folder} has no finished maps: it was stopped before the first.")
+    panels = []
+    for task in tasks:
+        example = EXAMPLES[task]()
+        panels.append(cloud_panel(example, rebuilt(example, chosen[task].values), HEIGHT))
+    rows = [("", panels[first : first + SHEET_COLUMNS]) for first in range(0, len(panels), SHEET_COLUMNS)]
+    return write_sheet(rows, folder / "figure.png")
+
+
+EXPERIMENT = Experiment(
+    name="trm",
+    claim="maps for all tasks of thesis figures 3.1 to 3.11 and 4.8: their poses valid, their task spaces covered",
+    source="thesis 3.3, 3.4, 4.3",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+    claims=CLAIMS,
+)

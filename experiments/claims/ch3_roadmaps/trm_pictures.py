@@ -1,0 +1,140 @@
+"""Pictures of maps: the positions of their markers, and a motion through each (as thesis figs. 3.1-3.11).
+
+    python -m experiments.claims.ch3_roadmaps.trm_pictures TASK [TASK ...] [--method least_squares] [--out FOLDER]
+
+Writes TASK.npz, which `mobee roadmap` reads, too, TASK_cloud.png and TASK_film.png; with several tasks also films_one_hand.png,
+films_both_hands.png and clouds.png, all on one sheet.  A map that is there already is not built again.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
+from experiments.drawing.cloud import cloud_solids, marker_cloud
+from experiments.drawing.filmstrip import Strip, filmstrip, pictures_of
+from experiments.drawing.motion import Motion, motion_through
+from experiments.drawing.sheet import Panel, write_sheet
+from experiments.kit.roadmap_task import LEFT_ARM, Example, Method, build
+from mobee import MobeeError
+from mobee.roadmap.building.task import Coordinate
+from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.robot import Array
+
+STEP = 0.05  # rad of the motor that moves most, between two poses of a film
+SPEED = 0.35  # rad/s, of that motor: 20 degrees a second
+POSES = 6
+CLOUD = "oblique"  # the one view of a cloud on a sheet
+METHODS: tuple[Method, ...] = ("least_squares", "nes", "hybrid")
+SHEET, COLORS = 140, 48  # pixels, the height of a picture on a sheet
+COLUMNS = 4
+
+
+def draw_cloud(example: Example, roadmap: Roadmap, path: Path, height: int = 400) -> Path:
+    """The places of the markers in all poses, beside the robot where its film begins."""
+    shown = roadmap.q[_near(roadmap, example.via[0])]
+    return marker_cloud(example.model, roadmap.q, example.markers, path, shown, title=_title(example), height=height)
+
+
+def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
+    """The same in one view, with its title below."""
+    shown = example.model.evaluate(roadmap.q[_near(roadmap, example.via[0])])
+    pose = example.model.evaluate(roadmap.q)
+    places = np.concatenate([pose.position(marker) for marker in example.markers])
+    return Panel(pictures_of([cloud_solids(shown, places, places[:, 2])], CLOUD, height)[0], _title(example))
+
+
+def draw_film(example: Example, roadmap: Roadmap, path: Path, height: int = 260) -> Path:
+    """The motion through the points of the example."""
+    return filmstrip([strip_of(example, roadmap)], path, height)
+
+
+def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
+    """The motion as a row of a filmstrip, the task coordinates below each pose."""
+
+    def caption(motion: Motion, moment: int) -> str:
+        y = example.task.of(example.model.evaluate(motion.poses[moment].q[None]))[0]
+        return caption_of(example.task.coordinates, y)
+
+    motion = planned(example, roadmap)
+    return Strip(motion, example.markers[-1], example.views, poses, _title(example), caption, _moving_parts(example))
+
+
+def planned(example: Example, roadmap: Roadmap) -> Motion:
+    """The shortest paths in the map through the points of the example, one after the other."""
+    q = roadmap.q[roadmap.exit(example.via[0])][None]
+    for y in example.via[1:]:
+        q = np.concatenate([q, roadmap.path(q[-1], y)[1:]])
+    fine = [q[:1]]
+    for here, there in pairwise(q):
+        steps = max(1, int(np.ceil(np.abs(there - here).max() / STEP)))
+        fine.append(here + np.arange(1, steps + 1)[:, None] / steps * (there - here))
+    poses = np.concatenate(fine)
+    times = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(poses, axis=0)).max(axis=1) / SPEED)])
+    return motion_through(example.model, poses, times.tolist())
+
+
+def caption_of(coordinates: Sequence[Coordinate], y: Array) -> str:
+    """Task coordinates as text: places in cm, angles in degrees."""
+    words = []
+    for one, value in zip(coordinates, y, strict=True):
+        words.append(f"{round(np.rad2deg(value))}°" if one.unit == "rad" else f"{one.name.split()[-1]} {round(100.0 * value)}")
+    return ", ".join(words) + (" cm" if any(one.unit == "m" for one in coordinates) else "")
+
+
+def _near(roadmap: Roadmap, y: tuple[float, ...]) -> int:
+    """The vertex nearest to task coordinates, however far."""
+    return int(np.linalg.norm((roadmap.y - y) / roadmap.spacing, axis=1).argmin())
+
+
+def _title(example: Example) -> str:
+    return f"{example.title} (fig. {example.figure})"
+
+
+def _moving_parts(example: Example) -> tuple[str, ...]:
+    """The parts of which some motor may move."""
+    robot = example.model.robot
+    return tuple(name for name, part in robot.parts.items() if {name, *part.motors} & set(example.motors))
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Build and draw."""
+    parser = argparse.ArgumentParser(description="Build the maps of tasks and draw them.")
+    parser.add_argument("tasks", nargs="+", choices=[*EXAMPLES, "all"], metavar="TASK", help=f"all, or of {', '.join(EXAMPLES)}")
+    parser.add_argument("--method", choices=METHODS, default=METHODS[0], help="how poses are found (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is drawn (default: 0)")
+    parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help="where to (default: here)")
+    options = parser.parse_args(argv)
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        draw_all(list(EXAMPLES) if "all" in options.tasks else options.tasks, options.method, options.seed, options.out)
+    except MobeeError as error:
+        raise SystemExit(str(error)) from None
+
+
+def draw_all(tasks: Sequence[str], method: Method, seed: int, out: Path) -> None:
+    """Every task's map and pictures, with a line printed for each, and the sheets."""
+    strips: dict[str, list[Strip]] = {}
+    clouds = []
+    for task in tasks:
+        example = EXAMPLES[task]()
+        roadmap = build(example, method, seed, out / f"{task}.npz")
+        line = f"{len(roadmap.q)} poses, {len(roadmap.edges)} edges, {roadmap.settings['seconds']:.1f} s"
+        pictures = draw_cloud(example, roadmap, out / f"{task}_cloud.png"), draw_film(example, roadmap, out / f"{task}_film.png")
+        print(f"{task}: {line}; {', '.join(map(str, pictures))}")
+        hands = "both_hands" if set(LEFT_ARM) <= set(example.motors) else "one_hand"
+        strips.setdefault(hands, []).append(strip_of(example, roadmap))
+        clouds.append(cloud_panel(example, roadmap, SHEET))
+    if len(tasks) > 1:
+        for name, chosen in strips.items():
+            filmstrip(chosen, out / f"films_{name}.png", SHEET, COLORS)
+        write_sheet([("", clouds[first : first + COLUMNS]) for first in range(0, len(clouds), COLUMNS)], out / "clouds.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Thesis chapters 4.1, 4.2 and 4.4: the reflex of MoBeE 1.0."""

@@ -1,0 +1,340 @@
+"""Babbling: collisions and completed commands under random position moves of 23 motors at 20 % speed, at a table (thesis 4.1.1).
+
+Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second
+MoBeE lets more of the commands happen, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
+hours over several trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all
+of them", on the robot.  Here: the PyBullet robot, every process in lockstep, postures uniform over the whole ranges of torso (3
+motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is a posture of one part; it
+is completed when all its motors end within 10 degrees, returned when the part ends where it began, else deflected.
+
+Run time: 2 h of robot time in each of three modes take about an hour; an interrupted run goes on with --resume.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.claims.ch4_reflex.babbling_commands import ROBOT
+from experiments.claims.ch4_reflex.babbling_trial import (
+    MODES,
+    RATE,
+    TITLES,
+    Judged,
+    Outcome,
+    Trial,
+    TrialFailed,
+    measure,
+    read_trial,
+    run_trial,
+    write_trial,
+)
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.options import positive_number
+from experiments.kit.plots import new_figure
+from experiments.kit.progress import Progress
+from experiments.kit.recordings import POSITIONS, Touch
+from mobee import load_robot
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
+
+TRIAL = "trial.json"
+SEEDS = 10_000  # trials a seed
+TRIES = 3  # of a trial in which a process was late for a tick
+
+OUTCOMES: tuple[Outcome, ...] = ("completed", "deflected", "returned")
+DEEPEST = 2e-3  # m, allowed with MoBeE 2.0
+BEYOND = float(np.deg2rad(0.5))  # rad, allowed with MoBeE 2.0
+STRICT = float(np.deg2rad(5.0))  # rad, reported beside what counts as completed
+HUNDREDS = 100.0 / 7200.0  # events a second of robot time without MoBeE: hundreds in two hours
+EDGES = (0.1, 0.2, 0.5, 1.0, 2.0)  # mm, of the depth histogram
+
+LABEL, COLUMN = 38, 14
+LIMITS = {"completed": ", within 10 deg", "deflected": "", "returned": ", within 5 deg"}
+PRINTED_PAIRS = 8  # the most frequent first
+
+COLORS = {"off": "tab:red", "one": "tab:orange", "two": "tab:blue"}
+OUTCOME_COLORS = ("tab:green", "tab:olive", "0.7")
+DRAWN_PAIRS = 12
+
+Rows = Mapping[str, Mapping[str, Any]]  # by mode
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options."""
+    parser.add_argument("--minutes", type=positive_number, default=120.0, metavar="M", help="of robot time in each mode (default: 120)")
+    parser.add_argument("--trial", type=positive_number, default=10.0, metavar="M", help="robot time of a trial (default: 10)")
+    parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), metavar="MODE", help=f"of {', '.join(MODES)}")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Run the trials that are not there yet; returns the table, and whether the claims hold."""
+    robot = load_robot(ROBOT)
+    lengths = trial_lengths(arguments.minutes, arguments.trial)
+    total, done = len(lengths) * len(arguments.modes), 0
+    with Progress() as progress:
+        for number, minutes in enumerate(lengths):
+            for mode in arguments.modes:
+                place = folder / mode / f"{number:03}"
+                if not (place / TRIAL).exists():
+                    text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
+                    seed, ticks = SEEDS * arguments.seed + number, round(60.0 * minutes * RATE)
+                    _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text))
+                done += 1
+    rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
+    judged = verdict(rows)
+    if not arguments.json:
+        print(as_table(rows))
+    return {"passed": all(judged.values()), "judged": judged, **({"modes": rows} if arguments.json else {})}
+
+
+def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
+    """Repeat a trial until no process was late for a tick; raises TrialFailed."""
+    for _ in range(TRIES):
+        run_trial(place, mode, robot, seed, ticks, show)
+        trial = measure(place, robot, 1.0 / RATE)
+        if trial.lockstep.repeatable:
+            write_trial(place / TRIAL, trial)
+            (place / POSITIONS).unlink()
+            return
+    raise TrialFailed(f"{mode}: in {TRIES} trials somebody was late for a tick: this machine is too busy; see {place / 'launch'}")
+
+
+def _shower(progress: Progress, done: int, total: int, text: str) -> Callable[[float], None]:
+    """Shows the share of all trials that is done, given that of the one under way."""
+    return lambda share: progress.show((done + share) / total, text)
+
+
+def trial_lengths(minutes: float, trial: float) -> list[float]:
+    """The trials that make up so many minutes, in minutes; the last may be shorter."""
+    whole = int(minutes / trial + 1e-9)
+    rest = minutes - whole * trial
+    return [trial] * whole + ([rest] if rest > 1e-6 * trial else [])
+
+
+def read_trials(folder: Path, mode: str) -> list[Trial]:
+    """All finished trials of a mode, in order."""
+    return [read_trial(path) for path in sorted(folder.glob(f"{mode}/*/{TRIAL}"))]
+
+
+def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
+    """The row of a mode: lengths in mm, angles in degrees, paths in rad."""
+    touches = [touch for trial in trials for touch in trial.touches]
+    commands = [command for trial in trials for command in trial.commands]
+    seconds = sum(trial.seconds for trial in trials)
+    furthest = max(trials, key=lambda trial: trial.beyond)
+    pairs = Counter(touch.pair for touch in touches)
+    left = [distance for command in commands for distance in command.left.values()]
+    jerk = _rms([trial.jerk_squared for trial in trials], trials)
+    speed = _rms([trial.speed_squared for trial in trials], trials)
+    whole = sum(set(command.outcomes.values()) == {"completed"} for command in commands)
+    return {
+        "minutes": round(seconds / 60.0, 2),
+        "trials": len(trials),
+        "times_real_time": round(seconds / sum(trial.seconds / trial.lockstep.speed for trial in trials), 2),
+        "collisions": len(touches),
+        "deepest_mm": round(1e3 * max((touch.depth for touch in touches), default=0.0), 3),
+        "depth_histogram_mm": depth_histogram(touches),
+        "pairs": dict(pairs.most_common()),
+        "worst_beyond_limit_deg": round(float(np.rad2deg(furthest.beyond)), 3),
+        "worst_motor": furthest.motor,
+        "postures": len(commands),
+        "postures_completed": whole,
+        "commands": sum(len(command.outcomes) for command in commands),
+        **{outcome: _count(commands, outcome) for outcome in OUTCOMES},
+        "within_5_deg": sum(distance <= STRICT for distance in left),
+        "left_median_deg": round(float(np.rad2deg(np.median(left))), 2) if left else None,
+        "endings": dict(Counter(ending for command in commands for ending in command.endings.values())),
+        "seconds_a_posture": _mean([command.duration for command in commands]),
+        "path_rad": _mean([command.path for command in commands]),
+        "straight_way_rad": _mean([command.way for command in commands]),
+        "path_a_minute_rad": round(60.0 * sum(trial.path for trial in trials) / seconds, 2),
+        "speed_rms": round(speed, 4),
+        "jerk_rms": round(jerk, 2),
+        "jerk_over_speed": round(jerk / max(speed, 1e-9), 1),
+        "jerk_max": round(max(trial.jerk_max for trial in trials), 1),
+    }
+
+
+def verdict(rows: Rows) -> dict[str, bool]:
+    """The claims that can be judged with the modes that were run."""
+    claims: dict[str, bool] = {}
+    off, one, two = (rows.get(mode) for mode in ("off", "one", "two"))
+    if off:
+        hundreds = max(1.0, HUNDREDS * 60.0 * off["minutes"])
+        claims["without MoBeE it collides, hundreds of times in two hours"] = off["collisions"] >= hundreds
+    if two:
+        claims["with 2.0 no listed contact is deeper than 2 mm"] = two["deepest_mm"] <= 1e3 * DEEPEST
+        claims["with 2.0 no joint is beyond its limit by more than 0.5 degrees"] = two["worst_beyond_limit_deg"] <= np.rad2deg(BEYOND)
+    if one and two:
+        claims["2.0 completes a larger share of the commands than 1.0"] = share(two, "completed") > share(one, "completed")
+        claims["2.0 moves more smoothly than 1.0"] = two["jerk_over_speed"] < one["jerk_over_speed"]
+    return {claim: bool(stands) for claim, stands in claims.items()}
+
+
+def share(row: Mapping[str, Any], count: str) -> float:
+    """What share of the commands a count is; 0 when there are none."""
+    return float(row[count] / row["commands"]) if row["commands"] else 0.0
+
+
+def _count(commands: Sequence[Judged], outcome: Outcome) -> int:
+    return sum(each == outcome for command in commands for each in command.outcomes.values())
+
+
+def _rms(squares: Sequence[float], trials: Sequence[Trial]) -> float:
+    """Of mean squares, one a trial."""
+    return float(np.sqrt(np.average(squares, weights=[trial.seconds for trial in trials])))
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return round(float(np.mean(values)), 2) if values else None
+
+
+def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
+    """The number of events by range of depth in mm."""
+    depths = [1e3 * event.depth for event in events]
+    bounds = (0.0, *EDGES, float("inf"))
+    labels = [f"<{EDGES[0]:g}", *(f"{low:g}-{high:g}" for low, high in zip(EDGES, EDGES[1:], strict=False)), f">{EDGES[-1]:g}"]
+    return {label: sum(low <= depth < high for depth in depths) for label, low, high in zip(labels, bounds[:-1], bounds[1:], strict=True)}
+
+
+def as_table(rows: Rows) -> str:
+    """A column a mode."""
+    lines = [_line("", [TITLES[mode] for mode in rows])]
+
+    def add(label: str, text: Mapping[str, str]) -> None:
+        lines.append(_line(label, list(text.values())))
+
+    def plain(label: str, key: str, digits: int = 0) -> None:
+        add(label, {mode: _number(row[key], digits) for mode, row in rows.items()})
+
+    plain("robot time [min]", "minutes", 1)
+    plain("trials", "trials")
+    plain("  times real time", "times_real_time", 1)
+    plain("collisions (solid contacts)", "collisions")
+    for depth in next(iter(rows.values()))["depth_histogram_mm"]:
+        add(f"  {depth} mm deep", {mode: str(row["depth_histogram_mm"][depth]) for mode, row in rows.items()})
+    plain("  deepest [mm]", "deepest_mm", 2)
+    plain("furthest beyond a joint limit [deg]", "worst_beyond_limit_deg", 2)
+    plain("commands (postures of a part)", "commands")
+    for outcome in OUTCOMES:
+        add(f"  {outcome}{LIMITS[outcome]}", {mode: f"{share(row, outcome):.0%}" for mode, row in rows.items()})
+    add("  within 5 deg", {mode: f"{share(row, 'within_5_deg'):.0%}" for mode, row in rows.items()})
+    plain("  left to go, median [deg]", "left_median_deg", 1)
+    add("postures of all parts completed", {mode: f"{row['postures_completed']} of {row['postures']}" for mode, row in rows.items()})
+    plain("time a posture [s]", "seconds_a_posture", 1)
+    plain("path a posture [rad, all motors]", "path_rad", 1)
+    plain("  straight way to it [rad]", "straight_way_rad", 1)
+    plain("speed, rms [rad/s]", "speed_rms", 3)
+    plain("jerk, rms [rad/s^3]", "jerk_rms", 1)
+    plain("  largest [rad/s^3]", "jerk_max", 0)
+    plain("  over speed, rms [1/s^2]", "jerk_over_speed", 0)
+    return "\n".join([*lines, *_pairs(rows)])
+
+
+def _pairs(rows: Rows) -> list[str]:
+    """The pairs that touched, the most frequent first."""
+    total: dict[str, int] = {}
+    for row in rows.values():
+        for pair, count in row["pairs"].items():
+            total[pair] = total.get(pair, 0) + count
+    ranked = sorted(total, key=lambda pair: (-total[pair], pair))
+    lines = ["collisions by pair:"] if ranked else []
+    lines += [
+        _line(f"  {pair.replace(' ', ' - ')}", [str(row["pairs"].get(pair, 0)) for row in rows.values()]) for pair in ranked[:PRINTED_PAIRS]
+    ]
+    rest = [str(sum(row["pairs"].get(pair, 0) for pair in ranked[PRINTED_PAIRS:])) for row in rows.values()]
+    return [*lines, _line(f"  {len(ranked) - PRINTED_PAIRS} more", rest)] if len(ranked) > PRINTED_PAIRS else lines
+
+
+def _line(label: str, cells: list[str]) -> str:
+    return f"{label:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def figure(folder: Path) -> Path:
+    """Draw the finished trials; raises InvalidValue if there are none."""
+    trials = {mode: found for mode in MODES if (found := read_trials(folder, mode))}
+    if not trials:
+        raise InvalidValue(f"{folder} has no finished trial: it was stopped before the first was over.")
+    path = folder / "figure.png"
+    plot({mode: summarise(found) for mode, found in trials.items()}).savefig(path, dpi=150)
+    return path
+
+
+def plot(rows: Rows) -> Any:
+    """Collisions by pair and by depth, outcomes of the commands, and roughness; rows as of `summarise`, by mode."""
+    drawing = new_figure(11.0, 7.5)
+    axes = drawing.subplots(2, 2)
+    minutes = ", ".join(f"{TITLES[mode]} {row['minutes']:g} min" for mode, row in rows.items())
+    drawing.suptitle(f"Motor babbling at 20 % speed, thesis 4.1.1 ({minutes} of robot time)")
+    _by_pair(axes[0, 0], rows)
+    _by_depth(axes[0, 1], rows)
+    _outcomes(axes[1, 0], rows)
+    _smoothness(axes[1, 1], rows)
+    return drawing
+
+
+def _by_pair(axes: Any, rows: Rows) -> None:
+    total: dict[str, int] = {}
+    for row in rows.values():
+        for pair, count in row["pairs"].items():
+            total[pair] = total.get(pair, 0) + count
+    pairs = sorted(total, key=lambda pair: (-total[pair], pair))[:DRAWN_PAIRS]
+    _bars(axes.barh, rows, [[row["pairs"].get(pair, 0) for pair in pairs] for row in rows.values()])
+    axes.set_yticks(range(len(pairs)), [pair.replace(" ", " - ") for pair in pairs], fontsize=8)
+    axes.invert_yaxis()
+    axes.set(title="Collisions by pair" if pairs else "No collisions", xlabel="events")
+    axes.set_xlim(0.0, max(1.0, axes.get_xlim()[1]))
+
+
+def _by_depth(axes: Any, rows: Rows) -> None:
+    depths = list(next(iter(rows.values()))["depth_histogram_mm"])
+    _bars(axes.bar, rows, [list(row["depth_histogram_mm"].values()) for row in rows.values()])
+    axes.set_xticks(range(len(depths)), depths)
+    axes.set(title=f"Depth of the collisions (allowed with 2.0: {1e3 * DEEPEST:g} mm)", xlabel="mm", ylabel="events")
+    axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
+    axes.legend(fontsize=8)
+
+
+def _outcomes(axes: Any, rows: Rows) -> None:
+    bottom = [0.0] * len(rows)
+    for outcome, color in zip(OUTCOMES, OUTCOME_COLORS, strict=True):
+        heights = [share(row, outcome) for row in rows.values()]
+        axes.bar(range(len(rows)), heights, bottom=bottom, color=color, label=outcome)
+        bottom = [below + height for below, height in zip(bottom, heights, strict=True)]
+    axes.set_xticks(range(len(rows)), [f"{TITLES[mode]}\n{row['commands']} commands" for mode, row in rows.items()])
+    axes.set(ylabel="share", ylim=(0.0, 1.0))
+    axes.set_title("What became of the commands", pad=22.0)
+    axes.legend(fontsize=8, ncols=len(OUTCOMES), loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+
+
+def _smoothness(axes: Any, rows: Rows) -> None:
+    axes.bar(range(len(rows)), [row["jerk_over_speed"] for row in rows.values()], color=[COLORS[mode] for mode in rows])
+    axes.set_xticks(range(len(rows)), [TITLES[mode] for mode in rows])
+    axes.set(title="Roughness: jerk over speed, each rms", ylabel="1/s$^2$")
+
+
+def _bars(bars: Callable[..., Any], rows: Rows, heights: list[list[int]]) -> None:
+    """A bar a mode at every place; `bars`: bar or barh of some axes."""
+    width = 0.8 / len(rows)
+    for i, (mode, values) in enumerate(zip(rows, heights, strict=True)):
+        shift = (i - (len(rows) - 1) / 2.0) * width
+        bars([x + shift for x in range(len(values))], values, width, color=COLORS[mode], label=TITLES[mode])
+
+
+EXPERIMENT = Experiment(
+    name="babbling",
+    claim="random position moves break nothing under MoBeE, and 2.0 deflects them less than 1.0",
+    source="thesis 4.1.1",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+)

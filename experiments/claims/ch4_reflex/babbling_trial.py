@@ -1,0 +1,259 @@
+"""One trial of `babbling`: a fresh system of real processes in lockstep, from home, until its robot time is over, and its measures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from experiments.claims.ch4_reflex.babbling_commands import COMMANDS, Commanded, Ending, moved_motors, read_commands
+from experiments.kit.live import TABLE, free_endpoint, stop
+from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array, Robot
+from services.common.session import NAMESPACE
+
+MODES = ("off", "one", "two")
+TITLES = {"off": "without MoBeE", "one": "MoBeE 1.0", "two": "MoBeE 2.0"}
+RATE = 50.0  # Hz, the published control period
+FILTERED = "icub_filtered"  # namespace of the robot that MoBeE 1.0 offers
+SPEED = 0.2  # of the motors' top speed, thesis 4.1.1
+
+_ROBOT = """title = "Babbling {title}"
+
+[shared]
+mode = "lock"
+patience = 20
+robot = "icub"
+world = {world}
+seed = {seed}
+{gains}
+
+[services.robot_sim]
+rate = {rate:g}
+ticks = {ticks}
+record = {record}
+"""
+_ONE = """participants = ["port_filter"]
+
+[services.port_filter]
+clients = "icub_filtered"
+participants = ["babbler"]
+"""
+_TWO = """
+[services.model]
+
+[services.controller]
+speed_scale = {speed:g}
+"""
+_BABBLER = """
+[services.babbler]
+module = "experiments.claims.ch4_reflex.babbler"
+at = "{at}"
+robot_of = "{robot_of}"
+speed = {speed:g}
+run_dir = {folder}
+"""
+PERIOD = 0.05  # s between two checks of the progress
+BEGINS = 60.0  # s within which the first tick must come
+STANDS = 30.0  # s without a tick after which a trial is given up
+REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the limits' own zone, less than half a cell of the thesis' lattices
+RETURNED = float(np.deg2rad(5.0))  # rad, likewise
+SUMMARY = "summary.json"  # of the launcher
+
+Outcome = Literal["completed", "deflected", "returned"]
+
+
+def scenario(mode: str, folder: Path, seed: int, ticks: int) -> str:
+    """The scenario's text; the recordings go to the folder."""
+    where = _quoted(folder)
+    gains = 'gains = "default"' if mode == "two" else ""
+    at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
+    between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
+    robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where, world=_quoted(TABLE))
+    return robot + between + _BABBLER.format(at=at, robot_of=robot_of, speed=SPEED, folder=where)
+
+
+def _quoted(path: Path) -> str:
+    return '"' + str(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+class TrialFailed(MobeeError):
+    """A trial that did not end in order; the message names its logs."""
+
+
+def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
+    """Leave commands, positions and contacts in the folder; `show` is called with the share that is done.  Raises TrialFailed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for left in (COMMANDS, POSITIONS):  # of an interrupted trial
+        (folder / left).unlink(missing_ok=True)
+    file = folder / f"{mode}.toml"
+    file.write_text(scenario(mode, folder.resolve(), seed, ticks))
+    due = ticks * 8 * len(robot.motors)  # bytes of a whole record
+    with _launched(file, folder) as process:
+        written, stands_at = 0, time.monotonic() + BEGINS
+        while process.poll() is None:  # robot_sim counts the ticks, and the launcher ends with it
+            time.sleep(PERIOD)
+            size = _size(folder / POSITIONS)
+            if size != written:
+                written, stands_at = size, time.monotonic() + STANDS
+                show(size / due)
+            elif time.monotonic() > stands_at:
+                raise TrialFailed(f"{mode}: no tick for {STANDS:g} s; see {folder / 'news'} and {folder / 'launch'}")
+    if _size(folder / POSITIONS) != due:
+        raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'news'} and {folder / 'launch'}")
+
+
+@contextmanager
+def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """`mobee launch` at an endpoint of its own; it must end without fault, and is stopped when anything is raised."""
+    argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--headless", "--json"]
+    argv += ["--endpoint", free_endpoint(), "--runs", str(folder / "launch")]
+    with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
+        # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
+        process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=summary, stderr=news, process_group=0)
+    try:
+        yield process
+    finally:
+        code = stop(process)
+    if code != 0:
+        raise TrialFailed(f"{file.stem}: the system ended with code {code}: {_last_line(folder / 'news')}")
+
+
+def _last_line(path: Path) -> str:
+    *_, last = ["it said nothing", *path.read_text(errors="replace").strip().splitlines()]
+    return last
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+class Judged(Struct, frozen=True):
+    """A command and its outcome."""
+
+    outcomes: dict[str, Outcome]  # by part
+    endings: dict[str, Ending]  # by part
+    left: dict[str, float]  # by part: rad, how far its worst motor ended from where it should
+    duration: float  # s
+    path: float  # rad, all motors together
+    way: float  # rad, the straight way from begin to target, all motors together
+
+
+class Lockstep(Struct, frozen=True):
+    """The launcher's summary of the run's ticks."""
+
+    ticks: int
+    speed: float  # x real time
+    repeatable: bool  # all answered every tick in time
+    states_sha256: str  # of the state stream
+
+
+class _Summary(Struct):
+    """The part of the launcher's summary that is used."""
+
+    lockstep: Lockstep
+
+
+class Trial(Struct, frozen=True):
+    """The numbers of one trial."""
+
+    seconds: float  # robot time
+    commands: list[Judged]
+    touches: list[Touch]
+    beyond: float  # rad, the furthest beyond a limit; negative: inside
+    motor: str  # that went there
+    speed_squared: float  # (rad/s)^2, mean over ticks and motors
+    jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
+    jerk_max: float  # rad/s^3
+    path: float  # rad
+    lockstep: Lockstep
+
+
+def measure(folder: Path, robot: Robot, dt: float) -> Trial:
+    """The measures of a finished trial, from its folder."""
+    q_all = read_positions(folder, robot)
+    moved = moved_motors(robot)
+    q = q_all[:, moved]
+    worst = beyond_limits(q, robot.limits[moved])
+    third = jerk(q, dt)
+    return Trial(
+        seconds=len(q) * dt,
+        commands=[judge(commanded, q_all, robot, dt) for commanded in read_commands(folder / COMMANDS)],
+        touches=read_touches(folder / CONTACTS, dt),
+        beyond=float(worst.max()),
+        motor=robot.motors[moved[int(worst.argmax())]],
+        speed_squared=float((speed(q, dt) ** 2).mean()),
+        jerk_squared=float((third**2).mean()),
+        jerk_max=float(np.abs(third).max()),
+        path=path_length(q),
+        lockstep=msgspec.json.decode((folder / SUMMARY).read_bytes(), type=_Summary).lockstep,
+    )
+
+
+def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged:
+    """The outcome of a command; q_all (ticks, n) rad at the ends of the ticks, the first is tick 1."""
+    moved = moved_motors(robot)
+    target = np.array(commanded.target)
+    course = q_all[max(commanded.begin - 2, 0) : max(commanded.end - 1, 1)]  # from the beginning of tick `begin` to that of `end`
+    first, last = course[0], course[-1]
+    own = {name: moved[(moved >= part.slice.start) & (moved < part.slice.stop)] for name, part in robot.parts.items()}
+    left = {name: float(np.abs(last - target)[motors].max()) for name, motors in own.items()}
+    return Judged(
+        outcomes={name: _outcome(left[name], float(np.abs(last - first)[motors].max())) for name, motors in own.items()},
+        endings=commanded.endings,
+        left=left,
+        duration=(commanded.end - commanded.begin) * dt,
+        path=path_length(course[:, moved]),
+        way=float(np.abs(target - first)[moved].sum()),
+    )
+
+
+def _outcome(left: float, gone: float) -> Outcome:
+    """From how far a part ended from its target, and from where it began, rad."""
+    if left <= REACHED:
+        return "completed"
+    return "returned" if gone <= RETURNED else "deflected"
+
+
+def write_trial(path: Path, trial: Trial) -> None:
+    """Write it whole or not at all."""
+    new = path.with_suffix(".new")
+    new.write_bytes(msgspec.json.format(msgspec.json.encode(trial), indent=1))
+    new.replace(path)
+
+
+def read_trial(path: Path) -> Trial:
+    """Read what `write_trial` wrote."""
+    return msgspec.json.decode(path.read_bytes(), type=Trial)
+
+
+def beyond_limits(q: Array, limits: Array) -> Array:
+    """The furthest that each motor was beyond its limits, (m,) rad, negative inside; q (ticks, m), limits (m, 2) rad."""
+    worst: Array = np.maximum(limits[:, 0] - q.min(axis=0), q.max(axis=0) - limits[:, 1])
+    return worst
+
+
+def path_length(q: Array) -> float:
+    """The sum of the distances of all motors, rad; q (ticks, m)."""
+    return float(np.abs(np.diff(q, axis=0)).sum())
+
+
+def speed(q: Array, dt: float) -> Array:
+    """First difference of q (ticks, m) rad over dt [s], (ticks - 1, m) rad/s."""
+    first: Array = np.diff(q, axis=0) / dt
+    return first
+
+
+def jerk(q: Array, dt: float) -> Array:
+    """Third difference of q (ticks, m) rad over dt [s] cubed, (ticks - 3, m) rad/s^3."""
+    third: Array = np.diff(q, n=3, axis=0) / dt**3
+    return third

@@ -1,0 +1,201 @@
+"""Straight paths of the hand into the table's field, at any angle, as postures, and a client that drives along one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from mobee.control.violation import Violation, Watch
+from mobee.kinematics.quaternion import from_matrix
+from mobee.model import Model
+from mobee.robot.load import load_robot, load_world
+from mobee.robot.robot import Array, Robot
+
+SPEED = 0.2  # of the motors' top speed, as in the thesis
+MARKER = "left_palm"
+MOTORS = ("torso_*", "l_shoulder_*", "l_elbow", "l_wrist_*")  # that move the hand
+HAND = ("l_hand", "l_palm", "l_fingers", "l_thumb")  # how the names of its shapes begin
+ASIDE = {"r_shoulder_roll": 70.0, "r_elbow": 90.0}  # degrees, so that the other hand is far from the paths
+BEFORE, BEHIND, LIFT = 0.06, 0.04, 0.04  # m of the path before and behind the first contact, and above its start
+TOP = 0.1  # m below the root, the table's top
+STEP = 0.002  # m between two postures of a path
+SAMPLED = (0.3, 0.7)  # share of the motors' ranges from which postures are drawn
+TORSO = np.deg2rad([[0.0, 0.0], [0.0, 0.0], [0.0, 25.0]])  # rad, range of yaw, roll and pitch from which they are drawn
+PRECISE, DAMPING = 2e-4, 1e-5  # of the inverse kinematics: m and rad; m^2
+MARGIN = 2.0  # degrees within the motors' limits, so that noise does not matter there
+HIGHEST_START = 0.15  # m, of the palm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spot:
+    """Where the hand just touches the table's field, and its heading there."""
+
+    q: Array  # (n,) rad
+    position: Array  # (3,) m, of the palm
+    rotation: Array  # (3, 3)
+    heading: Array  # (3,) unit vector, horizontal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandPath:
+    """Postures (w, n) rad, from above the start over the start into the field; `start` is the index of the start."""
+
+    postures: Array
+    start: int
+
+
+class Table:
+    """The iCub at its table, and the paths of its left hand there."""
+
+    def __init__(self) -> None:
+        self.robot: Robot = load_robot("icub")
+        world = load_world("table")
+        for name, item in list(world.objects.items()):
+            if item.role == "target":
+                world.remove(name)
+        self.model = Model(self.robot, world)
+        self.watch = Watch(self.robot)
+        names = self.robot.motors
+        self._moving = np.array([i for i, name in enumerate(names) if any(fnmatchcase(name, pattern) for pattern in MOTORS)])
+        margin = np.deg2rad([MARGIN, -MARGIN])
+        self._limits = self.robot.limits[self._moving] + margin
+        self._home = self.robot.home.copy()
+        for name, degrees in ASIDE.items():
+            self._home[self.robot.motor_index(name)] = np.deg2rad(degrees)
+
+    def spots(self, number: int, seed: int) -> list[Spot]:
+        """So many random spots that have a path at 90, 45 and 0 degrees."""
+        rng = np.random.default_rng([seed, 0x67])
+        found: list[Spot] = []
+        while len(found) < number:
+            spot = self._touch(rng)
+            if spot is not None and all(self.path(spot, np.deg2rad(angle)) is not None for angle in (90.0, 45.0, 0.0)):
+                found.append(spot)
+        return found
+
+    def _touch(self, rng: np.random.Generator) -> Spot | None:
+        """Lower the hand from a posture drawn at random until it touches the table, and nothing else does."""
+        q = self._home.copy()
+        low, high = self._limits.T
+        q[self._moving] = low + rng.uniform(*SAMPLED, len(low)) * (high - low)
+        q[: len(TORSO)] = rng.uniform(*TORSO.T)
+        heading = rng.uniform(0.0, 2.0 * np.pi)
+        pose = self.model.evaluate(q)
+        position, rotation = pose.position(MARKER), pose.rotation(MARKER)
+        if self.watch.look(pose) or position[2] > HIGHEST_START:
+            return None
+        for _ in range(round((HIGHEST_START + TOP) / STEP)):
+            position = position - np.array([0.0, 0.0, STEP])
+            moved = self._solve(q, position, rotation)
+            if moved is None:
+                return None
+            q = moved
+            found = self.watch.look(self.model.evaluate(q))
+            if found:
+                return self._edge(q, position, rotation, heading) if _is_on_table(found, HAND) else None
+        return None
+
+    def _edge(self, touching: Array, position: Array, rotation: Array, heading: float) -> Spot | None:
+        """The height at which contact begins, between two heights a step apart."""
+        low, high, q = position[2], position[2] + STEP, touching
+        for _ in range(8):
+            middle = np.array([*position[:2], 0.5 * (low + high)])
+            solved = self._solve(q, middle, rotation)
+            if solved is None:
+                return None
+            q = solved
+            low, high = (middle[2], high) if self.watch.look(self.model.evaluate(q)) else (low, middle[2])
+        direction = np.array([np.cos(heading), np.sin(heading), 0.0])
+        return Spot(q, np.array([*position[:2], high]), rotation, direction)
+
+    def path(self, spot: Spot, angle: float) -> HandPath | None:
+        """The path into the spot at an angle to the table's top, rad; None where the arm cannot follow it."""
+        direction = np.cos(angle) * spot.heading - np.array([0.0, 0.0, np.sin(angle)])
+        into = self._line(spot.q, spot, [spot.position + s * direction for s in np.arange(STEP, BEHIND + 1e-9, STEP)])
+        back = self._line(spot.q, spot, [spot.position - s * direction for s in np.arange(STEP, BEFORE + 1e-9, STEP)])
+        if into is None or back is None:
+            return None
+        above = spot.position - BEFORE * direction
+        up = self._line(back[-1], spot, [above + np.array([0.0, 0.0, z]) for z in np.arange(STEP, LIFT + 1e-9, STEP)])
+        if up is None or self.watch.look(self.model.evaluate(up[-1])):
+            return None
+        postures = np.array([*reversed(up), *reversed(back), spot.q, *into])
+        return HandPath(postures, len(up))
+
+    def _line(self, q: Array, spot: Spot, positions: list[Array]) -> list[Array] | None:
+        """Postures on a line of positions, the hand turned as at the spot; None where there is no posture, or another contact."""
+        found = []
+        for position in positions:
+            solved = self._solve(q, position, spot.rotation)
+            if solved is None:
+                return None
+            pose = self.model.evaluate(solved)
+            if not _is_on_table(self.watch.look(pose), ("l_",)):
+                return None
+            q = solved
+            found.append(q)
+        return found
+
+    def _solve(self, q: Array, position: Array, rotation: Array) -> Array | None:
+        """The posture near q whose palm is there, by damped least squares over the arm; None when it is not found."""
+        q = q.copy()
+        for _ in range(30):
+            pose = self.model.evaluate(q)
+            turn = from_matrix(rotation @ pose.rotation(MARKER).T)
+            error = np.concatenate([position - pose.position(MARKER), 2.0 * np.sign(turn[0]) * turn[1:]])
+            if np.abs(error).max() < PRECISE:
+                return q
+            jacobian = self.model.jacobian(q, MARKER)[:, self._moving]
+            change = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + DAMPING * np.eye(6), error)
+            q[self._moving] = (q[self._moving] + change).clip(*self._limits.T)
+        return None
+
+
+def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> bool:
+    """Whether all violations are contacts of shapes whose names begin so with the table."""
+    return all(v.kind == "contact" and v.what.endswith(" - table") and v.what.startswith(touching) for v in violations)
+
+
+class Client:
+    """Position references along a path, tick by tick; when it failed, once more from the beginning."""
+
+    def __init__(self, robot: Robot, path: HandPath, dt: float) -> None:
+        fastest = SPEED * np.array([motor.max_velocity for motor in robot.motor_table])
+        steps = np.abs(np.diff(path.postures, axis=0)) / fastest  # s, the slowest motor of each step sets the pace
+        times = np.concatenate([[0.0], np.cumsum(steps.max(axis=1))])
+        self._ticks = np.arange(0.0, times[-1], dt)
+        self._references = np.array([np.interp(self._ticks, times, column) for column in path.postures.T]).T
+        self.begin = int(np.searchsorted(self._ticks, times[path.start]))  # index of the reference at the start
+        self._next = 0
+        self.runs = 0  # times that it has left the start
+
+    @property
+    def start(self) -> Array:
+        """Where the robot stands before it begins: above the start."""
+        start: Array = self._references[0]
+        return start
+
+    @property
+    def leaves_start(self) -> bool:
+        """Whether the next reference is the start, from which on the path is a position command of its own."""
+        return self._next == self.begin
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last reference was commanded."""
+        return self._next >= len(self._references)
+
+    def next(self) -> Array:
+        """The next reference (n,) rad; behind the end the last one."""
+        self.runs += self.leaves_start
+        reference: Array = self._references[min(self._next, len(self._references) - 1)]
+        self._next += 1
+        return reference
+
+    def retry(self, q: Array) -> None:
+        """Go on from whichever is nearer to q (n,) rad: the beginning above the start, or the start."""
+        places = (0, self.begin)
+        self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))

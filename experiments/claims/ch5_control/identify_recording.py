@@ -1,0 +1,175 @@
+"""Recordings of the PyBullet robot's motors: velocities [rad/s] in, tick by tick, encoder positions out."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee import MotorParameters, World
+from mobee.errors import InvalidValue
+from mobee.model import Model
+from mobee.robot.robot import Array, Robot
+from services.robot_sim.backend import Backend, BackendUnavailable
+
+DT = 0.01  # s, a tick
+ROOM = np.deg2rad(14.0)  # rad, no signal goes farther from its start
+SPEEDS = np.deg2rad([5.0, 10.0, 20.0, 40.0])  # rad/s, of the steps
+REACH = np.deg2rad(11.0)  # rad, that a random signal keeps to, its lag not counted
+PRELOAD = 60  # ticks at the beginning that take up the play in the positive direction; they are not fitted
+
+TRAVEL = 250  # ticks to move to a posture
+RETURN = 60  # ticks to move back to where the signal started
+ARRIVED = np.deg2rad(1.0)  # rad
+SHARE = 0.4  # of the distance from home to a random posture of the whole range
+TRIES = 1000
+ALL = slice(None)
+
+
+def fitted_signal() -> Array:
+    """Steps of four sizes and both signs, reversals without rest, slow ramps through zero; shape (ticks,)."""
+    parts = [_preload()]
+    for speed in SPEEDS:
+        parts += [_hold(speed, 0.3), _hold(0.0, 0.3), _hold(-speed, 0.3), _hold(0.0, 0.3)]
+    swing = np.deg2rad(10.0)
+    parts += [_hold(swing, 0.2), *(_hold(sign * swing, 0.4) for sign in (-1.0, 1.0) * 3), _hold(-swing, 0.2), _hold(0.0, 0.3)]
+    slow = np.deg2rad(4.0)
+    up, down = np.linspace(-slow, slow, 150), np.linspace(slow, -slow, 150)
+    parts += [up, down, _hold(0.0, 0.3)]
+    return np.concatenate(parts)
+
+
+def held_out_signal(rng: np.random.Generator) -> Array:
+    """Random steps of random length, 4 s; not used in the fit."""
+    parts, position = [_preload()], 0.0
+    while sum(map(len, parts)) * DT < 4.0:
+        speed, duration = np.deg2rad(rng.uniform(-40.0, 40.0)), rng.uniform(0.05, 0.4)
+        if position * speed > 0.0 and abs(position + speed * duration) > REACH:
+            speed = -speed
+        if rng.random() < 0.2 or abs(position + speed * duration) > REACH:
+            speed = 0.0
+        parts.append(_hold(speed, duration))
+        position += speed * len(parts[-1]) * DT
+    return np.concatenate(parts)
+
+
+def _preload() -> Array:
+    return np.concatenate([_hold(0.0, 0.1), _hold(np.deg2rad(5.0), 0.2), _hold(0.0, 0.3)])
+
+
+def _hold(speed: float, duration: float) -> Array:
+    return np.full(round(duration / DT), speed)
+
+
+def make_body(robot: Robot, seed: int) -> Backend:
+    """The robot with its default motors and nothing else in its world; raises BackendUnavailable where there is no PyBullet."""
+    try:
+        from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which not every Python has
+    except ModuleNotFoundError as error:
+        raise BackendUnavailable(
+            f"identify needs the module {error.name!r}: pip install '.[sim]' in MoBeE's folder on Python 3.11."
+        ) from error
+    return BulletBackend(robot, World, MotorParameters(), seed, DT)
+
+
+@contextmanager
+def prints_to_stderr() -> Iterator[None]:
+    """PyBullet prints a line on standard output for every scene, from C; it goes to standard error while entered."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Responses:
+    """Encoders [rad] of one motor at the beginning of every tick: (postures, repetitions, ticks)."""
+
+    fitted: Array
+    held_out: Array
+
+
+def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> Array:
+    """Home and random postures around it, rad, shape (count, n), in which the motor has its room and the robot touches nothing.
+
+    Raises InvalidValue if there are not so many.
+    """
+    robot = model.robot
+    low, high = robot.limits.T
+    found: list[Array] = []
+    candidate = robot.home.copy()
+    for _ in range(TRIES):
+        candidate[motor] = np.clip(candidate[motor], low[motor] + ROOM, high[motor] - ROOM)
+        swept = np.repeat(candidate[None], 5, axis=0)
+        swept[:, motor] += np.linspace(-ROOM, ROOM, 5)
+        if not np.any(model.evaluate(swept).count):
+            found.append(candidate)
+        if len(found) == count:
+            return np.array(found)
+        candidate = robot.home + SHARE * (rng.uniform(low, high) - robot.home)
+    raise InvalidValue(f"{robot.motors[motor]}: only {len(found)} of {TRIES} postures are free; ask for fewer than {count}")
+
+
+def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Array, Array], repetitions: int) -> Responses:
+    """Responses to both signals in each of the postures `at` (postures, n), several times."""
+    shape = (len(at), repetitions)
+    fitted, held_out = np.empty((*shape, len(signals[0]))), np.empty((*shape, len(signals[1])))
+    k = 0  # ticks since the body was made: the noise of the encoders depends on it
+    for i, posture in enumerate(at):
+        ticks = TRAVEL
+        for repetition in range(repetitions):
+            for signal, kept in zip(signals, (fitted, held_out), strict=True):
+                k = _go(body, robot, posture, k, ticks)
+                k = _drive(body, motor, signal, kept[i, repetition], k)
+                ticks = RETURN
+    return Responses(fitted, held_out)
+
+
+def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Array]) -> None:
+    """All in SI units; the file is there only when it is whole."""
+    unfinished = path.with_suffix(".part.npz")
+    np.savez_compressed(
+        unfinished, fitted=responses.fitted.astype(np.float32), held_out=responses.held_out.astype(np.float32), postures=at,
+        fitted_signal=signals[0], held_out_signal=signals[1],
+    )  # fmt: skip
+    unfinished.rename(path)
+
+
+def load(path: Path) -> tuple[Responses, tuple[Array, Array]]:
+    """The responses and the signals."""
+    with np.load(path) as file:
+        responses = Responses(file["fitted"].astype(float), file["held_out"].astype(float))
+        return responses, (file["fitted_signal"], file["held_out_signal"])
+
+
+def _go(body: Backend, robot: Robot, posture: Array, k: int, ticks: int) -> int:
+    for _ in range(ticks):
+        body.motors.command(ALL, "position", posture)
+        body.step(DT)
+    k += ticks
+    error = np.abs(body.motors.encoders(k, DT) - posture)
+    if error.max() > ARRIVED:
+        worst = int(error.argmax())
+        raise InvalidValue(f"{robot.motors[worst]} is {np.rad2deg(error[worst]):.1f} deg from the posture to start in: something blocks it")
+    return k
+
+
+def _drive(body: Backend, motor: int, signal: Array, encoders: NDArray[np.float64], k: int) -> int:
+    velocity = np.zeros(len(body.motors.q))
+    where = slice(motor, motor + 1)
+    for tick, speed in enumerate(signal.tolist()):
+        encoders[tick] = body.motors.encoders(k + tick, DT, where)[0]
+        velocity[motor] = speed
+        body.motors.command(ALL, "velocity", velocity)
+        body.step(DT)
+    return k + len(signal)

@@ -1,0 +1,128 @@
+"""Chapter 7: all its experiments one after the other, with their figures.
+
+Claim: the thesis' experiments in model learning can be repeated, figures and all, by one command.  Source: thesis chapter 7, paper
+section 3.  Published number: the robot took over two days for the longest of them (7.4).
+Run time: 23 minutes on 2 cores; with --all, which adds what the works promise and our own studies, 45.
+
+Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
+that fails, whatever it raises, does not stop the others, and leaves failed.txt.  With --resume and more --seeds those that have
+results go on too.  Then `mobee experiment claims` reads what was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from experiments.kit.claims import open_with_few_seeds
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.options import positive_whole
+from experiments.kit.plots import MatplotlibMissing
+from experiments.kit.run_folder import CONFIG, RESULTS, read, write
+from experiments.kit.sweep import ENGINES
+from experiments.registry import BEYOND, CHAPTER7, load_experiment
+from mobee.errors import MobeeError, UnknownName
+
+_COMMON = ("seeds", "jobs", "engine", "quick")  # options that are handed on
+_TIMES, _FAILURE = "seconds.json", "failed.txt"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options, of a sweep, for all experiments."""
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join((*CHAPTER7, *BEYOND))}")
+    parser.add_argument("--all", action="store_true", help=f"also {', '.join(BEYOND)}")
+    parser.add_argument("--seeds", type=positive_whole, metavar="N", help="repetitions (default: each experiment's own)")
+    parser.add_argument("--jobs", type=positive_whole, metavar="N", help="how many run at once (default: one a core)")
+    parser.add_argument("--engine", choices=ENGINES, help="processes of this machine, or a Ray cluster (default: processes)")
+    parser.add_argument("--quick", action="store_true", help="short versions that show whether all works")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Run what has no results yet, and draw it."""
+    every = (*CHAPTER7, *BEYOND)
+    names = arguments.only or (every if arguments.all else CHAPTER7)
+    for name in names:
+        if name not in every:
+            raise UnknownName("experiment of chapter 7", name, every)
+    parts: dict[str, Any] = {}
+    for number, name in enumerate(names, 1):
+        if sys.stderr.isatty():
+            print(f"{name} ({number} of {len(names)})", file=sys.stderr)
+        parts[name] = _part(name, arguments, folder)
+    seconds = sum(part["minutes"] for part in parts.values())
+    passed = not any("failed" in part for part in parts.values())
+    return {"parts": {name: {"minutes": 0.0, "figure": "-", **part} for name, part in parts.items()}, "minutes": seconds, "passed": passed}
+
+
+def figure(folder: Path) -> Path:
+    """Draw every part anew; returns the folder, in which each part has its own."""
+    for results in sorted(folder.glob(f"*/{RESULTS}")):
+        load_experiment(read(results.parent / CONFIG)["experiment"]).method.figure(results.parent)
+    return folder
+
+
+def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """One experiment in its own folder: how long it took in all, its figure, or why it failed."""
+    place, start = folder / name, time.monotonic()
+    place.mkdir(exist_ok=True)
+    try:
+        options = options_of_part(name, arguments)
+        if not _is_finished(place, options):
+            (place / RESULTS).unlink(missing_ok=True)  # of fewer seeds
+            own = dict(vars(options))
+            write(place / CONFIG, {"experiment": name, "options": own})
+            vars(options).update(runs=folder, resume=place, json=False)  # as the command has them
+            write(place / RESULTS, open_with_few_seeds(load_experiment(name).method.run(options, place), own))
+        drawn = _drawn(name, place)
+        (place / _FAILURE).unlink(missing_ok=True)
+    except Exception as error:  # of the experiment's own code: it is reported, and the others go on
+        (place / _FAILURE).write_text(traceback.format_exc())
+        told = str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"
+        return {"minutes": _spent(place, start), "failed": told}
+    finally:
+        spent = _spent(place, start)
+        write(place / _TIMES, {"seconds": 60.0 * spent})
+    return {"minutes": spent, "figure": drawn}
+
+
+def _is_finished(place: Path, options: argparse.Namespace) -> bool:
+    """Whether there are results, of as many seeds as are asked for."""
+    return (place / RESULTS).exists() and getattr(options, "seeds", 0) <= read(place / CONFIG)["options"].get("seeds", 0)
+
+
+def _drawn(name: str, place: Path) -> str:
+    try:
+        return str(load_experiment(name).method.figure(place).relative_to(place.parent))
+    except MatplotlibMissing:
+        return "-"
+
+
+def _spent(place: Path, start: float) -> float:
+    """Minutes, those of interrupted runs too."""
+    before = read(place / _TIMES)["seconds"] if (place / _TIMES).exists() else 0.0
+    return float(before + time.monotonic() - start) / 60.0
+
+
+def options_of_part(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
+    """The experiment's own defaults, changed by what was given for all."""
+    parser = argparse.ArgumentParser()
+    load_experiment(name).method.add_arguments(parser)
+    options = parser.parse_args([])
+    options.seed = arguments.seed
+    for common in _COMMON:
+        if getattr(arguments, common) and hasattr(options, common):
+            setattr(options, common, getattr(arguments, common))
+    return options
+
+
+EXPERIMENT = Experiment(
+    name="chapter7",
+    claim="all experiments in model learning can be repeated by one command",
+    source="thesis chapter 7, paper section 3",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+)

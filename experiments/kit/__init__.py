@@ -1,0 +1,1 @@
+"""What experiments share: sweeps, statistics, figures, records, live runs."""

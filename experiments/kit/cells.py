@@ -1,0 +1,128 @@
+"""Cells: the independent runs of a sweep, and their results on disk, one .npz file each, which is whole or not there."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zipfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array
+
+_SAFE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,119}")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What decides a run: the same cell gives the same values on any machine.
+
+    `name`: unique in its sweep and safe as a file's name, as "lattice-g0.9-50-50-s3".  `settings`: JSON values.
+    `cost`: how long it takes beside the others, in any unit; it orders the sweep and tells the time left.
+    """
+
+    name: str
+    seed: int
+    settings: dict[str, Any] = field(default_factory=dict)
+    cost: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not _SAFE.fullmatch(self.name):
+            raise InvalidValue(
+                f"cell {self.name!r}: a name has up to 120 letters, digits and any of . _ + = -, and begins with one of the first."
+            )
+        if not self.cost > 0.0:
+            raise InvalidValue(f"cell {self.name!r} costs {self.cost!r}: must be above 0")
+
+
+Work = Callable[[Cell], dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class CellResult:
+    """A finished cell on disk; its values are read when they are first asked for."""
+
+    cell: Cell
+    seconds: float
+    """How long the work took."""
+    path: Path
+
+    @cached_property
+    def values(self) -> dict[str, Any]:
+        """What the work returned: JSON values and arrays."""
+        return read_values(self.path)
+
+
+FOLDER = "cells"
+_RECORD, _ARRAY = "record", "array."  # names in the archive: the JSON text, and what comes before the names of the arrays
+
+
+def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
+    """Put a cell's values into `folder`/cells/<name>.npz at once; raises InvalidValue for what is no JSON and no array, and OSError."""
+    arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
+    record = {"cell": asdict(cell), "seconds": seconds, "values": {key: value for key, value in values.items() if key not in arrays}}
+    for key, array in arrays.items():
+        if array.dtype.hasobject:
+            raise InvalidValue(f"the array {key!r} of cell {cell.name} holds Python objects: give numbers or text.")
+    path = cell_path(folder, cell.name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".unfinished")
+    with unfinished.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **{_RECORD: _bytes(cell, record), **{_ARRAY + k: a for k, a in arrays.items()}})
+        file.flush()
+        os.fsync(file.fileno())
+    unfinished.replace(path)
+
+
+def cell_path(folder: Path, name: str) -> Path:
+    """Where a finished cell lies."""
+    return folder / FOLDER / f"{name}.npz"
+
+
+def load_cells(folder: Path) -> dict[str, CellResult]:
+    """The finished cells of a run by name, sorted; raises InvalidValue for a file that is none."""
+    return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
+
+
+def read_cell(path: Path) -> CellResult:
+    """One finished cell, its arrays left on disk."""
+    record = _read(path, arrays=False)[0]
+    return CellResult(Cell(**record["cell"]), record["seconds"], path)
+
+
+def read_values(path: Path) -> dict[str, Any]:
+    """The values of one finished cell."""
+    record, arrays = _read(path, arrays=True)
+    return {**record["values"], **arrays}
+
+
+def _read(path: Path, arrays: bool) -> tuple[dict[str, Any], dict[str, Array]]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            record = json.loads(archive[_RECORD].tobytes())
+            names = [name for name in archive.files if arrays and name.startswith(_ARRAY)]
+            return record, {name.removeprefix(_ARRAY): archive[name] for name in names}
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise InvalidValue(f"{path} is not a finished cell ({error}): delete it, and the run will do it again.") from None
+
+
+def _bytes(cell: Cell, record: dict[str, Any]) -> Array:
+    try:
+        text = json.dumps(record, default=_plain)
+    except (TypeError, ValueError) as error:
+        raise InvalidValue(f"cell {cell.name}: {error}; valid are JSON values, and arrays as values of the dict itself.") from None
+    return np.frombuffer(text.encode(), dtype=np.uint8)
+
+
+def _plain(value: object) -> Any:
+    """NumPy's scalars are JSON values too."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{value!r} of type {type(value).__name__} is no JSON value")

@@ -1,0 +1,45 @@
+"""Matplotlib, if it is there: experiments run without it, only their figures need it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from experiments.kit.statistics import interquartile_mean, interval
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array
+
+
+class MatplotlibMissing(MobeeError):
+    """Raised when a figure is asked for and Matplotlib is not installed."""
+
+
+def new_figure(width: float, height: float) -> Any:
+    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MatplotlibMissing("figures need Matplotlib, which is not installed: pip install '.[figures]' in MoBeE's folder") from None
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
+    """A line through the means of the runs (N, L) at L places, in a band."""
+    means, low, high = _of(list(runs.T))
+    axes.plot(at, means, "o-", color=color, label=label, markersize=4)
+    axes.fill_between(at, low, high, color=color, alpha=0.15, linewidth=0.0)
+
+
+def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:
+    """A bar with a whisker for each group of runs."""
+    means, low, high = _of(groups)
+    spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
+    axes.bar(at, means, width, yerr=spread, color=color, label=label, capsize=3)
+
+
+def _of(groups: Sequence[Array]) -> tuple[Array, Array, Array]:
+    low, high = np.array([interval(one) for one in groups]).T
+    return np.array([interquartile_mean(one) for one in groups]), low, high

@@ -1,0 +1,71 @@
+"""All transitions of a run: of the stores of its agents, and of the cells of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.cells import FOLDER, load_cells
+from mobee.errors import InvalidValue
+from mobee.store import TransitionStore
+
+SEEN = "seen"  # the array of a cell with one agent's transitions, or what comes before "_<part>" in the names of several
+
+
+@dataclass(frozen=True)
+class Record:
+    """The transitions of one agent.
+
+    `source`: the file they are from, in the run's folder.  `settings`: the agent's, or the cell's.  `columns`: one list
+    of plain values each, all of one length; a cell has only n, s, a and s_next.
+    """
+
+    source: str
+    agent: str
+    settings: dict[str, Any]
+    columns: dict[str, list[Any]]
+
+
+def records(folder: Path) -> Iterator[Record]:
+    """Every agent's transitions in a run's folder.
+
+    Raises InvalidValue if there are none, or an array that holds none, MobeeError for a damaged file.
+    """
+    found = False
+    for record in (*_of_stores(folder), *_of_cells(folder)):
+        found = True
+        yield record
+    if not found:
+        raise InvalidValue(f"{folder}: no transitions are kept there, neither in a file *.sqlite nor in the cells of a sweep.")
+
+
+def _of_stores(folder: Path) -> Iterator[Record]:
+    for file in sorted(folder.rglob("*.sqlite")):
+        with TransitionStore(file, "", read_only=True) as store:
+            for agent in store.agents():
+                made = store.load(agent)
+                names = ("n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched")
+                columns: dict[str, list[Any]] = {name: [getattr(one, name) for one in made] for name in names}
+                yield Record(str(file.relative_to(folder)), agent, store.settings(agent), columns | {"time": store.times(agent)})
+
+
+def _of_cells(folder: Path) -> Iterator[Record]:
+    for cells in sorted(folder.rglob(FOLDER)):  # a run of several experiments has one folder of cells each
+        for result in load_cells(cells.parent).values():
+            source = str(result.path.relative_to(folder))
+            settings = {**result.cell.settings, "seed": result.cell.seed}
+            for key, array in result.values.items():
+                if key == SEEN or key.startswith(f"{SEEN}_"):
+                    made = _checked(array, f"{folder}: {key} of {source}")
+                    columns = dict(zip(("s", "a", "s_next"), made.T.tolist(), strict=True))
+                    yield Record(source, key[len(SEEN) + 1 :], settings, {"n": list(range(1, len(made) + 1)), **columns})
+
+
+def _checked(array: Any, where: str) -> Any:
+    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidValue(f"{where} is no array of transitions, shape (T, 3): state, action, state reached.")
+    return array

@@ -1,0 +1,147 @@
+"""A task for a roadmap: all that a map is built from.  The helpers are for tasks of the iCub."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import mobee
+from experiments.drawing.filmstrip import View
+from mobee import Geometry, Model, Robot, World
+from mobee.roadmap.building.build import LONGEST
+from mobee.roadmap.building.task import Task
+from mobee.roadmap.ik.term import Term
+from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.robot import Array
+
+Method = Literal["nes", "least_squares", "hybrid"]
+MARGIN = float(np.deg2rad(10.0))  # the default law lets no motor rest nearer to a limit
+
+LEFT, RIGHT = "left_palm", "right_palm"
+DOWN, UP, FORWARD, TO_THE_LEFT, TO_THE_RIGHT = (0, 0, -1), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 1, 0)  # root frame
+FINGERS, THUMB = (1, 0, 0), (0, -1, 0)  # their directions in the frame of either palm
+THUMBS_UP = np.column_stack([FORWARD, DOWN, TO_THE_LEFT])  # the frame of a palm whose fingers point forward, its thumb up
+
+_HELD = (0.85, 0.45, 0.10, 1.0)  # colour
+_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw")
+_BENT = {  # degrees
+    "thumb_oppose": 60,
+    "thumb_proximal": 20,
+    "thumb_distal": 30,
+    "index_proximal": 35,
+    "index_distal": 50,
+    "middle_proximal": 35,
+    "middle_distal": 50,
+    "pinky": 80,
+}
+_ASIDE = {"shoulder_pitch": -40, "shoulder_roll": 40, "shoulder_yaw": -30, "elbow": 100}
+_OUT = {"shoulder_pitch": 0, "shoulder_roll": 80, "shoulder_yaw": -20, "elbow": 70}
+LEFT_ARM, RIGHT_ARM = (tuple(f"{side}_{joint}" for joint in _JOINTS) for side in "lr")  # without the hand
+NECK = ("neck_pitch", "neck_roll", "neck_yaw")
+ONE_HAND = ("torso", *RIGHT_ARM)
+BOTH_HANDS = ("torso", *LEFT_ARM, *RIGHT_ARM)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Example:
+    """What a map is built from by `mobee.build_roadmap`, and a motion in it for pictures.
+
+    `figure`: of the thesis.  `spacing`: in the units of the task's coordinates.  `motors`: names of those that move, or of parts.
+    `start`: (n,) rad, where the search begins and what all other motors keep; None: home.  `markers`: whose positions show the map.
+    `via`: task coordinates through which the motion of the filmstrip goes, one point after the other.  `views`: of the filmstrip.
+    `margin`: what motors keep from their limits [rad]; with MARGIN the control law lets the robot rest in every pose, so maps that
+    can do with less room have it.
+    """
+
+    title: str
+    figure: str
+    model: Model
+    costs: tuple[Term, ...]
+    task: Task
+    spacing: float | tuple[float, ...]
+    motors: tuple[str, ...]
+    via: Sequence[tuple[float, ...]]
+    markers: tuple[str, ...] = ("right_palm",)
+    views: Sequence[View] = ("oblique",)
+    start: Array | None = None
+    margin: float = 0.0
+
+
+def build(
+    example: Example,
+    method: Method,
+    seed: int = 0,
+    file: Path | None = None,
+    progress: Callable[[Any], None] | None = None,
+    neighbours: int | None = None,
+    longest: float | None = LONGEST,
+) -> Roadmap:
+    """The map of an example."""
+    return mobee.build_roadmap(
+        example.model,
+        costs=list(example.costs),
+        task=example.task,
+        spacing=example.spacing,
+        start=example.start,
+        motors=list(example.motors),
+        margin=example.margin,
+        method=method,
+        seed=seed,
+        neighbours=neighbours,
+        longest=longest,
+        file=file,
+        progress=progress,
+    )
+
+
+def at_table() -> Model:
+    """The iCub at its empty table."""
+    world = mobee.load_world("table")
+    world.remove("ball")
+    return Model(mobee.load_robot("icub"), world)
+
+
+def alone() -> Model:
+    """The iCub with nothing around it."""
+    return Model(mobee.load_robot("icub"), World())
+
+
+def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, along: ArrayLike = FINGERS) -> None:
+    """Show an object in a hand: its middle `ahead` [m] of the palm, its z axis along a direction in the palm's frame."""
+    m = model.robot.marker(marker)
+    z = m.rotation @ np.asarray(along, dtype=np.float64)
+    x = m.normal - (m.normal @ z) * z
+    if not x.any():
+        x = m.rotation @ np.asarray(FINGERS, dtype=np.float64)
+    x = x / np.linalg.norm(x)
+    model.world.add(name, shape, role="ghost", color=_HELD)
+    model.world.attach(name, model.robot.links[m.link], (m.position + ahead * m.normal, np.column_stack([x, np.cross(z, x), z])))
+
+
+def left_aside(robot: Robot) -> Array:
+    """Home with the left arm bent, so that its hand does not touch the table when the torso leans, (n,) rad."""
+    return changed(robot.home, robot, _ASIDE, "l")
+
+
+def elbows_out(q: Array, robot: Robot, sides: str = "lr") -> Array:
+    """A posture with the elbows at the sides, (n,) rad: about it hands can turn far without a jump."""
+    return changed(q, robot, _OUT, sides)
+
+
+def grasping(q: Array, robot: Robot, sides: str = "lr") -> Array:
+    """A posture with bent fingers, (n,) rad."""
+    return changed(q, robot, _BENT, sides)
+
+
+def changed(q: Array, robot: Robot, degrees: Mapping[str, float], sides: str) -> Array:
+    """A posture with other angles of some motors of the arms, (n,) rad."""
+    new = q.copy()
+    for side in sides:
+        for joint, angle in degrees.items():
+            new[robot.motor_index(f"{side}_{joint}")] = np.deg2rad(angle)
+    return new

@@ -1,1 +1,0 @@
-"""The service that crosses: a Walker on the bus, and who makes the ball solid."""

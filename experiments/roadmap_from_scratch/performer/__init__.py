@@ -1,1 +1,0 @@
-"""The service that explores: a MapExplorer on the bus."""

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
+from experiments.claims.ch3_roadmaps import nes
+from experiments.claims.ch3_roadmaps.nes import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
+from experiments.kit.cells import Cell
+from tests.experiments.finished_cells import finished_trials
+from tests.experiments.small_run import options_of
+
+TASKS = [(function, d) for function in FUNCTIONS for d in DIMENSIONS]
+
+
+def runs(**ratios: float):
+    """Runs of six seeds with these ratios to CMA-ES on all tasks."""
+    cma = 1000.0 + 10.0 * np.arange(6)
+    return {(name, task): ratios.get(name, 1.0) * cma for name in STRATEGIES for task in TASKS}
+
+
+def verdicts(known) -> dict[str, str]:
+    return {claim.text: claim.verdict for claim in judged(known)}
+
+
+def test_who_needs_fewer_on_one_task_outperforms_and_who_needs_more_on_all_does_not():
+    known = runs(nes=1.0, xnes=3.0, snes=3.0)
+    known["snes", TASKS[0]] /= 6.0
+    found = verdicts(known)
+    assert found[BETTER["xnes"].text] == found[BETTER["nes"].text] == "refuted"
+    assert found[BETTER["snes"].text] == "confirmed"
+
+
+def test_comparable_is_what_needs_little_more_on_the_median_task():
+    found = verdicts(runs(nes=1.1, xnes=3.0, snes=1.4))
+    assert [found[AS_GOOD[name].text] for name in ("xnes", "snes", "nes")] == ["refuted", "confirmed", "confirmed"]
+    assert found[AIM.text] == "refuted"
+    assert verdicts(runs(nes=1.0))[AIM.text] == "confirmed"
+
+
+def test_claims_stay_open_until_every_task_has_as_many_runs():
+    known = runs()
+    del known["xnes", TASKS[-1]]
+    assert judged(known) == list(CLAIMS)
+    assert judged({key: values[: 6 - (key[0] == "nes")] for key, values in runs().items()}) == list(CLAIMS)
+
+
+def test_a_quick_cell_finds_or_counts_with_all_it_had():
+    quick = nes.EXPERIMENT.method.cells(options_of(nes.EXPERIMENT, "--seed", "3", "--seeds", "1", "--quick"))
+    assert {cell.settings["dimensions"] for cell in quick} == {10} and len(quick) == len(FUNCTIONS) * len(STRATEGIES)
+    ours = next(cell for cell in quick if cell.name == "nes-sphere-10-s3")
+    hard = Cell("snes-cigar-s3", 3, {"strategy": "snes", "function": "cigar 1e6", "dimensions": 10, "most": 500})
+    found = finished_trials(nes.trial, [ours, hard])
+    assert found[ours.name].values["found"] and 500 < found[ours.name].values["evaluations"] < 5000
+    assert not found[hard.name].values["found"] and found[hard.name].values["evaluations"] == 500
+    results = findings(found)
+    assert results["found"]["SNES as published"] == "0 of 1" and results["found"]["CMA-ES"] == "0 of 0"
+    assert evaluations(found)["snes", ("cigar 1e6", 10)].tolist() == [500.0]
+
+
+def test_what_is_done_can_be_drawn():
+    pytest.importorskip("matplotlib")
+    found = finished_trials(nes.trial, [Cell("a", 1, {"strategy": "nes", "function": "sphere", "dimensions": 10, "most": 200})])
+    assert len(nes.plot(found).axes) == len(FUNCTIONS)

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch3_roadmaps import ngik
+from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
+from tests.experiments.finished_cells import finished_trials
+from tests.experiments.small_run import options_of
+
+SEEDS = 6
+
+
+def solver(evaluations: float, reached: float = 1.0) -> Solver:
+    return Solver(np.full(SEEDS, reached), evaluations * (1.0 + 0.01 * np.arange(SEEDS)), np.full(SEEDS, 40.0))
+
+
+def test_who_needs_fewer_evaluations_outperforms():
+    known = {(NES, WHOLE): solver(2500.0), ("cma", WHOLE): solver(4000.0), ("annealing", WHOLE): solver(2000.0)}
+    found = {claim.text: claim for claim in judged(known)}
+    cma, annealing, particles = (found[OUTPERFORMS[NES, rival].text] for rival in ("cma", "annealing", "particles"))
+    assert (cma.verdict, annealing.verdict, particles.verdict) == ("confirmed", "refuted", "open")
+    assert cma.ours.startswith("the rival needs 1.60 x")
+    assert not particles.ours
+
+
+def test_without_41_motors_all_is_open():
+    assert judged({(name, FEW): solver(1000.0) for name in (NES, *RIVALS)}) == list(CLAIMS)
+
+
+def test_a_quick_sweep_holds_every_solver_and_a_cell_solves_its_own_targets():
+    quick = ngik.EXPERIMENT.method.cells(options_of(ngik.EXPERIMENT, "--seed", "5", "--seeds", "1", "--quick"))
+    assert {(cell.settings["solver"], cell.settings["motors"]) for cell in quick} == {
+        (name, motors) for name in (NES, *RIVALS) for motors in (FEW, WHOLE)
+    }
+    chosen = [cell for cell in quick if cell.name in ("nes-10-s5", "particles-10-s5")]
+    found = finished_trials(ngik.trial, chosen)
+    for cell in chosen:
+        values = found[cell.name].values
+        assert values["reached"].all() and (values["evaluations"] < 20_000).all() and len(values["ms"]) == 2
+    pytest.importorskip("matplotlib")
+    assert len(ngik.plot(found).axes) == 2

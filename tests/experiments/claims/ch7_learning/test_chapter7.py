@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from experiments.claims.ch7_learning import chapter7
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.run_folder import new_run
+from experiments.kit.sweep import sweep_arguments
+from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS
+from mobee.errors import MobeeError, UnknownName
+
+CLAIM = Claim("thesis 7", "a toy works", "it does")
+
+
+def options(*given: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    chapter7.add_arguments(parser)
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args(given)
+
+
+@pytest.fixture
+def toys(monkeypatch):
+    """Two experiments that note how they were called, in place of hypercube and coverage."""
+    calls = []
+
+    def run(name):
+        def toy(arguments, folder):
+            calls.append((name, arguments.seeds, arguments.seed, arguments.quick))
+            if name in broken:
+                raise broken[name]
+            return {"answer": 42, "claims": [CLAIM.measured("0.3", True).record()]}
+
+        return toy
+
+    def figure(folder):
+        (folder / "toy.png").touch()
+        return folder / "toy.png"
+
+    broken: dict[str, Exception] = {}
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube", "coverage"))
+    monkeypatch.setattr(chapter7, "BEYOND", ())
+    for name in ("hypercube", "coverage"):
+        toy = SimpleNamespace(EXPERIMENT=Experiment(name, "it works", "thesis 7", "", Steps(sweep_arguments, run(name), figure)))
+        monkeypatch.setitem(EXPERIMENTS, name, f"toy_{name}")
+        monkeypatch.setitem(sys.modules, f"toy_{name}", toy)
+    return SimpleNamespace(calls=calls, broken=broken)
+
+
+@pytest.mark.parametrize("name", (*CHAPTER7, *BEYOND))
+def test_a_part_needs_no_option(name):
+    given = chapter7.options_of_part(name, options("--seed", "3", "--jobs", "1"))
+    assert given.seed == 3
+
+
+def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys):
+    folder = new_run(tmp_path, "chapter7", {})
+    results = chapter7.run(options("--seed", "3"), folder)
+    assert toys.calls == [("hypercube", 10, 3, False), ("coverage", 10, 3, False)]
+    assert results["passed"] and results["parts"]["coverage"]["figure"] == "coverage/toy.png"
+    assert json.loads((folder / "hypercube" / "results.json").read_text())["answer"] == 42
+    config = json.loads((folder / "hypercube" / "config.json").read_text())
+    assert config == {"experiment": "hypercube", "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3}}
+
+
+def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
+    chapter7.run(options("--seeds", "2", "--quick", "--only", "coverage"), new_run(tmp_path, "chapter7", {}))
+    assert toys.calls == [("coverage", 2, 0, True)]
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [(MobeeError("the toy is broken"), "the toy is broken"), (ValueError("of its own code"), "ValueError: of its own code")],
+)
+def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, told):
+    folder = new_run(tmp_path, "chapter7", {})
+    toys.broken["hypercube"] = error
+    results = chapter7.run(options(), folder)
+    assert not results["passed"] and results["parts"]["hypercube"]["failed"] == told
+    assert str(error) in (folder / "hypercube" / "failed.txt").read_text()
+    toys.broken.clear()
+    assert chapter7.run(options(), folder)["passed"]
+    assert [name for name, *_ in toys.calls] == ["hypercube", "coverage", "hypercube"]
+    assert not (folder / "hypercube" / "failed.txt").exists()
+
+
+def test_a_part_goes_on_when_more_seeds_are_asked_for_and_not_when_fewer_are(tmp_path, toys):
+    folder = new_run(tmp_path, "chapter7", {})
+    for seeds in ("2", "6", "3"):
+        chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
+    assert [seeds for _, seeds, *_ in toys.calls] == [2, 6]
+
+
+@pytest.mark.parametrize(("seeds", "verdict"), [("4", "open"), ("5", "confirmed")])
+def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
+    folder = new_run(tmp_path, "chapter7", {})
+    chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
+    assert json.loads((folder / "coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
+
+
+def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkeypatch):
+    clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
+    monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
+    folder = new_run(tmp_path, "chapter7", {})
+    toys.broken["hypercube"] = MobeeError("broken")
+    chapter7.run(options("--only", "hypercube"), folder)
+    toys.broken.clear()
+    assert chapter7.run(options("--only", "hypercube"), folder)["minutes"] == pytest.approx(3.0)
+
+
+def test_an_unknown_part_is_refused(tmp_path):
+    with pytest.raises(UnknownName, match="experiment of chapter 7 'tabel'"):
+        chapter7.run(options("--only", "tabel"), tmp_path)
+
+
+def test_all_runs_what_goes_beyond_the_chapter_too(tmp_path, toys, monkeypatch):
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube",))
+    monkeypatch.setattr(chapter7, "BEYOND", ("coverage",))
+    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube"]
+    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube", "coverage"]

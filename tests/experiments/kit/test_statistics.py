@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from experiments.kit.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval, told
+from mobee.errors import InvalidValue
+
+numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40)
+whole = st.lists(st.integers(0, 6), min_size=1, max_size=15)
+mean = partial(np.mean, axis=-1)
+
+
+@given(numbers)
+def test_the_interquartile_mean_is_scipys_trimmed_mean(values):
+    assert interquartile_mean(values) == pytest.approx(stats.trim_mean(values, 0.25), abs=1e-9)
+
+
+def test_the_interquartile_mean_leaves_outliers_out():
+    assert interquartile_mean([1e9, 3.0, 5.0, -1e9]) == 4.0
+
+
+@given(whole, whole)
+def test_the_probability_of_improvement_is_mann_whitneys_u_by_the_number_of_pairs(first, second):
+    u = stats.mannwhitneyu(first, second, method="asymptotic").statistic if len({*first, *second}) > 1 else len(first) * len(second) / 2
+    assert probability_of_improvement(first, second) == pytest.approx(u / (len(first) * len(second)))
+
+
+def test_the_interval_is_scipys_percentile_bootstrap():
+    values = np.random.default_rng(3).gamma(2.0, size=30)
+    theirs = stats.bootstrap(
+        (values,), interquartile_mean, method="percentile", vectorized=False, n_resamples=20_000, rng=1
+    ).confidence_interval
+    assert interval(values, resamples=20_000) == pytest.approx(
+        (theirs.low, theirs.high), abs=0.02
+    )  # 4 standard errors of two bootstraps' ends
+
+
+def test_the_interval_covers_the_truth_as_often_as_it_says():
+    rng = np.random.default_rng(5)
+    covered = [low < 2.0 < high for low, high in (interval(rng.normal(2.0, 1.0, 40), mean, seed=i, resamples=300) for i in range(200))]
+    assert 0.88 <= np.mean(covered) <= 0.99
+
+
+def test_strata_keep_the_difference_between_them_out_of_the_interval():
+    values, strata = np.repeat([0.0, 100.0], 10), np.repeat(["easy", "hard"], 10)
+    assert interval(values, mean, strata) == (50.0, 50.0)
+    low, high = interval(values, mean)
+    assert high - low > 20.0
+
+
+def test_the_interval_follows_its_seed():
+    values = np.random.default_rng(0).normal(size=12)
+    assert interval(values, seed=1) == interval(values, seed=1) != interval(values, seed=2)
+
+
+def test_a_ratio_has_an_interval_in_which_both_groups_are_drawn():
+    rng = np.random.default_rng(1)
+    above, below = rng.normal(1600.0, 20.0, 12), rng.normal(3300.0, 150.0, 10)
+    low, high = ratio_interval(above, below)
+    assert low < ratio(above, below) < high
+    theirs = stats.bootstrap((above, below), ratio, method="percentile", vectorized=False, n_resamples=5000, rng=2).confidence_interval
+    assert (low, high) == pytest.approx((theirs.low, theirs.high), abs=0.003)
+
+
+@pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0, 2.0]]])
+def test_values_without_a_mean_are_refused(values):
+    with pytest.raises(InvalidValue, match="finite numbers"):
+        interquartile_mean(values)
+
+
+def test_each_value_needs_a_stratum():
+    with pytest.raises(InvalidValue, match="one label for each of the 2 values"):
+        interval([1.0, 2.0], strata=["a"])
+
+
+@pytest.mark.parametrize(
+    ("span", "verdict"),
+    [
+        ((0.4, 0.5), True),
+        ((0.45, 0.6), True),
+        ((0.3, 0.5), None),
+        ((0.5, 0.7), None),
+        ((0.3, 0.9), None),
+        ((0.1, 0.3), False),
+        ((0.7, 0.9), False),
+    ],
+)
+def test_an_interval_decides_where_it_holds_no_bound(span, verdict):
+    assert decides(span, 0.4, 0.6) is verdict
+
+
+def test_one_bound_is_enough_to_decide():
+    assert decides((1.1, 1.2), most=1.0) is False and decides((0.8, 1.2), least=1.0) is None and decides((1.0, 1.2), least=1.0) is True
+
+
+def test_a_mean_is_told_with_its_interval():
+    assert told([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
+    assert told([321, 320, 320, 320], 0).startswith("320 [320, ")

@@ -1,0 +1,49 @@
+"""A sweep to be started, interrupted and killed: python -m tests.experiments.kit.toy_sweep FOLDER [--seeds N ...]."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from experiments.kit.cells import Cell
+from experiments.kit.sweep import run_cells, sweep_arguments
+
+
+def options(*given: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seconds", type=float, default=0.0)
+    sweep_arguments(parser, seeds=4)
+    return parser.parse_args(given or None)
+
+
+def cells(count: int, **settings: object) -> list[Cell]:
+    return [Cell(f"toy-s{seed}", seed, dict(settings)) for seed in range(count)]
+
+
+def work(cell: Cell) -> dict[str, object]:
+    """Leaves a line in a log each time it is done, so that repetitions show."""
+    if cell.settings.get("fails") == cell.seed:
+        raise ValueError("the toy is broken")
+    if cell.settings.get("dies") == cell.seed:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(cell.settings.get("seconds", 0.0))
+    if log := cell.settings.get("log"):
+        with open(log, "a") as file:
+            file.write(f"{cell.name} {os.getpid()}\n")
+    return {"square": cell.seed**2, "row": np.arange(cell.seed), "nested": {"pi": np.float64(3.5)}}
+
+
+def useless(cell: Cell) -> dict[str, object]:
+    return {"is": object()}
+
+
+if __name__ == "__main__":
+    arguments = options()
+    settings = {"seconds": arguments.seconds, "log": str(arguments.folder / "log")}
+    run_cells(work, cells(arguments.seeds, **settings), arguments.folder, arguments)
