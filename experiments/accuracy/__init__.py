@@ -24,9 +24,9 @@ from experiments.accuracy.figure import draw
 from experiments.accuracy.findings import CLAIMS, findings
 from experiments.accuracy.worlds import WALKS, WORLDS, plant_of, space_of
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import begin_nearby, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.trial import begin_nearby, explore
-from experiments.learning.truth import walk
+from experiments.kit.truth import walk
 from mobee import CuriousAgent
 
 NAME = "accuracy"

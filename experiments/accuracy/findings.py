@@ -11,8 +11,7 @@ from experiments.accuracy.worlds import WORLDS, space_of, truths
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
 from experiments.kit.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
-from experiments.learning.model_error import CERTAIN, l1, most_likely, sampling_error
-from experiments.learning.truth import Truth
+from experiments.kit.truth import CERTAIN, Truth, l1, most_likely, sampling_error
 from mobee import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.robot.robot import Array, Ints

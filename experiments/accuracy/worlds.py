@@ -8,9 +8,9 @@ from functools import cache
 
 import numpy as np
 
+from experiments.kit.arm_learning import RANK3, RANK4, arm_plant, arm_space
 from experiments.kit.cells import CellResult
-from experiments.learning.published import RANK3, RANK4, arm_plant, arm_space
-from experiments.learning.truth import truth_of
+from experiments.kit.truth import truth_of
 from mobee import Lattice, Plant
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.tabular import TabularPlant, half_space

@@ -28,12 +28,11 @@ from experiments.change.figure import draw
 from experiments.change.findings import CLAIMS, findings
 from experiments.change.runs import BEFORE, CONDITIONS, EVERY
 from experiments.change.worlds import CHANGES, groups, measure_outcomes, plant_of
+from experiments.kit.arm_learning import arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.model_error import l1
-from experiments.learning.published import arm_space
-from experiments.learning.trial import explore
-from experiments.learning.truth import Truth, truth_of
+from experiments.kit.truth import Truth, l1, truth_of
 from mobee import CuriousAgent
 from mobee.errors import InvalidValue
 

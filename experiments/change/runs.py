@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.kit.arm_learning import arm_space
 from experiments.kit.cells import CellResult
-from experiments.learning.published import arm_space
 from mobee.robot.robot import Array, Ints
 
 BEFORE = 3_000  # transitions, and as many after the change

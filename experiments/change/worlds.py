@@ -8,9 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.model_error import l1
-from experiments.learning.published import arm_plant, arm_space, robot
-from experiments.learning.truth import Truth, walk
+from experiments.kit.arm_learning import arm_plant, arm_space, robot
+from experiments.kit.truth import Truth, l1, walk
 from mobee import Gains, Model, MotorParameters, OfflinePlant, World, sphere
 from mobee.robot.robot import Array, Ints
 

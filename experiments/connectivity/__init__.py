@@ -21,11 +21,11 @@ import numpy as np
 
 from experiments.connectivity.figure import draw
 from experiments.connectivity.findings import CLAIMS, GRAPHS, findings
+from experiments.connectivity.tasks import Tasks, attempt, fewest_actions
+from experiments.kit.arm_learning import arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import arm_plant, arm_space
-from experiments.learning.tasks import Tasks, attempt, fewest_actions
-from experiments.learning.trial import LeastTries, begin_anywhere, explore
 from mobee import CuriousAgent
 
 NAME = "connectivity"

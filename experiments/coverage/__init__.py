@@ -23,10 +23,10 @@ import numpy as np
 from experiments.coverage.figure import draw
 from experiments.coverage.findings import CLAIMS, findings
 from experiments.coverage.postman import postman_floor
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
-from experiments.learning.trial import LeastTries, begin_anywhere, explore
 from mobee import CuriousAgent
 from mobee.learning.explorers import EXPLORERS
 

@@ -22,10 +22,10 @@ import numpy as np
 
 from experiments.hypercube.figure import draw
 from experiments.hypercube.findings import CLAIMS, DISCOUNTS, EARLY, LEAST, findings
+from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import HYPERCUBE, arm_plant, arm_space
-from experiments.learning.trial import LeastTries, begin_anywhere, explore
 from mobee import CuriousAgent, value_iteration
 
 NAME = "hypercube"

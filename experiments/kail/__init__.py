@@ -22,8 +22,8 @@ from experiments.kail.figure import draw
 from experiments.kail.findings import CLAIMS, DIVERGENCES, PARTS, findings
 from experiments.kail.spaces import plant_of, space_of
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.trial import begin_anywhere, explore
 from mobee import CuriousAgent, TransitionModel
 
 NAME = "kail"

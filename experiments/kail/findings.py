@@ -11,9 +11,8 @@ from experiments.kail.on_paper import told_apart
 from experiments.kail.spaces import space_of
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
 from experiments.kit.statistics import interquartile_mean, interval, told
-from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
-from experiments.learning.explored import Explored, Groups, explored
 from mobee.robot.robot import Array
 
 DIVERGENCES = ("kail", "kl")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from experiments.learning.published import ARM_NEIGHBOURS, DT, TORSO, arm_plant, arm_space, robot, torso_space
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, DT, TORSO, arm_plant, arm_space, robot, torso_space
 from mobee import Gains, Lattice, Model, OfflinePlant
 
 

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.lattice.figure import draw
 from experiments.lattice.findings import CLAIMS, DISCOUNTS, INITIAL, LEAST, findings
-from experiments.learning.published import arm_plant, arm_space
-from experiments.learning.trial import LeastTries, begin_anywhere, explore
 from mobee import CuriousAgent
 
 NAME = "lattice"

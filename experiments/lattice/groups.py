@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_space
 from experiments.kit.cells import CellResult
-from experiments.learning.outcomes import exists_in, failures_of, visits_of
-from experiments.learning.published import arm_space
+from experiments.kit.outcomes import exists_in, failures_of, visits_of
 from mobee import Lattice
 from mobee.robot.robot import Array, Ints
 

@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
-from experiments.learning.trial import explore
 from experiments.planner.figure import draw
 from experiments.planner.findings import CLAIMS, ENTERS, claims, fates, summary
 from experiments.planner.table import UP, TablePlant

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.cells import CellResult
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import interquartile_mean, interval
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.planner.arrows import draw_arrows
 from experiments.planner.findings import ENTERS, ROADMAPS, entering, tested
 from experiments.planner.trial import TESTS

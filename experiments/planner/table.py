@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.learning.published import arm_plant
+from experiments.kit.arm_learning import arm_plant
 from mobee import Outcome, World, box
 from mobee.robot.robot import Array, Robot
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.arm_poses import arm_clauses
+from experiments.kit.arm_learning import arm_clauses
 from experiments.planner.following import Followed, Frozen, Queries, follow, promises, queries, through, zone
 from experiments.planner.table import DOWN, UP, TablePlant
 from experiments.prm_vs_mdp.belief import Belief

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import arm_plant, arm_space
-from experiments.learning.trial import begin_anywhere, explore
 from experiments.rank4.felt_plant import FeltPlant, SelfContact
 from experiments.rank4.figure import draw
 from experiments.rank4.findings import CLAIMS, findings

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import CellResult
+from experiments.kit.outcomes import tries_of
 from experiments.kit.plots import new_figure
-from experiments.learning.outcomes import tries_of
 from experiments.rank4.runs import ACTIONS, LEVELS, Run, runs_of
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array

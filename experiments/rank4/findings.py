@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.outcomes import ends_of, outcome_counts
 from experiments.kit.statistics import interquartile_mean, interval, told
-from experiments.learning.outcomes import ends_of, outcome_counts
 from experiments.rank4.runs import ACTIONS, ASIDE, HARDLY, NEVER, Run, runs_of
 
 MOST_VISITS, LEAST_ASIDE, HANDFUL = 10, 100, 10

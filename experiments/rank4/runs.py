@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from experiments.kit.arm_learning import RANK4, STRETCHED, arm_space
 from experiments.kit.cells import CellResult
-from experiments.learning.outcomes import failure_shares, goals_of, visits_of
-from experiments.learning.published import RANK4, STRETCHED, arm_space
+from experiments.kit.outcomes import failure_shares, goals_of, visits_of
 from mobee import Lattice
 from mobee.robot.robot import Array, Ints
 

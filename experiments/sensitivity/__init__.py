@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import begin_anywhere, newest
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import arm_space
-from experiments.learning.trial import begin_anywhere, newest
 from experiments.sensitivity.figure import draw
 from experiments.sensitivity.findings import ACTIONS, CLAIMS, LEVELS, findings
 from experiments.sensitivity.variants import VARIANTS

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.learning.published import DT, LEFT, robot
+from experiments.kit.arm_learning import DT, LEFT, robot
 from mobee import Gains, Model, MotorParameters, OfflinePlant
 from mobee.robot.robot import Robot
 

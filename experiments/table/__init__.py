@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import table_agents, table_plant
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import explore_together
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import table_agents, table_plant
 from experiments.table.figure import draw
 from experiments.table.findings import CLAIMS, findings
 from experiments.table.runs import ARMS, EXPLORERS, TRANSITIONS, WORLDS
-from experiments.table.session import explore_together
 from experiments.table.touch import is_forward, near_table
 
 NAME = "table"

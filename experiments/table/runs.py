@@ -9,9 +9,9 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, arm_space, torso_space
 from experiments.kit.cells import CellResult
-from experiments.learning.outcomes import failure_shares, outcome_counts, tries_of
-from experiments.learning.published import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, arm_space, torso_space
+from experiments.kit.outcomes import failure_shares, outcome_counts, tries_of
 from experiments.table.touch import low_goals
 from mobee import Lattice
 from mobee.robot.robot import Array, Ints

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.published import LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world
+from experiments.kit.arm_learning import LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world
 from mobee import Model, World, box
 from mobee.collision.touch import links_moved
 from mobee.robot.robot import Array

@@ -26,11 +26,11 @@ from scipy.special import stdtrit
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.claims import Claim
+from experiments.kit.exploration import explore_together
 from experiments.kit.options import positive_whole
 from experiments.kit.progress import Progress
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.table.session import explore_together
 from experiments.transfer.comparing import Distance
 from experiments.transfer.figure import draw
 from experiments.transfer.live import ROBOTS, learn

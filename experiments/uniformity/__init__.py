@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import ARM_NEIGHBOURS, arm_plant, arm_space
-from experiments.learning.trial import begin_anywhere, explore
 from experiments.uniformity.figure import draw
 from experiments.uniformity.findings import CLAIMS, EXPLORERS, GRAPHS, findings
 from mobee import CuriousAgent

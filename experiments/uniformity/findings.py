@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_space
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
-from experiments.kit.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
-from experiments.learning.constraint_actions import constraint_actions, relative_tries_of
-from experiments.learning.explored import Explored, Groups, explored
-from experiments.learning.published import ARM_NEIGHBOURS, arm_space
-from experiments.learning.spread import gini, relative_spread
+from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
+from experiments.kit.statistics import decides, gini, interquartile_mean, interval, ratio, ratio_interval, relative_spread, told
 from mobee import Lattice
 from mobee.robot.robot import Array
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import interquartile_mean, interval, ratio_interval, told
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from experiments.learning.published import ARM_NEIGHBOURS, arm_plant, arm_space
-from experiments.learning.trial import begin_anywhere, explore
 from mobee import CuriousAgent
 
 EXPLORERS = ("curious", "least_tried", "random")

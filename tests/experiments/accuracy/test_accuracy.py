@@ -6,7 +6,7 @@ import pytest
 from experiments import accuracy
 from experiments.accuracy.findings import CLAIMS, error_curve, findings, looks
 from experiments.accuracy.worlds import WALKS, half_space_plant, space_of, truths
-from experiments.learning.model_error import model_error
+from experiments.kit.truth import model_error
 from mobee import CuriousAgent
 from tests.experiments.finished_cells import Cell, finished
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.change.runs import EVERY, SOON, Run
-from experiments.learning.published import arm_space
+from experiments.kit.arm_learning import arm_space
 
 LOOKS = 4 * SOON // EVERY  # half of them before the change
 

@@ -5,10 +5,9 @@ import pytest
 
 from experiments import change
 from experiments.change.runs import EVERY
+from experiments.kit.arm_learning import arm_space
 from experiments.kit.cells import Cell
-from experiments.learning.model_error import l1
-from experiments.learning.published import arm_space
-from experiments.learning.truth import truth_of
+from experiments.kit.truth import l1, truth_of
 from mobee import TransitionModel
 from mobee.errors import InvalidValue
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.change.worlds import CHANGES, groups, plant_of
-from experiments.learning.published import arm_space
-from experiments.learning.truth import truth_of
+from experiments.kit.arm_learning import arm_space
+from experiments.kit.truth import truth_of
 
 
 @pytest.mark.parametrize("change", CHANGES)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.coverage.postman import postman_floor
-from experiments.learning.published import HYPERCUBE, RANK3, RANK4, arm_space
+from experiments.kit.arm_learning import HYPERCUBE, RANK3, RANK4, arm_space
 from mobee.errors import InvalidValue
 
 

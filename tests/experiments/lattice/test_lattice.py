@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_space
 from experiments.lattice.findings import CLAIMS, DISCOUNTS, INITIAL, findings
 from experiments.lattice.groups import ENTERING, FAILING
-from experiments.learning.published import arm_space
 from tests.experiments.finished_cells import Cell, finished
 
 SPACE = arm_space()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_space
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.planner.findings import fates
 from experiments.planner.following import Frozen, follow, promises, queries, through, zone
 from experiments.planner.table import DOWN, PERIOD, UP, TablePlant

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.published import LEFT, STRETCHED, arm_plant, arm_space, robot
+from experiments.kit.arm_learning import LEFT, STRETCHED, arm_plant, arm_space, robot
 from experiments.rank4.felt_plant import FeltPlant
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.published import RANK4, arm_space
+from experiments.kit.arm_learning import RANK4, arm_space
 from experiments.rank4.findings import contacts_by_pair
 from experiments.rank4.runs import Run
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.published import arm_plant, robot
+from experiments.kit.arm_learning import arm_plant, robot
 from experiments.rank4.runs import NEVER
 from experiments.sensitivity.findings import Row
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS, normalised

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.learning.published import robot
+from experiments.kit.arm_learning import robot
 from experiments.table.touch import is_forward, low_goals, near_table
 
 

@@ -1,4 +1,4 @@
-"""The settings of the published experiments, in one place (thesis chapter 7, paper section 3).
+"""The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
 
 The robot is `icub_2014` under the gains of 2014, at a control period of 20 ms, its motors those of the plant's defaults
 (docs/plant.md).  Motors that do not take part are rigid at home; those of the arms half-way, as the goals of the actions have them.
@@ -11,9 +11,12 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 import mobee
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World
-from mobee.robot.robot import Motor, Robot
+from mobee.robot.robot import Array, Clause, Motor, Robot
 
 ROBOT = "icub_2014"
 DT = 0.02  # s
@@ -26,6 +29,8 @@ RANK3 = (0.25, 0.5, 0.75)  # 81 states, 432 actions to equidistant neighbours, 1
 RANK4 = (0.2, 0.4, 0.6, 0.8)  # 256 states, 1536 actions to equidistant neighbours (7.3)
 STRETCHED = (0.125, 0.375, 0.625, 0.875)
 ARM_NEIGHBOURS, TORSO_NEIGHBOURS = 16, 8  # of the table experiment (7.4)
+
+PART, JOINTS = "left_arm", len(LEFT)  # of the arm that learns alone
 
 Neighbours = int | Literal["equidistant"]
 
@@ -84,3 +89,41 @@ def table_agents(plant: OfflinePlant, explorer: str = "curious", seed: int = 0, 
     """The torso's, the left and the right arm's agents; both arms have the same graph.  `settings`: more of CuriousAgent."""
     arms = [arm_space(RANK3, ARM_NEIGHBOURS, tie_seed, joints) for joints in (LEFT, RIGHT)]
     return [CuriousAgent(space, plant, explorer, seed, **settings) for space in (torso_space(tie_seed), *arms)]
+
+
+def columns() -> slice:
+    """Where the four joints of the left arm are among the robot's motors."""
+    first = robot().parts[PART].start
+    return slice(first, first + JOINTS)
+
+
+def arm_clauses() -> list[Clause]:
+    """The clauses of the left shoulder's cables."""
+    return [clause for clause in robot().clauses if clause.part == PART]
+
+
+@cache
+def least_margin() -> float:
+    """The least distance from a clause at which a pose counts as clear, in units of a.q + b: half the zone in which the law pushes.
+
+    There the force moves a resting arm by some three degrees, a quarter of the distance to the edge of a cell of the rank 3 lattice.
+    """
+    return Gains.published_2014().constraint_width / 2.0
+
+
+def whole(q: Array) -> Array:
+    """Poses of the four joints (..., 4) as poses of the robot (..., n), the other motors at home; rad."""
+    body = robot()
+    poses = np.broadcast_to(body.home, (*q.shape[:-1], len(body.home))).copy()
+    poses[..., columns()] = q
+    return poses
+
+
+def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
+    """In which poses (P, 4) rad no field is in contact and all of the clauses are farther than `least_margin`, (P,)."""
+    poses = whole(q)
+    good = np.ones(len(poses), dtype=bool)
+    good[model.evaluate(poses).table.pose] = False
+    for clause in clauses:
+        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= least_margin()
+    return good

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.learning.published import HYPERCUBE, arm_plant, arm_space
-from experiments.learning.tasks import Tasks, attempt, fewest_actions
+from experiments.connectivity.tasks import Tasks, attempt, fewest_actions
+from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
 from mobee import TransitionModel
 
 

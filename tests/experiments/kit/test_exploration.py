@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.published import table_agents, table_plant
-from experiments.table.session import explore_together
+from experiments.kit.arm_learning import table_agents, table_plant
+from experiments.kit.exploration import explore_together
 
 
 @pytest.fixture(scope="module")
