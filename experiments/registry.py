@@ -47,7 +47,7 @@ EXPERIMENTS = {
     "transfer": "experiments.transfer",
     "trm": "experiments.trm",
     "tune": "experiments.tune",
-    "uniformity": "experiments.uniformity",
+    "uniformity": "experiments.claims.ch7_learning.uniformity",
     "unmodelled": "experiments.unmodelled",
     "urdf-files": "experiments.urdf_files",
     "wall": "experiments.wall",
