@@ -20,7 +20,7 @@ EXPERIMENTS = {
     "either-alone": "experiments.either_alone",
     "flood": "experiments.flood",
     "graze": "experiments.graze",
-    "hypercube": "experiments.hypercube",
+    "hypercube": "experiments.claims.ch7_learning.hypercube",
     "identify": "experiments.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
