@@ -23,7 +23,7 @@ EXPERIMENTS = {
     "hypercube": "experiments.claims.ch7_learning.hypercube",
     "identify": "experiments.identify",
     "kail": "experiments.kail",
-    "lattice": "experiments.lattice",
+    "lattice": "experiments.claims.ch7_learning.lattice",
     "live-reach": "experiments.live_reach",
     "live-table": "experiments.live_table",
     "nes": "experiments.nes",

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.claims.ch7_learning.lattice import CLAIMS, DISCOUNTS, ENTERING, FAILING, INITIAL, findings
 from experiments.kit.arm_learning import arm_space
-from experiments.lattice.findings import CLAIMS, DISCOUNTS, INITIAL, findings
-from experiments.lattice.groups import ENTERING, FAILING
 from tests.experiments.finished_cells import Cell, finished
 
 SPACE = arm_space()
