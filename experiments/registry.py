@@ -15,7 +15,7 @@ EXPERIMENTS = {
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "clauses": "experiments.clauses",
     "connectivity": "experiments.connectivity",
-    "coverage": "experiments.coverage",
+    "coverage": "experiments.claims.ch7_learning.coverage",
     "decay": "experiments.claims.ch7_learning.decay",
     "either-alone": "experiments.either_alone",
     "flood": "experiments.flood",
