@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from experiments.claims.ch7_learning.rank4 import NEVER
 from experiments.kit.cells import CellResult
 from experiments.kit.plots import new_figure
-from experiments.rank4.runs import NEVER
 from experiments.sensitivity.findings import MOST, RARE, SOME, Row, rows_of
 from mobee.errors import InvalidValue
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.claims.ch7_learning.rank4 import ASIDE, HARDLY, NEVER
 from experiments.kit.arm_learning import RANK3, RANK4, arm_space
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
 from experiments.kit.outcomes import ends_of, outcome_counts, visits_of
-from experiments.rank4.runs import ASIDE, HARDLY, NEVER
 from experiments.sensitivity.variants import PUBLISHED, VARIANTS
 from mobee.robot.robot import Ints
 

@@ -1,4 +1,4 @@
-"""A plant whose actions are watched tick by tick for contacts of the robot with itself."""
+"""A plant that records the contacts of the robot with itself during each action, tick by tick."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ class SelfContact:
     depth: float  # m
 
 
-class FeltPlant:
-    """Acts as its plant does, to the last bit; `felt` holds a SelfContact, or None, for every action so far."""
+class SelfContactPlant:
+    """Acts as its plant does, to the last bit; `contacts` holds a SelfContact, or None, for every action so far."""
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant
         self.robot = plant.robot
-        self.felt: list[SelfContact | None] = []
+        self.contacts: list[SelfContact | None] = []
 
     def measure(self, part: str) -> Array:
         """As the plant's."""
         return self._plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """As the plant's: runs from look to look of the settle test."""
+        """As the plant's: runs from check to check of the settle test."""
         plant, settle = self._plant, self._plant.controller.gains.settle
         where, start = self.robot.part(part).slice, plant.time - plant.dt
         test, ticks = SettleTest(settle, start), _ticks(settle.first_look, plant.dt)
@@ -49,7 +49,7 @@ class FeltPlant:
             if verdict != "moving":
                 break
             ticks = _ticks(settle.interval, plant.dt)
-        self.felt.append(None if pose is None else SelfContact(self._pair(pose), deepest))
+        self.contacts.append(None if pose is None else SelfContact(self._pair(pose), deepest))
         return Outcome(plant.measure(part), verdict == "settled", plant.time - plant.dt - start, ())
 
     def _pair(self, q: Array) -> tuple[str, str]:
