@@ -11,7 +11,7 @@ from mobee.errors import UnknownName
 EXPERIMENTS = {
     "accuracy": "experiments.accuracy",
     "babbling": "experiments.babbling",
-    "change": "experiments.change",
+    "change": "experiments.claims.ch7_learning.change",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "clauses": "experiments.clauses",
     "connectivity": "experiments.connectivity",
