@@ -14,7 +14,7 @@ EXPERIMENTS = {
     "change": "experiments.claims.ch7_learning.change",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "clauses": "experiments.clauses",
-    "connectivity": "experiments.connectivity",
+    "connectivity": "experiments.claims.ch7_learning.connectivity",
     "coverage": "experiments.claims.ch7_learning.coverage",
     "decay": "experiments.claims.ch7_learning.decay",
     "either-alone": "experiments.either_alone",
