@@ -9,7 +9,7 @@ from experiments.kit.experiment import Experiment, Steps
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
-    "accuracy": "experiments.accuracy",
+    "accuracy": "experiments.claims.ch7_learning.accuracy",
     "babbling": "experiments.babbling",
     "change": "experiments.claims.ch7_learning.change",
     "chapter7": "experiments.claims.ch7_learning.chapter7",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.kit.statistics import interquartile_mean, interval
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array
 
 
@@ -18,7 +18,9 @@ class MatplotlibMissing(MobeeError):
 
 
 def new_figure(width: float, height: float) -> Any:
-    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing."""
+    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing, and InvalidValue for one without rows or columns."""
+    if not (width > 0.0 and height > 0.0):
+        raise InvalidValue("none of the runs that the figure shows is finished: go on with --resume.")
     try:
         from matplotlib.figure import Figure
     except ImportError:
