@@ -39,7 +39,7 @@ EXPERIMENTS = {
     "reach-vs-planners": "experiments.reach_vs_planners",
     "replanning": "experiments.replanning",
     "roadmap-from-scratch": "experiments.roadmap_from_scratch",
-    "sensitivity": "experiments.sensitivity",
+    "sensitivity": "experiments.claims.ch7_learning.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
     "simultaneous": "experiments.simultaneous",

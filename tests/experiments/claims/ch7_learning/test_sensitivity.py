@@ -3,10 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.claims.ch7_learning.rank4 import NEVER
+from experiments.claims.ch7_learning.sensitivity import PUBLISHED, VARIANTS, Row, normalised
 from experiments.kit.arm_learning import arm_plant, robot
-from experiments.rank4.runs import NEVER
-from experiments.sensitivity.findings import Row
-from experiments.sensitivity.variants import PUBLISHED, VARIANTS, normalised
 
 
 def test_the_first_variant_is_the_published_plant():
