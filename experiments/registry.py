@@ -30,7 +30,7 @@ EXPERIMENTS = {
     "ngik": "experiments.ngik",
     "originals": "experiments.originals",
     "own-robots": "experiments.own_robots",
-    "planner": "experiments.planner",
+    "planner": "experiments.claims.ch7_learning.planner",
     "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.claims.ch7_learning.rank4",

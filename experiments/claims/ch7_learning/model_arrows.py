@@ -1,4 +1,4 @@
-"""The transition model of an arm drawn as in fig. 7 of the paper: four dimensions in two, an arrow a probability."""
+"""A drawing of the transition model of an arm as in fig. 7 of the paper: four dimensions in two, an arrow a probability."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mobee.learning.neighbours import NO_ACTION
 from mobee.robot.robot import Array, Ints
 
 GAP = 4.6  # between blocks of states, in units of the distance inside
-SEEN, SHOWN = 0.3, 0.08  # a state-action is coloured when an unforeseen state is that likely; its arrows begin there
+COLOURED, SHOWN = 0.3, 0.08  # a state-action is coloured when an unforeseen state is that likely; its arrows begin there
 LABELS = ("123", "abc", ("I", "II", "III"), "ABC")  # of the levels of pitch, roll, yaw and elbow, as in the paper
 
 
@@ -30,7 +30,7 @@ def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array)
     states, actions = np.nonzero(space.goals != NO_ACTION)
     goals = space.goals[states, actions]
     axes.add_collection(
-        LineCollection(np.stack([places[states], places[goals]], axis=1), colors="0.5", linewidths=0.3, alpha=0.18, zorder=1)
+        LineCollection(list(np.stack([places[states], places[goals]], axis=1)), colors="0.5", linewidths=0.3, alpha=0.18, zorder=1)
     )
     colors = colormaps["turbo"]
     coloured = list(_unforeseen(space, outcomes, probabilities))
@@ -63,7 +63,7 @@ def _unforeseen(space: Lattice, outcomes: Ints, probabilities: Array) -> Iterato
     for state in range(len(space)):
         for action, goal in enumerate(space.actions(state)):
             other = (outcomes[state, action] != goal) & (outcomes[state, action] != state)
-            if probabilities[state, action][other].max(initial=0.0) >= SEEN:
+            if probabilities[state, action][other].max(initial=0.0) >= COLOURED:
                 yield state, action
 
 
