@@ -43,7 +43,7 @@ EXPERIMENTS = {
     "settle": "experiments.settle",
     "shove": "experiments.shove",
     "simultaneous": "experiments.simultaneous",
-    "table": "experiments.table",
+    "table": "experiments.claims.ch7_learning.table",
     "transfer": "experiments.transfer",
     "trm": "experiments.trm",
     "tune": "experiments.tune",

@@ -1,36 +1,42 @@
-"""The finished runs at the table, and what is counted in each."""
+"""The finished runs at the table, the counts of each, and the touch of an arm by geometry.
+
+Touch is computed from poses alone, alike of tables that exert forces and of ghosts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, arm_space, torso_space
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
 from experiments.kit.cells import CellResult
-from experiments.kit.outcomes import failure_shares, outcome_counts, tries_of
-from experiments.table.touch import low_goals
-from mobee import Lattice
+from experiments.kit.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
+from experiments.kit.sweep import Cells, grouped_by
+from mobee import Lattice, Model, World, box
+from mobee.collision.touch import links_moved
 from mobee.robot.robot import Array, Ints
 
-TRANSITIONS = 18_000  # a learner
+WAYS = ("tree", "part")  # to which root contact forces are propagated
 EXPLORERS, WORLDS = ("curious", "least_tried", "random"), ("table", "ghost")
-ARMS = ("left_arm", "right_arm")
+JOINTS = {"left_arm": LEFT, "right_arm": RIGHT}
+ARMS = tuple(JOINTS)
 PARTS = ("torso", *ARMS)
 FORWARD_STATES = slice(18, 27)  # of the torso: pitch at its third level
 WINDOW = 50  # transitions of an arm, of the touch rate over time
-
-Key = tuple[str, str, str]  # propagation, explorer, world
+NEAR = 0.02  # m between a field and the table's surface (paper, fig. 8: hand or elbow "within 2 cm of the table")
+FORWARD = np.deg2rad(30.0)  # of torso pitch
+BATCH = 2000  # poses
 
 
 @cache
 def spaces() -> dict[str, Lattice]:
     """Of each part; both arms have one graph."""
-    arms = {arm: arm_space(RANK3, ARM_NEIGHBOURS, joints=joints) for arm, joints in zip(ARMS, (LEFT, RIGHT), strict=True)}
-    return {"torso": torso_space(), **arms}
+    return {"torso": torso_space(), **{arm: arm_space(RANK3, ARM_NEIGHBOURS, joints=joints) for arm, joints in JOINTS.items()}}
 
 
 @cache
@@ -40,9 +46,45 @@ def low() -> NDArray[np.bool_]:
     return either
 
 
+def world_around(margin: float) -> World:
+    """The table, larger by a margin [m] on every side."""
+    table = table_world().objects["table"]
+    larger = World()
+    size = [edge + 2.0 * margin for edge in table.size]
+    larger.add("table", box(*size), position=table.position, rotation=table.rotation)
+    return larger
+
+
+def near_table(q: Array, arm: str, margin: float = NEAR) -> NDArray[np.bool_]:
+    """In which poses q (N, n) rad a field of the arm is nearer to the table than the margin [m], (N,)."""
+    model, moved = Model(robot(), world_around(margin)), np.array(sorted(links_moved(robot())[arm]))
+    near = np.zeros(len(q), dtype=bool)
+    for first in range(0, len(q), BATCH):
+        table = model.evaluate(q[first : first + BATCH]).table
+        rows = (table.second_link < 0) & (table.kind == 1) & np.isin(table.first_link, moved)
+        near[first + table.pose[rows]] = True
+    return near
+
+
+def low_goals(arm: str) -> NDArray[np.bool_]:
+    """Which states (81,) of an arm lie below the table's top when the torso is bent forward (75 % of its range)."""
+    space, pitch = arm_space(joints=JOINTS[arm]), robot().motor_index(TORSO[2])
+    q = np.tile(robot().home, (len(space), 1))
+    low, high = robot().limits[pitch]
+    q[:, pitch] = low + RANK3[-1] * (high - low)
+    q[:, robot().part(arm).slice] = [space.target(state) for state in range(len(space))]
+    return near_table(q, arm, 0.0)
+
+
+def is_forward(q: Array) -> NDArray[np.bool_]:
+    """In which poses q (N, n) rad the torso is bent forward, (N,)."""
+    bent: NDArray[np.bool_] = q[:, robot().motor_index(TORSO[2])] > FORWARD
+    return bent
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of three agents, see `experiments.table.work`."""
+    """One run of three agents; see the trial of `table`."""
 
     result: CellResult
 
@@ -65,6 +107,12 @@ class Run:
     def outcomes(self) -> dict[str, Ints]:
         """In how many states each action of a part ended, (S, A)."""
         return {part: outcome_counts(spaces()[part], seen) for part, seen in self.seen.items()}
+
+    @cached_property
+    def outcome_numbers(self) -> Ints:
+        """In how many states the actions ended that were tried, of all parts together."""
+        every = np.concatenate([self.outcomes[part].ravel() for part in PARTS])
+        return every[every > 0]
 
     def of_arms(self, name: str) -> Array:
         """What was recorded of both arms' actions, (2, T)."""
@@ -106,7 +154,7 @@ class Run:
     @property
     def low_and_forward(self) -> float:
         """The share of the arms' actions that aimed low and ended while the torso was bent, in the second half."""
-        goals = np.array([spaces()[arm].goals[self.seen[arm][:, 0], self.seen[arm][:, 1]] for arm in ARMS])
+        goals = np.array([goals_of(spaces()[arm], self.seen[arm]) for arm in ARMS])
         both = low()[goals] & self.of_arms("forward").astype(bool)
         return float(both[:, self.late].mean())
 
@@ -120,8 +168,7 @@ class Run:
     @property
     def half_failing(self) -> int:
         """How many actions of both arms failed in 10 to 90 % of their tries."""
-        shares = np.array([failure_shares(spaces()[arm], self.seen[arm]) for arm in ARMS])
-        return int(((shares > 0.1) & (shares < 0.9)).sum())
+        return sum(uncertain_in(spaces()[arm], self.seen[arm]) for arm in ARMS)
 
     @property
     def timeouts(self) -> dict[str, float]:
@@ -134,18 +181,16 @@ class Run:
         return float(max(self.result.values[f"ends_{part}"][-1] for part in PARTS)) / 3600.0
 
 
-def runs_of(found: Mapping[str, CellResult]) -> dict[Key, list[Run]]:
-    """The finished runs of each condition, in the order of the seeds."""
-    grouped: dict[Key, list[Run]] = {}
-    for result in sorted(found.values(), key=lambda one: one.cell.seed):
-        chosen = result.cell.settings
-        grouped.setdefault((chosen["propagate"], chosen["explorer"], chosen["world"]), []).append(Run(result))
-    order = [(way, explorer, world) for way in ("tree", "part") for explorer in EXPLORERS for world in WORLDS]
-    return {key: grouped[key] for key in order if key in grouped}
+Runs = Mapping[tuple[str, str, str], list[Run]]  # propagation, explorer, world
 
 
-def with_ghosts(runs: Mapping[Key, list[Run]], way: str, explorer: str) -> list[tuple[Run, Run]]:
+def runs_of(found: Cells) -> Runs:
+    """The finished runs of each condition, by seed, in the order of the conditions."""
+    grouped = grouped_by(found, "propagate", "explorer", "world")
+    return {key: [Run(result) for result in grouped[key]] for key in product(WAYS, EXPLORERS, WORLDS) if key in grouped}
+
+
+def with_ghosts(runs: Runs, way: str, explorer: str) -> list[tuple[Run, Run]]:
     """Each run at the table with the one of the same seed at the ghost."""
     ghosts = {run.seed: run for run in runs.get((way, explorer, "ghost"), [])}
-    at_table: Iterable[Run] = runs.get((way, explorer, "table"), [])
-    return [(run, ghosts[run.seed]) for run in at_table if run.seed in ghosts]
+    return [(run, ghosts[run.seed]) for run in runs.get((way, explorer, "table"), []) if run.seed in ghosts]
