@@ -3,12 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit import live_learning
 from experiments.kit.cells import Cell, write_cell
 from experiments.kit.live import LaunchFailed
-from experiments.transfer import live
-from experiments.transfer.live import ROBOTS, learn
-from experiments.transfer.records import compared
-from experiments.transfer.settings import RATE, TASKS, agents, offline_plant
+from experiments.kit.live_learning import RATE, ROBOTS, TASKS, agents, learn_live, offline_plant
+from experiments.kit.outcome_distance import compared
 from mobee.store import STORE, Transition, TransitionStore
 from services.launcher.scenario import read_scenario
 
@@ -30,8 +29,8 @@ def test_the_launcher_takes_the_scenario_and_its_agents_are_those_of_the_offline
             made(tmp_path, part, 30)
         return {}
 
-    monkeypatch.setattr(live, "summary_of", launched)
-    learn(task, robot, 3, 30, tmp_path, lambda number: None)
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live(task, robot, 3, 30, tmp_path, lambda number: None)
     ((scenario, ticks),) = started
     configs = {part.who: part.config for part in scenario.parts}
     assert scenario.is_locked and ticks > 30 * 4 * RATE
@@ -55,15 +54,15 @@ def test_it_goes_on_with_another_seed_until_all_parts_have_enough(tmp_path, monk
         made(tmp_path, "right_arm", 10 * len(seeds) - 3)
         return {}
 
-    monkeypatch.setattr(live, "summary_of", launched)
-    learn("arms", "kinematic", 0, 25, tmp_path, told.append)
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live("arms", "kinematic", 0, 25, tmp_path, told.append)
     assert told == [0, 7, 17] and len(set(seeds)) == 3
 
 
 def test_a_system_that_makes_nothing_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(live, "summary_of", lambda path, ticks, runs: {})
+    monkeypatch.setattr(live_learning, "summary_of", lambda path, ticks, runs: {})
     with pytest.raises(LaunchFailed, match="no transition"):
-        learn("arms", "pybullet", 0, 25, tmp_path, lambda number: None)
+        learn_live("arms", "pybullet", 0, 25, tmp_path, lambda number: None)
 
 
 def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_others(tmp_path):
@@ -81,7 +80,7 @@ def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_o
     assert found.counts["pybullet"]["left_arm"].sum() == 8  # as many as the offline seeds made
 
 
-def test_who_has_enough_goes_on_with_the_others_so_that_nobody_waits_for_it(tmp_path, monkeypatch):
+def test_a_part_that_has_enough_goes_on_with_the_others_so_that_none_waits_for_it(tmp_path, monkeypatch):
     left = []
 
     def launched(path, ticks, runs):
@@ -91,6 +90,6 @@ def test_who_has_enough_goes_on_with_the_others_so_that_nobody_waits_for_it(tmp_
             made(tmp_path, part, goal - (4 if part == "right_arm" and len(left) == 1 else 0))
         return {}
 
-    monkeypatch.setattr(live, "summary_of", launched)
-    learn("arms", "kinematic", 0, 25, tmp_path, lambda number: None)
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live("arms", "kinematic", 0, 25, tmp_path, lambda number: None)
     assert left == [{"left_arm": 25, "right_arm": 25}, {"left_arm": 29, "right_arm": 25}]

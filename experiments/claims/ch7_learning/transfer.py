@@ -1,4 +1,4 @@
-"""Does what is learned on the offline plant hold on a robot with physics?
+"""Transfer: is what is learned on the offline plant true of a robot with physics?
 
 Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of
 PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) names the robot's time as what limits learning.
@@ -26,26 +26,18 @@ from scipy.special import stdtrit
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.claims import Claim
-from experiments.kit.exploration import explore_together
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.live_learning import ROBOTS, learn_live, learn_offline
 from experiments.kit.options import positive_whole
+from experiments.kit.outcome_distance import Compared, Distance, compared, draw_distances
 from experiments.kit.progress import Progress
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.transfer.comparing import Distance
-from experiments.transfer.figure import draw
-from experiments.transfer.live import ROBOTS, learn
-from experiments.transfer.records import Compared, compared
-from experiments.transfer.settings import TASKS, agents, offline_plant
 
-NAME = "transfer"
-CLAIM = "what is learned on the offline plant, with identified motors, is what PyBullet's robot does"
-SOURCE = "aim of this reproduction; paper 4.1"
-CLAIMS = (
-    Claim(
-        "aim of this reproduction",
-        "the transition model learned offline with identified motors is that of PyBullet's robot in lockstep",
-        "as near as another offline seed",
-    ),
+ALIKE = Claim(
+    "aim of this reproduction",
+    "the transition model learned offline with identified motors is that of PyBullet's robot in lockstep",
+    "as near as another offline seed",
 )
 MARGIN = 0.02  # of equivalence: a larger difference would have to be found
 NEAR = 0.01  # what is nearer than that is the same, whatever the spread
@@ -71,36 +63,30 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
     return [Cell(f"{task}-s{seed}", seed, {"task": task, "transitions": number}) for task in _tasks(arguments) for seed in seeds]
 
 
-def work(cell: Cell) -> dict[str, Any]:
-    """Learn offline; what each part has seen, (T, 3)."""
-    task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
-    plant = offline_plant(task, cell.seed)
-    logs = explore_together(agents(task, plant, cell.seed), plant, number)
-    return {f"seen_{part}": np.array(log.seen[:number], dtype=np.int32) for part, log in logs.items()}
-
-
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Learn offline and live, and compare."""
-    run_cells(work, cells(arguments), folder, arguments)
+    run_cells(learn_offline, cells(arguments), folder, arguments)
     number = _transitions(arguments)
     with Progress() as progress:
 
-        def told(made: int) -> None:
+        def report(made: int) -> None:
             progress.show(made / number, f"{task} on {robot}: {made} of {number}")
 
         for task, robot in product(_tasks(arguments), ROBOTS):
-            learn(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, told)
+            learn_live(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, report)
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
     table = {f"{task}, {who}": row for task, found in tasks.items() for who, row in _rows(found).items()}
-    return {"claims": [_claim(tasks).record()], "distances": table}
+    return {"claims": [measured(tasks).record()], "distances": table}
 
 
 def figure(folder: Path) -> Path:
     """Distances to the offline seeds together, and how often actions reach their goals."""
     least = int(read(folder / LEAST_FILE)["least"])
     names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
-    return draw({task: compared(folder, task, least) for task in names}, least, folder / "transfer.png")
+    path = folder / "figure.png"
+    draw_distances({task: compared(folder, task, least) for task in names}, least).savefig(path, dpi=130)
+    return path
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
@@ -117,24 +103,25 @@ def _plain(one: Distance) -> dict[str, Any]:
     return {"variation": round(one.variation, 4), "agree": round(one.agree, 4), "compared": one.compared}
 
 
-def _claim(tasks: Mapping[str, Compared]) -> Claim:
+def measured(tasks: Mapping[str, Compared]) -> Claim:
+    """The claim with our numbers, of all tasks."""
     texts, verdicts = [], []
     for task, found in tasks.items():
         one = found.live["pybullet"]
         apart, differ = [seed.variation for seed in found.offline], [1.0 - seed.agree for seed in found.offline]
         verdicts += [_as_near(one.variation, apart), _as_near(1.0 - one.agree, differ)]
-        told = max(_bound(values) - float(np.mean(values)) for values in (apart, differ))
+        detectable = max(prediction_bound(values) - float(np.mean(values)) for values in (apart, differ))
         texts.append(
-            f"{task}: total variation {one.variation:.3f} (another offline seed: up to {_bound(apart):.3f}),"
-            f" same most frequent outcome {one.agree:.3f} (from {1.0 - _bound(differ):.3f}), {one.compared} state-actions;"
-            f" a difference of {told:.3f} would have been found (margin {MARGIN})"
+            f"{task}: total variation {one.variation:.3f} (another offline seed: up to {prediction_bound(apart):.3f}),"
+            f" same most frequent outcome {one.agree:.3f} (from {1.0 - prediction_bound(differ):.3f}), {one.compared} state-actions;"
+            f" a difference of {detectable:.3f} would have been found (margin {MARGIN})"
         )
-    return CLAIMS[0].measured("; ".join(texts), False if False in verdicts else None if None in verdicts else True)
+    return ALIKE.measured("; ".join(texts), False if False in verdicts else None if None in verdicts else True)
 
 
 def _as_near(value: float, offline: Sequence[float]) -> bool | None:
     """Whether a robot is as near as another offline seed; None where nothing was compared, or a seed could be anywhere."""
-    most = _bound(offline)
+    most = prediction_bound(offline)
     if not np.isfinite([value, most]).all():
         return None
     if value > max(most, NEAR):
@@ -142,8 +129,8 @@ def _as_near(value: float, offline: Sequence[float]) -> bool | None:
     return True if most - float(np.mean(offline)) <= MARGIN else None
 
 
-def _bound(values: Sequence[float]) -> float:
-    """What one more value of the same kind stays below with 95 %, if they are normally distributed."""
+def prediction_bound(values: Sequence[float]) -> float:
+    """The value below which one more of the same kind is with 95 %, if they are normally distributed."""
     n = len(values)
     return float(np.mean(values) + stdtrit(n - 1, 0.95) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
 
@@ -154,3 +141,13 @@ def _tasks(arguments: argparse.Namespace) -> list[str]:
 
 def _transitions(arguments: argparse.Namespace) -> int:
     return min(20, arguments.transitions) if arguments.quick else int(arguments.transitions)
+
+
+EXPERIMENT = Experiment(
+    name="transfer",
+    claim="what is learned on the offline plant, with identified motors, is what PyBullet's robot does",
+    source="aim of this reproduction; paper 4.1",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+    claims=(ALIKE,),
+)

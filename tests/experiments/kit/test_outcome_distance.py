@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.transfer.comparing import counts_of, distance, variations
-from experiments.transfer.settings import JOINTS
+from experiments.kit.live_learning import JOINTS
+from experiments.kit.outcome_distance import counts_of, distance, variations
 from mobee import Lattice, load_robot
 
 

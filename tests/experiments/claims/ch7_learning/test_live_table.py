@@ -5,9 +5,9 @@ import argparse
 import numpy as np
 import pytest
 
-from experiments import live_table
+from experiments.claims.ch7_learning import live_table
 from experiments.kit.cells import write_cell
-from experiments.transfer.settings import TASKS, space
+from experiments.kit.live_learning import TASKS, space
 from mobee import load_robot
 from mobee.store import STORE, Transition, TransitionStore
 
