@@ -100,8 +100,8 @@ Groups = dict[tuple[str, str], list[Explored]]  # values of two settings
 def explored(found: Mapping[str, CellResult], space_of: Callable[[str], Lattice], where: str, how: str) -> Groups:
     """The runs that recorded transitions as "seen", by seed, under the values of two settings; `where` decides the space."""
     return {
-        (place, way): [_explored(space_of(place), result) for result in results]
-        for (place, way), results in grouped_by(found, where, how).items()
+        (place, method): [_explored(space_of(place), result) for result in results]
+        for (place, method), results in grouped_by(found, where, how).items()
     }
 
 

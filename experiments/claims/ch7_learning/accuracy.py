@@ -204,8 +204,8 @@ def _ratio(claim: Claim, above: Array | None, below: Array | None, least: float,
     """Whether what is above is that many times what is below; open if one is not known, or the interval holds the number."""
     if above is None or below is None:
         return claim
-    said = told_ratio(above, below).replace(" ", " x ", 1)
-    text = f"{said} ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
+    factor = told_ratio(above, below).replace(" ", " x ", 1)
+    text = f"{factor} ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
     return claim.measured(text + note, decides(ratio_interval(above, below), least))
 
 

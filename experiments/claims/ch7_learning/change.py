@@ -167,12 +167,12 @@ class Run:
 
     @property
     def eagerness(self) -> float:
-        """The same soon after the change."""
+        """The mean of `tries` soon after the change."""
         return float(self.tries[self.checks_before : self.checks_before + SOON // EVERY].mean())
 
     @property
     def eagerness_before(self) -> float:
-        """The same as long before the change."""
+        """The mean of `tries` as long before the change."""
         return float(self.tries[self.checks_before - SOON // EVERY : self.checks_before].mean())
 
     @property
@@ -182,7 +182,7 @@ class Run:
 
     @property
     def value_jump_before(self) -> float:
-        """The same where nothing has changed: over the last transitions before."""
+        """`value_jump` where nothing has changed: over the last transitions before."""
         return self._jump(self.checks_before - SOON // EVERY)
 
     def _jump(self, check: int) -> float:
@@ -197,7 +197,7 @@ class Run:
 
     @property
     def error_left(self) -> float:
-        """The last of the errors."""
+        """The last of `errors`."""
         return float(self.errors[-1])
 
     @property
@@ -208,7 +208,7 @@ class Run:
 
     @property
     def relearned_within(self) -> float:
-        """The same, or the transitions that were made after the change."""
+        """`relearned`, or the transitions that were made after the change, whichever is less."""
         return float(min(self.relearned, EVERY * (len(self.series) - self.checks_before)))
 
 
@@ -231,7 +231,7 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]
     whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * BEFORE // EVERY
-    rows = {f"{change}, {who}, forgetting {f:g}": _row(runs[change, who, f]) for change, who, f in keys if (change, who, f) in runs}
+    rows = {"{}, {}, forgetting {:g}".format(*key): _row(runs[key]) for key in keys if key in runs}
     return {"agents": rows, "claims": [claim.record() for claim in (measured(runs) if whole else CLAIMS)]}
 
 
@@ -281,8 +281,8 @@ def _sooner(claim: Claim, runs: Runs, explorer: str, forgetting: float) -> Claim
         forgot, kept = runs[change, explorer, forgetting], runs[change, explorer, 1.0]
         values = [[run.relearned_within for run in mine] for mine in (forgot, kept)]
         never = [sum(np.isinf(run.relearned) for run in mine) for mine in (forgot, kept)]
-        said = [f"{told(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True)]
-        parts.append(f"{change}: {said[0]}, without forgetting {said[1]}")
+        forgetful, lasting = (f"{told(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True))
+        parts.append(f"{change}: {forgetful}, without forgetting {lasting}")
         holds = holds and interval(values[0])[1] < interval(values[1])[0]
     return claim.measured("; ".join(parts), holds)
 

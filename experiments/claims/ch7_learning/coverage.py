@@ -215,8 +215,8 @@ def _best(times: Mapping[tuple[str, str], Array], unfinished_random: int) -> Cla
 def _novel(published: Published) -> Claim:
     repeats = {name: [first_repeat(run) for run in published["constrained", name]] for name in ("curious", "least_tried", "random")}
     holds = all(interval(repeats[name])[0] >= EARLY for name in ("curious", "least_tried")) and interval(repeats["random"])[1] < EARLY
-    said = ", ".join(f"{label} {told(mine, 0)}" for label, mine in zip(("AC", "LT", "RAND"), repeats.values(), strict=True))
-    return NOVEL.measured(f"first repeat at {said} transitions", holds)
+    text = ", ".join(f"{label} {told(mine, 0)}" for label, mine in zip(("AC", "LT", "RAND"), repeats.values(), strict=True))
+    return NOVEL.measured(f"first repeat at {text} transitions", holds)
 
 
 def _aggressive(published: Published) -> Claim:

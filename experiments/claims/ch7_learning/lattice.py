@@ -2,7 +2,7 @@
 
 Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (50-50) or 2651 (60-40); the states 24, 51
 and 78 are hard to get into because some actions that should lead there fail; the agent's tries of what can be done there dip, the
-less the farther it looks ahead; who expects success (60-40) tries the failing actions most often.
+less the farther it plans ahead; an agent that expects success (60-40) tries the failing actions most often.
 Source: thesis 7.2.2 to 7.2.5, figs. 7.4, 7.6 and 7.7; 5 runs a setting.  Run time: 1 minute on 2 cores.
 
 The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both initialisations, until

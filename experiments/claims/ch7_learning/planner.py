@@ -66,19 +66,19 @@ CLAIMS = (FATES, ADAPTS, INOPERABLE, PREDICTABLE, AROUND)
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Learned without the table, with one that moves, and one that enters, with and without forgetting; and the roadmaps."""
     settings: dict[str, Any] = {"queries": 10, "share": 0.25} if arguments.quick else {"queries": QUERIES, "share": 1.0}
-    lasting = [Condition(way, settings | {"way": way}) for way in ("still", "moving", "roadmap")]
+    lasting = [Condition(condition, settings | {"way": condition}) for condition in ("still", "moving", "roadmap")]
     return lasting + [Condition(f"enters-{f:g}", settings | {"way": "enters", "forgetting": f}, 2.0) for f in ENTERS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Learn, and follow plans; the means over the queries by name."""
-    way, share, space = settings["way"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
-    plant = TablePlant(seed, moves=way == "moving")
+    condition, share, space = settings["way"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
+    plant = TablePlant(seed, moves=condition == "moving")
     queries = Queries.of_seed(plant, space, settings["queries"], seed)
-    if way == "roadmap":
+    if condition == "roadmap":
         return {"tests": {mode: queries.in_all_worlds(rival) for mode, rival in roadmaps(plant, space).items()}}
     agent = CuriousAgent(space, plant, seed=seed, forgetting=settings.get("forgetting", 1.0))
-    return _entered(agent, plant, queries, share) if way == "enters" else _learned(agent, queries, share)
+    return _entered(agent, plant, queries, share) if condition == "enters" else _learned(agent, queries, share)
 
 
 def _learned(agent: CuriousAgent, queries: Queries, share: float) -> dict[str, Any]:
@@ -122,15 +122,15 @@ Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # the values by 
 def runs_of(found: Cells) -> Runs:
     """The values of the finished runs of each condition, by seed."""
     runs: dict[tuple[str, float | None], list[dict[str, Any]]] = {}
-    for (way,), results in grouped_by(found, "way").items():
+    for (condition,), results in grouped_by(found, "way").items():
         for result in results:
-            runs.setdefault((way, result.cell.settings.get("forgetting")), []).append(result.values)
+            runs.setdefault((condition, result.cell.settings.get("forgetting")), []).append(result.values)
     return runs
 
 
-def tested(runs: Runs, way: str, test: str, measure: str, mode: str = "plans") -> Array:
+def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "plans") -> Array:
     """A measure of each seed; `mode`: "plans" of the MDP, or one of the ROADMAPS."""
-    return np.array([run["tests"][mode][test][measure] for run in runs[way, None]])
+    return np.array([run["tests"][mode][test][measure] for run in runs[condition, None]])
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
@@ -151,9 +151,9 @@ def tables(runs: Runs) -> dict[str, Any]:
         {
             "who": name,
             "table": test,
-            **{m: told(tested(runs, way, test, m, mode)) for m in (OF_ALL if way == "roadmap" else MEASURES)},
+            **{m: told(tested(runs, condition, test, m, mode)) for m in (OF_ALL if condition == "roadmap" else MEASURES)},
         }
-        for (way, mode), name in PLANNERS.items()
+        for (condition, mode), name in PLANNERS.items()
         for test in TESTS
     ]
     entered = []
@@ -206,7 +206,7 @@ def _inoperable(runs: Runs) -> Claim:
 
 def _less(claim: Claim, runs: Runs, measure: str, what: str) -> Claim:
     """Whether an arm that learned with the moving table has less of something there than one that learned without."""
-    moving, still = (tested(runs, way, "moving", measure) for way in ("moving", "still"))
+    moving, still = (tested(runs, condition, "moving", measure) for condition in ("moving", "still"))
     low, high = interval(still - moving)
     text = f"{what} with the moving table: {told(moving)}, trained without it {told(still)}; less by {told(still - moving)}"
     return claim.measured(text, True if low > 0.0 else False if high < 0.0 else None)
@@ -219,12 +219,12 @@ TITLES = {"still": "learned without the table", "moving": "learned while the tab
 def plot(found: Cells) -> Any:
     """The learned models as in fig. 7, the plans with a moving table, and how they recover when it has entered."""
     runs = runs_of(found)
-    if not runs.keys() >= {*((way, None) for way in ("still", "moving", "roadmap")), *(("enters", f) for f in ENTERS)}:
+    if not runs.keys() >= {*((condition, None) for condition in ("still", "moving", "roadmap")), *(("enters", f) for f in ENTERS)}:
         raise InvalidValue("some conditions lack finished cells: go on with --resume.")
     drawing = new_figure(19.0, 13.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(2.0, 1.0))
-    for axes, (way, title) in zip(above.subplots(1, 2), TITLES.items(), strict=True):
-        values = runs[way, None][0]
+    for axes, (condition, title) in zip(above.subplots(1, 2), TITLES.items(), strict=True):
+        values = runs[condition, None][0]
         draw_arrows(axes, arm_space(RANK3, ARM_NEIGHBOURS), values["outcomes"], values["probabilities"])
         axes.set_title(title, fontsize=10)
     success, met, recovering, plans = below.subplots(1, 4)
@@ -237,9 +237,9 @@ def plot(found: Cells) -> Any:
 
 
 def _moving(axes: Any, runs: Runs, measure: str, label: str) -> None:
-    for number, ((way, mode), name) in enumerate(PLANNERS.items()):
-        values = [tested(runs, way, test, measure, mode) for test in TESTS]
-        style = {"fmt": "o", "color": COLORS[way, mode], "capsize": 3, "markersize": 5}
+    for number, ((condition, mode), name) in enumerate(PLANNERS.items()):
+        values = [tested(runs, condition, test, measure, mode) for test in TESTS]
+        style = {"fmt": "o", "color": COLORS[condition, mode], "capsize": 3, "markersize": 5}
         draw_points(axes, np.arange(3) + 0.1 * (number - 2), values, label=name, **style)
     axes.set_xticks(range(3), [f"table {test}" for test in TESTS])
     axes.set(ylabel=label, xlabel="while plans are carried out")

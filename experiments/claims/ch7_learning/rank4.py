@@ -109,7 +109,7 @@ class Run:
 
     @cached_property
     def visits(self) -> Ints:
-        """Of each state, (256,)."""
+        """The number of times each state was reached, (256,)."""
         return visits_of(self.space, self.seen)
 
     @property
@@ -257,11 +257,11 @@ def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
     text = ", ".join(f"{name}: {told([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
     few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
     reached = [float(run.succeeded[run.touched].mean()) for run in stretched if run.touched.any()]
-    said = f"stretched: {told([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+    despite = f"stretched: {told([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
     return [
         CONTACTS.measured(text, min(few[0], many[0]) > MANY),
         MORE.measured(text, many[0] > 2.0 * few[1]),
-        DESPITE.measured(said, bool(reached) and interval(reached)[0] > 0.0),
+        DESPITE.measured(despite, bool(reached) and interval(reached)[0] > 0.0),
     ]
 
 

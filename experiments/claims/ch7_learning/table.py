@@ -41,7 +41,7 @@ from experiments.claims.ch7_learning.table_runs import (
     EXPLORERS,
     FORWARD_STATES,
     PARTS,
-    WAYS,
+    PROPAGATIONS,
     WINDOW,
     WORLDS,
     Run,
@@ -102,11 +102,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     transitions, name = (QUICK, "quick-") if arguments.quick else (TRANSITIONS, "")
     return [
         Condition(
-            f"{name}{way}-{explorer}-{world}",
-            {"explorer": explorer, "world": world, "propagate": way, "transitions": transitions},
+            f"{name}{propagate}-{explorer}-{world}",
+            {"explorer": explorer, "world": world, "propagate": propagate, "transitions": transitions},
             2.0 if world == "table" else 1.0,
         )
-        for way, explorer, world in product(WAYS if arguments.part else WAYS[:1], EXPLORERS, WORLDS)
+        for propagate, explorer, world in product(PROPAGATIONS if arguments.part else PROPAGATIONS[:1], EXPLORERS, WORLDS)
     ]
 
 
@@ -138,9 +138,9 @@ def findings(found: Cells) -> dict[str, Any]:
     return {
         "conditions": {", ".join(key): _row(mine) for key, mine in runs.items()},
         "beside the ghost": {
-            f"{way}, {explorer}": _interest(pairs)
-            for way, explorer in product(WAYS, EXPLORERS)
-            if (pairs := with_ghosts(runs, way, explorer))
+            f"{propagate}, {explorer}": _interest(pairs)
+            for propagate, explorer in product(PROPAGATIONS, EXPLORERS)
+            if (pairs := with_ghosts(runs, propagate, explorer))
         },
         "outcomes an action": {", ".join(key): _histogram(mine) for key, mine in runs.items()},
         "detector": detector(runs),

@@ -53,7 +53,7 @@ def agreement(pair: Array) -> float:
 
 
 def autocorrelation(rate: Array, most: int) -> Array:
-    """Of a series without its linear trend, at the lags 0 to `most`, (most + 1,)."""
+    """The autocorrelation of a series without its linear trend, at the lags 0 to `most`, (most + 1,)."""
     steps = np.arange(len(rate))
     rest = rate - np.polyval(np.polyfit(steps, rate, 1), steps)
     products = [float((rest[lag:] * rest[: len(rest) - lag]).sum()) for lag in range(most + 1)]
@@ -80,7 +80,7 @@ def second_peak(curves: Array) -> int:
 
 
 def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]]:
-    """What the autocorrelation of each run, and of its ghost, is where the other runs have their second peak; two runs at least."""
+    """The autocorrelation of each run, and of its ghost, at the second peak of the other runs; two runs at least."""
     lags = [second_peak(np.delete(ours, run, axis=0)) for run in range(len(ours))]
     here, there = ([float(curve[lag]) for curve, lag in zip(curves, lags, strict=True)] for curves in (ours, theirs))
     return here, there
@@ -126,13 +126,13 @@ class Judged:
 
     @property
     def precision(self) -> Array:
-        """Of calling the first k dependent, for every k."""
+        """The precision of calling the first k dependent, for every k."""
         found: Array = (np.cumsum(self.hits, axis=1) / np.arange(1, self.hits.shape[1] + 1)).mean(axis=0)
         return found
 
     @property
     def recall(self) -> Array:
-        """Of the same."""
+        """The recall of calling the first k dependent, for every k."""
         found: Array = (np.cumsum(self.hits, axis=1) / self.hits.sum(axis=1, keepdims=True)).mean(axis=0)
         return found
 

@@ -21,7 +21,7 @@ from mobee import Lattice, Model, World, box
 from mobee.collision.touch import links_moved
 from mobee.robot.robot import Array, Ints
 
-WAYS = ("tree", "part")  # to which root contact forces are propagated
+PROPAGATIONS = ("tree", "part")  # contact forces reach the whole tree, or end at the root of a part
 EXPLORERS, WORLDS = ("curious", "least_tried", "random"), ("table", "ghost")
 JOINTS = {"left_arm": LEFT, "right_arm": RIGHT}
 ARMS = tuple(JOINTS)
@@ -35,7 +35,7 @@ BATCH = 2000  # poses
 
 @cache
 def spaces() -> dict[str, Lattice]:
-    """Of each part; both arms have one graph."""
+    """The lattice of each part; both arms have one graph."""
     return {"torso": torso_space(), **{arm: arm_space(RANK3, ARM_NEIGHBOURS, joints=joints) for arm, joints in JOINTS.items()}}
 
 
@@ -90,7 +90,7 @@ class Run:
 
     @property
     def seed(self) -> int:
-        """Of agents and encoders."""
+        """The seed of agents and encoders."""
         return self.result.cell.seed
 
     @cached_property
@@ -115,7 +115,7 @@ class Run:
         return every[every > 0]
 
     def of_arms(self, name: str) -> Array:
-        """What was recorded of both arms' actions, (2, T)."""
+        """A recorded array of both arms' actions, (2, T)."""
         return np.array([self.result.values[f"{name}_{arm}"] for arm in ARMS])
 
     @cached_property
@@ -130,7 +130,7 @@ class Run:
 
     @property
     def touch_rate(self) -> Array:
-        """The same over time, in windows of so many transitions of each arm."""
+        """The share of actions that ended touching over time, in windows of WINDOW transitions of each arm."""
         touch = self.of_arms("touch")
         count = touch.shape[1] // WINDOW
         rate: Array = touch[:, : count * WINDOW].reshape(2, count, WINDOW).mean(axis=(0, 2))
@@ -172,12 +172,12 @@ class Run:
 
     @property
     def timeouts(self) -> dict[str, float]:
-        """Which share of a part's actions timed out."""
+        """The share of a part's actions that timed out."""
         return {part: float(1.0 - self.result.values[f"settled_{part}"].mean()) for part in PARTS}
 
     @property
     def hours(self) -> float:
-        """Of the plant's time, until the slowest agent was done."""
+        """Hours of the plant's time until the slowest agent was done."""
         return float(max(self.result.values[f"ends_{part}"][-1] for part in PARTS)) / 3600.0
 
 
@@ -187,10 +187,10 @@ Runs = Mapping[tuple[str, str, str], list[Run]]  # propagation, explorer, world
 def runs_of(found: Cells) -> Runs:
     """The finished runs of each condition, by seed, in the order of the conditions."""
     grouped = grouped_by(found, "propagate", "explorer", "world")
-    return {key: [Run(result) for result in grouped[key]] for key in product(WAYS, EXPLORERS, WORLDS) if key in grouped}
+    return {key: [Run(result) for result in grouped[key]] for key in product(PROPAGATIONS, EXPLORERS, WORLDS) if key in grouped}
 
 
-def with_ghosts(runs: Runs, way: str, explorer: str) -> list[tuple[Run, Run]]:
+def with_ghosts(runs: Runs, propagate: str, explorer: str) -> list[tuple[Run, Run]]:
     """Each run at the table with the one of the same seed at the ghost."""
-    ghosts = {run.seed: run for run in runs.get((way, explorer, "ghost"), [])}
-    return [(run, ghosts[run.seed]) for run in runs.get((way, explorer, "table"), []) if run.seed in ghosts]
+    ghosts = {run.seed: run for run in runs.get((propagate, explorer, "ghost"), [])}
+    return [(run, ghosts[run.seed]) for run in runs.get((propagate, explorer, "table"), []) if run.seed in ghosts]

@@ -9,7 +9,7 @@ arms at the table.  Live: all services in lockstep, with PyBullet, and with the 
 agents with five other seeds.  How far each of them is from the four others is the noise that even a perfect twin would show, so a
 live robot is held against four of them at a time too.  It passes within what one more seed would do with 95 %, or within 0.01.
 That is the claim's verdict only where that bound is less than 0.02 above the offline mean, the margin of equivalence; else the
-offline seeds differ too much to tell, and it is open.
+offline seeds differ too much for a verdict, and it is open.
 PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
 """
 
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             learn_live(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, report)
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
-    table = {f"{task}, {who}": row for task, found in tasks.items() for who, row in _rows(found).items()}
+    table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
     return {"claims": [measured(tasks).record()], "distances": table}
 
 
