@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.learning.published import arm_space
+from experiments.kit.arm_learning import arm_space
 from mobee import CuriousAgent
 from mobee.learning.tabular import TabularPlant, half_space
 from mobee.robot.robot import Array, Ints

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.kit.statistics import interquartile_mean, interval
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.robot import Array
 
 
@@ -18,7 +18,9 @@ class MatplotlibMissing(MobeeError):
 
 
 def new_figure(width: float, height: float) -> Any:
-    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing."""
+    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing, and InvalidValue for one without rows or columns."""
+    if not (width > 0.0 and height > 0.0):
+        raise InvalidValue("none of the runs that the figure shows is finished: go on with --resume.")
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -40,6 +42,24 @@ def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, c
     axes.bar(at, means, width, yerr=spread, color=color, label=label, capsize=3)
 
 
-def _of(groups: Sequence[Array]) -> tuple[Array, Array, Array]:
+def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[ArrayLike], **style: Any) -> None:
+    """The mean and the interval of each group of runs; `style`: of Matplotlib's errorbar."""
+    means, low, high = _of(groups)
+    spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
+    axes.errorbar(at, means, spread, **style)
+
+
+def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
+    """A bar for each number of the runs, which all have as many; each run adds a piece in its colour.  Returns the bars' heights."""
+    heights = np.zeros(len(runs[0]))
+    for run in runs:
+        axes.bar(np.arange(len(run)), run, bottom=heights, width=1.0)
+        heights = heights + run
+    axes.set_xlim(-0.5, len(heights) - 0.5)
+    axes.tick_params(labelsize=7)
+    return heights
+
+
+def _of(groups: Sequence[ArrayLike]) -> tuple[Array, Array, Array]:
     low, high = np.array([interval(one) for one in groups]).T
     return np.array([interquartile_mean(one) for one in groups]), low, high

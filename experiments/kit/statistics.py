@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from mobee.robot.robot import Array, Ints
 RESAMPLES = 2000
 LEVEL = 0.95
 Statistic = Callable[[Array], Array]  # of values along the last axis
+Run = TypeVar("Run")
 
 
 def interquartile_mean(values: ArrayLike) -> float:
@@ -26,6 +28,11 @@ def interquartile_means(values: Array) -> Array:
     cut = values.shape[-1] // 4
     found: Array = ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
     return found
+
+
+def mean_over(runs: Sequence[Run], number: Callable[[Run], float]) -> float:
+    """The interquartile mean of a number of each run."""
+    return interquartile_mean([number(run) for run in runs])
 
 
 def interval(
@@ -79,6 +86,12 @@ def ratio_interval(above: ArrayLike, below: ArrayLike) -> tuple[float, float]:
     return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second))
 
 
+def told_ratio(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
+    """`ratio` and its 95 % interval, as `told` has them."""
+    low, high = ratio_interval(above, below)
+    return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+
+
 def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
     """Whether an interval (low, high) lies within the bounds, or beside them; None where it holds one of them and so does not decide."""
     low, high = span
@@ -109,6 +122,19 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
     groups = [_checked(first), _checked(second)]
     sizes = [len(group) for group in groups]
     return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), np.repeat([0, 1], sizes))
+
+
+def relative_spread(counts: ArrayLike) -> float:
+    """Standard deviation over mean; 0 when all are equal."""
+    given = np.asarray(counts, dtype=np.float64)
+    return float(given.std() / given.mean())
+
+
+def gini(counts: ArrayLike) -> float:
+    """The Gini coefficient of numbers of 0 or more: 0 when all are equal, 1 - 1/n when one has everything."""
+    ordered = np.sort(np.asarray(counts, dtype=np.float64))
+    ranks = np.arange(1, len(ordered) + 1)
+    return float(2.0 * (ranks * ordered).sum() / (len(ordered) * ordered.sum()) - (len(ordered) + 1) / len(ordered))
 
 
 def _checked(values: ArrayLike) -> Array:

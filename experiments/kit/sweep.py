@@ -34,12 +34,13 @@ class Condition(NamedTuple):
     """What the trials with one setting have in common.
 
     `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values.  `cost`: how long a trial takes beside the
-    others, in any unit.
+    others, in any unit.  `seeds`: of its own, whatever the options say; None: those of the options.
     """
 
     name: str
     settings: dict[str, Any]
     cost: float = 1.0
+    seeds: Sequence[int] | None = None
 
 
 Trial = Callable[[dict[str, Any], int], dict[str, Any]]
@@ -89,8 +90,12 @@ class Sweep:
 
     def cells(self, arguments: argparse.Namespace) -> list[Cell]:
         """Every condition with every seed."""
-        seeds = range(arguments.seed, arguments.seed + arguments.seeds)
-        return [Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in seeds]
+        given = range(arguments.seed, arguments.seed + arguments.seeds)
+        return [
+            Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost)
+            for one in self.conditions(arguments)
+            for seed in (given if one.seeds is None else one.seeds)
+        ]
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the trials that the folder does not hold yet."""
@@ -117,6 +122,14 @@ def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[
     cells = sorted(found.values(), key=lambda result: result.cell.seed)
     groups = {value: [one.values for one in cells if one.cell.settings[setting] == value] for value in order}
     return {value: values for value, values in groups.items() if values}
+
+
+def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[CellResult]]:
+    """The finished cells, by seed, under each combination of values of several settings that has some."""
+    groups: dict[tuple[Any, ...], list[CellResult]] = {}
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(result)
+    return groups
 
 
 def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argparse.Namespace) -> None:

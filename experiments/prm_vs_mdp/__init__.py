@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import arm_plant
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.claims import Claim
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.published import arm_plant
 from experiments.prm_vs_mdp.belief import BELIEFS, believed
 from experiments.prm_vs_mdp.figure import draw
 from experiments.prm_vs_mdp.graphs import KINDS, NEIGHBOURS, make_roadmap, with_goals

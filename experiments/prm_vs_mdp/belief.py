@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.arm_poses import arm_clauses, clear, columns
-from experiments.learning.published import robot
+from experiments.kit.arm_learning import arm_clauses, clear, columns, robot
 from experiments.prm_vs_mdp.scene import Scene, world_of
 from mobee import Gains, Model
 from mobee.robot.robot import Array, Clause

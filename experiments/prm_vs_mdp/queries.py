@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.learning.arm_poses import JOINTS, PART
+from experiments.kit.arm_learning import JOINTS, PART
 from experiments.prm_vs_mdp.rivals import Rival
 from experiments.prm_vs_mdp.scene import Scene, plant_of, space
 from mobee.robot.robot import Array, Ints

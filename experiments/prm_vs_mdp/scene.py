@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_plant, arm_space, columns, robot, whole
 from experiments.kit.control_runs import place
-from experiments.learning.arm_poses import JOINTS, PART, columns, whole
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_plant, arm_space, robot
 from mobee import Lattice, Model, OfflinePlant, World, sphere
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints

@@ -23,7 +23,7 @@ import mobee
 from experiments.drawing.camera import axes_named
 from experiments.drawing.filmstrip import Strip, filmstrip
 from experiments.drawing.motion import Motion, recorded
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.reach.telling import selected
 from experiments.reaching.scene import LEARNED, MARKER, PART
 from experiments.reaching.targets import grid, targets_at

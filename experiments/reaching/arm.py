@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 
 import mobee
-from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
-from experiments.learning.published import robot as published_robot
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.kit.arm_learning import robot as published_robot
 from experiments.reaching.peer_belief import PeerBelief
 from experiments.reaching.peer_goals import goals
 from experiments.reaching.scene import LEARNED, MARKER, PART, laws

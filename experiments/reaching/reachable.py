@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from experiments.learning.published import RIGHT, robot
+from experiments.kit.arm_learning import RIGHT, robot
 from experiments.reaching.inverse import nearest_pose
 from experiments.reaching.scene import MARKER, PART
 from experiments.reaching.targets import GOOD, between, grid

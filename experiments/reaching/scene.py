@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from experiments.learning.published import DT, RANK3, RIGHT, arm_space, robot
-from experiments.learning.trial import begin_anywhere, explore
+from experiments.kit.arm_learning import DT, RANK3, RIGHT, arm_space, robot
+from experiments.kit.exploration import begin_anywhere, explore
 from mobee import CuriousAgent, Gains, Lattice, Model, OfflinePlant
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import Aim

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.learning.published import RIGHT, arm_space
+from experiments.kit.arm_learning import RIGHT, arm_space
 from experiments.reaching.toy_kinematics import hands, jacobians, missing, swept
 from mobee import Lattice
 from mobee.errors import InvalidValue

@@ -23,7 +23,7 @@ import numpy as np
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.learning.truth import walk
+from experiments.kit.truth import walk
 from experiments.reach_predictors.learners import LEARNERS
 from experiments.reaching.scene import reach_plant, reach_space
 from experiments.simultaneous.figure import draw

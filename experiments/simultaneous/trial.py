@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.learning.trial import begin_anywhere
+from experiments.kit.exploration import begin_anywhere
 from experiments.reach_predictors.learners import LEARNERS
 from experiments.reaching.scene import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.reaching.targets import grid, targets_at

@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from experiments.learning.published import RIGHT
+from experiments.kit.arm_learning import RIGHT
 from experiments.reaching.arm import arm_belief, arm_plant, body, space, straight_ways, touchable, touchable_targets
 from experiments.reaching.judged_plant import Errors, JudgedPlant
 from experiments.reaching.peer_belief import PeerBelief

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from experiments.claims.ch2_model import flood
+from experiments.claims.ch7_learning import hypercube
 from experiments.kit.run_folder import held
 from experiments.registry import EXPERIMENTS
 from mobee.errors import InvalidValue
@@ -189,10 +190,11 @@ def test_claims_are_told_as_the_page_has_them(capsys):
 
 
 def test_cells_that_fail_fail_the_command_and_are_named(tmp_path, capsys, monkeypatch):
-    def broken(cell):
+    def broken(settings, seed):
         raise ValueError("broken")
 
-    monkeypatch.setattr("experiments.hypercube.work", broken)
+    failing = replace(hypercube.EXPERIMENT, method=replace(hypercube.EXPERIMENT.method, trial=broken))
+    monkeypatch.setattr(hypercube, "EXPERIMENT", failing)
     assert main(["experiment", "run", "hypercube", "--seeds", "1", "--jobs", "1", "--runs", str(tmp_path)]) == 1
     said = capsys.readouterr().err
     assert "g0.9-s0: ValueError: broken" in said and "--resume" in said

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interquartile_mean, interval, ratio_interval, told
+from experiments.kit.statistics import interquartile_mean, interval, ratio_interval, told, told_ratio
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from experiments.learning.published import ARM_NEIGHBOURS, arm_plant, arm_space
-from experiments.learning.trial import begin_anywhere, explore
 from mobee import CuriousAgent
 
 EXPLORERS = ("curious", "least_tried", "random")
@@ -80,10 +80,7 @@ def measured(groups: Groups) -> list[Claim]:
     largest = {explorer: [float(rewards.max()) for rewards in last[explorer]] for explorer in EXPLORERS}
     mean = {explorer: [float(rewards.mean()) for rewards in last[explorer]] for explorer in EXPLORERS}
     others = [ratio_interval(mean["curious"], mean[explorer]) for explorer in EXPLORERS[1:]]
-    against = ", ".join(
-        f"{interquartile_mean(mean['curious']) / interquartile_mean(mean[explorer]):.2f} [{low:.2f}, {high:.2f}] of {explorer}'s"
-        for explorer, (low, high) in zip(EXPLORERS[1:], others, strict=True)
-    )
+    against = ", ".join(f"{told_ratio(mean['curious'], mean[explorer])} of {explorer}'s" for explorer in EXPLORERS[1:])
     return [
         UNIFORM.measured(_each(peak, 1), _is_least(peak)),
         GETS_IT.measured(_each(largest, 4), _is_least(largest)),

@@ -8,7 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.kit.statistics import decides, interquartile_mean, interval, probability_of_improvement, ratio, ratio_interval, told
+from experiments.kit.statistics import (
+    decides,
+    gini,
+    interquartile_mean,
+    interval,
+    mean_over,
+    probability_of_improvement,
+    ratio,
+    ratio_interval,
+    relative_spread,
+    told,
+    told_ratio,
+)
 from mobee.errors import InvalidValue
 
 numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40)
@@ -102,3 +114,19 @@ def test_one_bound_is_enough_to_decide():
 def test_a_mean_is_told_with_its_interval():
     assert told([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
     assert told([321, 320, 320, 320], 0).startswith("320 [320, ")
+
+
+@given(st.lists(st.integers(0, 50), min_size=2, max_size=30).filter(any))
+def test_gini_is_half_the_mean_difference_over_the_mean(counts):
+    given_ = np.array(counts, dtype=float)
+    pairs = np.abs(given_[:, None] - given_).mean()
+    assert gini(counts) == pytest.approx(pairs / (2.0 * given_.mean()), abs=1e-12)
+
+
+def test_equal_counts_have_no_spread():
+    assert gini([4, 4, 4]) == pytest.approx(0.0) and relative_spread([4, 4, 4]) == 0.0
+
+
+def test_a_ratio_is_told_with_its_interval():
+    assert told_ratio([2.0, 2.0], [4.0, 4.0]) == "0.50 [0.50, 0.50]"
+    assert mean_over(["a", "bbb"], len) == 2.0

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.published import arm_space
+from experiments.kit.arm_learning import arm_space
 from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Straight
 from experiments.prm_vs_mdp.roadmap import Roadmap
 from mobee import TransitionModel

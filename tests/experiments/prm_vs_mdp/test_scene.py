@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.learning.arm_poses import whole
+from experiments.kit.arm_learning import whole
 from experiments.prm_vs_mdp.belief import believed
 from experiments.prm_vs_mdp.queries import LIMIT, answer
 from experiments.prm_vs_mdp.rivals import Straight

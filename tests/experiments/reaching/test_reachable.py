@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.learning.published import RIGHT, robot
+from experiments.kit.arm_learning import RIGHT, robot
 from experiments.reaching.inverse import nearest_pose
 from experiments.reaching.reachable import AT_CENTRE, counts, distances, joints_of
 from experiments.reaching.scene import MARKER, PART

@@ -1,0 +1,129 @@
+"""The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
+
+The robot is `icub_2014` under the gains of 2014, at a control period of 20 ms, its motors those of the plant's defaults
+(docs/plant.md).  Motors that do not take part are rigid at home; those of the arms half-way, as the goals of the actions have them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+import mobee
+from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World
+from mobee.robot.robot import Array, Clause, Motor, Robot
+
+ROBOT = "icub_2014"
+DT = 0.02  # s
+TORSO = ("torso_yaw", "torso_roll", "torso_pitch")
+LEFT = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
+RIGHT = tuple("r" + name[1:] for name in LEFT)
+
+HYPERCUBE = (0.25, 0.75)  # 16 states, 64 actions (thesis 7.1)
+RANK3 = (0.25, 0.5, 0.75)  # 81 states, 432 actions to equidistant neighbours, 1296 to the 16 nearest (7.2)
+RANK4 = (0.2, 0.4, 0.6, 0.8)  # 256 states, 1536 actions to equidistant neighbours (7.3)
+STRETCHED = (0.125, 0.375, 0.625, 0.875)
+ARM_NEIGHBOURS, TORSO_NEIGHBOURS = 16, 8  # of the table experiment (7.4)
+
+PART, JOINTS = "left_arm", len(LEFT)  # of the arm that learns alone
+
+Neighbours = int | Literal["equidistant"]
+
+
+@cache
+def robot(free: bool = False) -> Robot:
+    """The published robot, the arms' other motors at home in the middle of their range; `free`: without its cable rows."""
+    loaded = mobee.load_robot(ROBOT)
+    motors = tuple(replace(m, home=float(m.limits.mean())) if _is_idle(m) else m for m in loaded.motor_table)
+    return replace(loaded, motor_table=motors, clauses=() if free else loaded.clauses)
+
+
+def _is_idle(motor: Motor) -> bool:
+    return motor.part.endswith("_arm") and motor.name not in (*LEFT, *RIGHT)
+
+
+def arm_plant(
+    seed: int, free: bool = False, world: World | None = None, gains: Gains | None = None, motors: MotorParameters | None = None
+) -> OfflinePlant:
+    """The four motors of the left arm; `free`: no cable rows, and contacts exert no forces.
+
+    `gains`, `motors`: other than the published ones, for a study of what depends on them.
+    """
+    law = Gains.published_2014() if gains is None else gains
+    return OfflinePlant(Model(robot(free), world), seed, law, motors, DT, contact_forces=not free, active=LEFT)
+
+
+def table_world(ghost: bool = False) -> World:
+    """The table alone, 50 cm thick, top at z = -0.10 m; `ghost`: it exerts no force."""
+    world = mobee.load_world("table")
+    world.remove("ball")
+    if ghost:
+        world.set_role("table", "ghost")
+    return world
+
+
+def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part"] = "tree") -> OfflinePlant:
+    """Torso and both arms, eleven motors, at the table; self-contacts stay when the table is a ghost."""
+    law, moving = Gains.published_2014(), (*TORSO, *LEFT, *RIGHT)
+    return OfflinePlant(Model(robot(), table_world(ghost)), seed, law, dt=DT, propagate=propagate, active=moving)
+
+
+def arm_space(
+    levels: Sequence[float] = RANK3, neighbours: Neighbours = "equidistant", tie_seed: int = 0, joints: Sequence[str] = LEFT
+) -> Lattice:
+    """A lattice over the four joints of an arm."""
+    return Lattice(robot(), joints, levels, neighbours, tie_seed)
+
+
+def torso_space(tie_seed: int = 0) -> Lattice:
+    """27 states with 8 neighbours each."""
+    return Lattice(robot(), TORSO, RANK3, TORSO_NEIGHBOURS, tie_seed)
+
+
+def table_agents(plant: OfflinePlant, explorer: str = "curious", seed: int = 0, tie_seed: int = 0, **settings: Any) -> list[CuriousAgent]:
+    """The torso's, the left and the right arm's agents; both arms have the same graph.  `settings`: more of CuriousAgent."""
+    arms = [arm_space(RANK3, ARM_NEIGHBOURS, tie_seed, joints) for joints in (LEFT, RIGHT)]
+    return [CuriousAgent(space, plant, explorer, seed, **settings) for space in (torso_space(tie_seed), *arms)]
+
+
+def columns() -> slice:
+    """Where the four joints of the left arm are among the robot's motors."""
+    first = robot().parts[PART].start
+    return slice(first, first + JOINTS)
+
+
+def arm_clauses() -> list[Clause]:
+    """The clauses of the left shoulder's cables."""
+    return [clause for clause in robot().clauses if clause.part == PART]
+
+
+@cache
+def least_margin() -> float:
+    """The least distance from a clause at which a pose counts as clear, in units of a.q + b: half the zone in which the law pushes.
+
+    There the force moves a resting arm by some three degrees, a quarter of the distance to the edge of a cell of the rank 3 lattice.
+    """
+    return Gains.published_2014().constraint_width / 2.0
+
+
+def whole(q: Array) -> Array:
+    """Poses of the four joints (..., 4) as poses of the robot (..., n), the other motors at home; rad."""
+    body = robot()
+    poses = np.broadcast_to(body.home, (*q.shape[:-1], len(body.home))).copy()
+    poses[..., columns()] = q
+    return poses
+
+
+def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
+    """In which poses (P, 4) rad no field is in contact and all of the clauses are farther than `least_margin`, (P,)."""
+    poses = whole(q)
+    good = np.ones(len(poses), dtype=bool)
+    good[model.evaluate(poses).table.pose] = False
+    for clause in clauses:
+        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= least_margin()
+    return good

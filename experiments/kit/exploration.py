@@ -1,0 +1,97 @@
+"""Exploration by one agent, or by several at the same time, and the record of their transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mobee import CuriousAgent, OfflinePlant, Plant, Space
+from mobee.errors import MobeeError
+from mobee.robot.robot import Array, Ints
+from mobee.store import Transition
+
+
+def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
+    """Move the part into a random state, as the published runs began; the motion is not observed."""
+    plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
+
+
+def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
+    """Move the part to a random neighbour of its state, unobserved, for that action begins at no sample; returns the state."""
+    state = space.state_of(plant.measure(space.part)[space.columns])
+    goal = int(np.random.default_rng(seed).choice(space.actions(state)))
+    return space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
+
+
+def newest(agent: CuriousAgent) -> Transition:
+    """The last transition of an agent; raises MobeeError if it has none."""
+    if agent.last is None:
+        raise MobeeError(f"the agent of {agent.part} has observed nothing yet: let it make a step first.")
+    return agent.last
+
+
+def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], bool] = lambda agent: False) -> Ints:
+    """Make up to `most` transitions, fewer when `enough` is true of the agent; returns (T, 3): state, action, state reached."""
+    seen: list[tuple[int, int, int]] = []
+    while len(seen) < most and not enough(agent):
+        agent.step()
+        last = newest(agent)
+        seen.append((last.s, last.a, last.s_next))
+    return np.array(seen, dtype=np.int64).reshape(-1, 3)
+
+
+class LeastTries:
+    """Whether every state-action was tried at least `least` times; counts incrementally."""
+
+    def __init__(self, least: int, state_actions: int) -> None:
+        self._least, self._left = least, state_actions
+
+    def __call__(self, agent: CuriousAgent) -> bool:
+        """To be called after every transition."""
+        if agent.last is not None and agent.model.tries[agent.last.s, agent.last.a] == self._least:
+            self._left -= 1
+        return self._left == 0
+
+
+@dataclass(eq=False)
+class Log:
+    """The transitions of one part; `poses` are those of all motors at their ends, (n,) rad."""
+
+    seen: list[tuple[int, int, int]] = field(default_factory=list)
+    settled: list[bool] = field(default_factory=list)
+    durations: list[float] = field(default_factory=list)  # s
+    ends: list[float] = field(default_factory=list)  # s of plant time
+    poses: list[Array] = field(default_factory=list)
+
+    def arrays(self, part: str, count: int) -> dict[str, Any]:
+        """The first `count` transitions without poses, as arrays for a cell; their names end in the part's."""
+        return {
+            f"seen_{part}": np.array(self.seen[:count], dtype=np.uint16),
+            f"settled_{part}": np.array(self.settled[:count], dtype=bool),
+            f"durations_{part}": np.array(self.durations[:count], dtype=np.float32),
+            f"ends_{part}": np.array(self.ends[:count], dtype=np.float64),
+        }
+
+
+def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transitions: int) -> dict[str, Log]:
+    """Act as `mobee.run` does until every agent has made that many transitions; the faster agents go on in the meantime."""
+    logs = {agent.part: Log() for agent in agents}
+    by_part, waiting = {agent.part: agent for agent in agents}, list(agents)
+    while min(len(log.seen) for log in logs.values()) < transitions:
+        for agent in waiting:
+            plant.begin(agent.part, agent.target(agent.decide(agent.state)))
+        waiting = []
+        for part, outcome in plant.advance():
+            agent, log = by_part[part], logs[part]
+            agent.observe(outcome)
+            last = newest(agent)
+            log.seen.append((last.s, last.a, last.s_next))
+            log.settled.append(outcome.settled)
+            log.durations.append(outcome.duration)
+            log.ends.append(plant.time)
+            log.poses.append(np.concatenate([plant.measure(name) for name in plant.robot.parts]))
+            waiting.append(agent)
+    return logs

@@ -1,1 +1,0 @@
-"""What the experiments of the thesis' chapter 7 share."""

@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from experiments.claims.ch7_learning.table_interest import Judged, agreement, at_second_peak, autocorrelation, is_cyclic, second_peak
+from experiments.claims.ch7_learning.table_runs import is_forward, low_goals, near_table
+from experiments.kit.arm_learning import robot
+
+RUNS, WINDOWS, LONGEST = 6, 300, 100
+PERIOD = 30
+
+
+def noise(seed):
+    return np.random.default_rng(seed).normal(size=(RUNS, WINDOWS))
+
+
+def curves(rates):
+    return np.array([autocorrelation(rate, LONGEST) for rate in rates])
+
+
+def waves(periods):
+    """A period of each run, with a phase of its own."""
+    return np.sin(2.0 * np.pi * (np.arange(WINDOWS) / np.array(periods)[:, None] + np.linspace(0.0, 1.0, RUNS)[:, None]))
+
+
+GHOSTS = curves(noise(1))
+
+
+def test_touching_that_comes_and_goes_with_one_period_is_cyclic():
+    found = curves(waves([PERIOD] * RUNS) + noise(0))
+    assert second_peak(found) % PERIOD in (0, 1, PERIOD - 1)
+    assert is_cyclic(found, GHOSTS) is True
+
+
+def test_bouts_that_do_not_return_in_time_are_not():
+    bouts = curves(lfilter([1.0], [1.0, -0.4], noise(0)))
+    assert bouts[:, 1].min() > GHOSTS[:, 1].max()
+    assert is_cyclic(bouts, GHOSTS) is False
+
+
+def test_what_stands_out_at_longer_lags_without_a_second_peak_is_open():
+    assert is_cyclic(curves(lfilter([1.0], [1.0, -0.9], noise(0))), GHOSTS) is None
+
+
+def test_runs_with_a_period_each_have_none_in_common():
+    assert is_cyclic(curves(waves([13, 17, 22, 29, 37, 47]) + noise(0)), GHOSTS) is None
+
+
+def test_a_period_that_the_ghosts_have_too_shows_nothing():
+    waving = waves([PERIOD] * RUNS)
+    assert is_cyclic(curves(waving + noise(0)), curves(waving + noise(1))) is not True
+
+
+def test_a_run_is_judged_where_the_others_have_their_peak():
+    alone = curves(np.concatenate([waves([PERIOD] * RUNS)[:1], waves([PERIOD / 2] * RUNS)[1:]]))
+    here, there = at_second_peak(alone, np.zeros_like(alone))
+    assert here[0] == pytest.approx(alone[0, second_peak(alone[1:])])
+    assert there == [0.0] * RUNS
+
+
+def test_a_trend_is_no_correlation_but_periods_are():
+    steps = np.arange(100)
+    periods = (steps // 10) % 2
+    found = autocorrelation(periods + 0.01 * steps, 10)
+    assert found[0] == pytest.approx(1.0)
+    assert found[1] > 0.7
+    assert found[10] < -0.7
+    assert autocorrelation(steps % 2, 1)[1] < -0.9
+
+
+def test_arms_that_prefer_the_same_agree():
+    tries = np.random.default_rng(0).normal(size=(3, 4))
+    assert agreement(np.array([tries, 2.0 * tries + 1.0])) == pytest.approx(1.0)
+    assert agreement(np.array([tries, -tries])) == pytest.approx(-1.0)
+
+
+def test_precision_and_recall_of_a_ranking():
+    judged = Judged(np.array([[True, False, True, False]]))
+    assert judged.precision.tolist() == pytest.approx([1.0, 0.5, 2 / 3, 0.5])
+    assert judged.recall.tolist() == pytest.approx([0.5, 0.5, 1.0, 1.0])
+    assert (judged.at_all, judged.chance) == (0.5, 0.5)
+
+
+def test_both_arms_of_a_run_are_one_value():
+    judged = Judged(np.array([[True, True, False, False], [False, True, False, True]]))
+    assert (judged.at_all, judged.chance) == (0.75, 0.5)
+    assert judged.precision.tolist() == pytest.approx([0.5, 0.75, 0.5, 0.5])
+    assert judged.recall.tolist() == pytest.approx([0.25, 0.75, 0.75, 1.0])
+
+
+def bent(degrees):
+    q = robot().home.copy()
+    q[robot().motor_index("torso_pitch")] = np.deg2rad(degrees)
+    return q
+
+
+def test_a_hand_is_near_the_table_when_the_torso_is_bent_and_nearer_with_a_larger_margin():
+    poses = np.array([bent(0.0), bent(25.0), bent(70.0)])
+    touching, near = near_table(poses, "left_arm", 0.0), near_table(poses, "left_arm", 0.2)
+    assert not touching[0]
+    assert touching[2]
+    assert near.sum() >= touching.sum()
+    assert is_forward(poses).tolist() == [False, False, True]
+
+
+def test_low_goals_are_the_same_for_both_arms():
+    left, right = low_goals("left_arm"), low_goals("right_arm")
+    assert (left == right).all()
+    assert 20 < left.sum() < 40
