@@ -35,7 +35,7 @@ EXPERIMENTS = {
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.reach",
-    "reach-predictors": "experiments.reach_predictors",
+    "reach-predictors": "experiments.claims.ch8_reaching.reach_predictors",
     "reach-vs-planners": "experiments.reach_vs_planners",
     "replanning": "experiments.replanning",
     "roadmap-from-scratch": "experiments.roadmap_from_scratch",

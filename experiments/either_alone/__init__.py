@@ -26,13 +26,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.either_alone.cases import SCENES, make_cases
 from experiments.either_alone.figure import draw
 from experiments.either_alone.findings import CLAIMS, LAWS, claims, summary
-from experiments.either_alone.trial import WAYS, attempt, trained
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.reaching.arm import LEARNED
+from experiments.kit.reaching.cases import SCENES, WAYS, attempt, make_cases, trained
 from experiments.kit.sweep import run_cells, sweep_arguments
-from experiments.reaching.scene import LEARNED
 
 NAME = "either-alone"
 CLAIM = "a coarse planner with a reactive reach does more than either alone"

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.either_alone.cases import SCENES
 from experiments.either_alone.findings import LAWS, MEASURE, measured
-from experiments.either_alone.trial import WAYS
 from experiments.kit.cells import CellResult
 from experiments.kit.plots import draw_bars, new_figure
+from experiments.kit.reaching.cases import SCENES, WAYS
 from mobee.errors import InvalidValue
 
 COLORS = {"planner": "tab:blue", "reach": "tab:orange", "both": "tab:red"}

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.either_alone.cases import SCENES
-from experiments.either_alone.trial import WAYS
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.reaching.cases import SCENES, WAYS
+from experiments.kit.reaching.targets import GOOD
 from experiments.kit.statistics import interval, told
-from experiments.reaching.targets import GOOD
 from mobee.robot.robot import Array
 
 TOLD = {

@@ -34,12 +34,13 @@ class Condition(NamedTuple):
     """What the trials with one setting have in common.
 
     `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values.  `cost`: how long a trial takes beside the
-    others, in any unit.
+    others, in any unit.  `seeds`: its own, if they are not those of the run.
     """
 
     name: str
     settings: dict[str, Any]
     cost: float = 1.0
+    seeds: tuple[int, ...] = ()
 
 
 Trial = Callable[[dict[str, Any], int], dict[str, Any]]
@@ -55,6 +56,10 @@ def no_options(parser: argparse.ArgumentParser) -> None:
     """Add nothing to what all sweeps have."""
 
 
+def no_requirement() -> None:
+    """Need nothing that may be absent."""
+
+
 @dataclass(frozen=True)
 class Sweep:
     """A method: one trial under each condition with each seed.
@@ -67,6 +72,7 @@ class Sweep:
         plot: their figure, a matplotlib Figure; see experiments.kit.plots.
         seeds: how many there are unless --seeds says otherwise.
         add_options: adds options of its own.
+        require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -75,6 +81,7 @@ class Sweep:
     plot: Callable[[Cells], Any]
     seeds: int = 10
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
+    require: Callable[[], object] = no_requirement
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Options of the sweep."""
@@ -84,10 +91,13 @@ class Sweep:
     def cells(self, arguments: argparse.Namespace) -> list[Cell]:
         """Every condition with every seed."""
         seeds = range(arguments.seed, arguments.seed + arguments.seeds)
-        return [Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in seeds]
+        return [
+            Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in one.seeds or seeds
+        ]
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the trials that the folder does not hold yet."""
+        self.require()
         run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
         return self.findings(load_cells(folder))
 

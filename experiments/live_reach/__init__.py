@@ -11,7 +11,7 @@ reaches a try.  The planner peer (inverse kinematics and RRT-Connect, planned an
 robot, and the true model; the target repels nothing while it moves, for it plans around it.  Besides, 8 targets that move to and fro over
 15 cm at 3 cm/s, and 8 with a ball of 8 cm, in model and simulator, that crosses the hand's way as fast.
 A target can be reached if inverse kinematics finds a pose that holds limits and cables, with the palm within 2 cm of the surface, and in
-which no solid touches anything but the hand the target (experiments/reaching/README.md has which grid it is).  Fresh targets are such.
+which no solid touches anything but the hand the target (experiments/kit/reaching/README.md has which grid it is).  Fresh targets are such.
 Judged by the simulator's joints, not by encoders: where the palm was when the force ended, or the planner held that it was there.
 First motion is measured with ticks of 2 ms: from the tick of the request to the first in which another command is in force.
 """

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from msgspec import Struct, structs
 
+from experiments.kit.reaching.belief import PeerBelief, approach
+from experiments.kit.reaching.targets import grid
 from experiments.live_reach.settings import AIM, GOOD, PART, belief, robot
-from experiments.reaching.peer_belief import PeerBelief
-from experiments.reaching.peer_goals import approach
-from experiments.reaching.targets import grid
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Array

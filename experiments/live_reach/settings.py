@@ -6,8 +6,8 @@ from functools import cache
 from pathlib import Path
 
 from experiments.babbling.modes import WORLD
-from experiments.reaching.peer_belief import PeerBelief
-from experiments.reaching.scene import MARKER, PART
+from experiments.kit.reaching.arm import MARKER, PART
+from experiments.kit.reaching.belief import PeerBelief
 from mobee import Gains, Lattice, Model, MotorParameters, OfflinePlant, World, load_robot, load_world
 from mobee.reach import Aim
 from mobee.robot.robot import Robot

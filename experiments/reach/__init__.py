@@ -10,7 +10,7 @@ Run time: 15 minutes on 2 cores; with 5 seeds, as published, 4.
 The four joints of the right arm under the published law, 81 states and 432 transitions of equidistant neighbours, their outcomes learned
 before by 3000 curious transitions without a target, anew for every seed.  Predictors, strategies and negative rewards as published,
 with the resolutions of docs/reaching.md; distances in units of 1 cm (--scale).  A score is the sum of the rewards of the 27 targets in one
-evaluation.  The targets and what inverse kinematics can reach of them: experiments/reaching/README.md.
+evaluation.  The targets and what inverse kinematics can reach of them: experiments/kit/reaching/README.md.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from typing import Any
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.options import positive_number
+from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
+from experiments.kit.reaching.learning import learn
+from experiments.kit.reaching.targets import grid, targets_at
 from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.reach.figure import draw
 from experiments.reach.findings import CLAIMS, findings
 from experiments.reach.runs import LOOKS, STRATEGIES
-from experiments.reaching.looks import learn
-from experiments.reaching.scene import MARKER, laws, learned_beliefs, reach_plant, reach_space
-from experiments.reaching.targets import grid, targets_at
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
 
@@ -65,7 +65,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """Learn the transitions, then to reach; see `experiments.reaching.looks.learn`."""
+    """Learn the transitions, then to reach; see `experiments.kit.reaching.learning.learn`."""
     settings, plant = cell.settings, reach_plant(cell.seed, cell.settings["law"])
     beliefs = learned_beliefs(plant, cell.seed)
     agent = ReachAgent(reach_space(), plant, beliefs, marker=MARKER, strategy=settings["strategy"], scale=settings["scale"], seed=cell.seed)

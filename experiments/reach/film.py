@@ -23,10 +23,10 @@ import mobee
 from experiments.drawing.camera import axes_named
 from experiments.drawing.filmstrip import Strip, filmstrip
 from experiments.drawing.motion import Motion, recorded
+from experiments.kit.reaching.arm import LEARNED, MARKER, PART
+from experiments.kit.reaching.targets import grid, targets_at
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.reach.telling import selected
-from experiments.reaching.scene import LEARNED, MARKER, PART
-from experiments.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.store import ReachStore

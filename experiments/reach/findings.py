@@ -12,7 +12,7 @@ import numpy as np
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
 from experiments.kit.statistics import decides, interquartile_mean, interval, told
-from experiments.reach.rules import all_hold, better, changes, published_ratio, rises
+from experiments.kit.verdicts import all_hold, better, changes, published_ratio, rises
 from experiments.reach.runs import STRATEGIES, Runs, runs_of
 
 RIVALS = STRATEGIES[1:]

@@ -10,9 +10,9 @@ from experiments.drawing.filmstrip import pictures_of
 from experiments.drawing.picture import Picture
 from experiments.drawing.scene import robot_solids
 from experiments.drawing.solid import Solid, ball
+from experiments.kit.reaching.arm import MARKER, PART, reach_space
+from experiments.kit.reaching.targets import grid
 from experiments.reach.runs import Runs
-from experiments.reaching.scene import MARKER, PART, reach_space
-from experiments.reaching.targets import grid
 from mobee import Model
 
 COUNT = 4

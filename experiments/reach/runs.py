@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import CellResult
-from experiments.reaching.scene import MARKER, reach_space
-from experiments.reaching.targets import grid
+from experiments.kit.reaching.arm import MARKER, reach_space
+from experiments.kit.reaching.targets import grid
 from mobee.learning.reaching.evaluation import NOWHERE
 from mobee.learning.reaching.where import hands_of
 from mobee.robot.robot import Array, Ints

@@ -5,7 +5,7 @@ query planning is too slow to be used online: 10 s for both arms around a table'
 Source: thesis 1.5, 9.3.  Published: BT-RRT's 10 s and 125 s (Perez et al. 2011).  Run time: three minutes on 2 cores.
 
 The right arm of today's robot under the default law; targets (where no joint limit pushes), starts and seeds are the same for both.  The
-learner has 3000 curious transitions and 800 tries behind it and learns nothing here; the peer (experiments/reaching/planner_peer.py)
+learner has 3000 curious transitions and 800 tries behind it and learns nothing here; the peer (experiments/kit/reaching/planner_peer.py)
 knows the robot, its cables and the target's place, plans anew on every change, and is executed through MoBeE.  "noise": encoder noise of
 0.5 degrees, five times the usual; "moving": the target goes to and fro by 5 to 12 cm at 3 cm/s and never rests.  Success: the palm within
 2 cm of the surface; the learner may reach three times, the peer has 20 actions.  Plant time stands still while anybody plans; that is
@@ -27,19 +27,16 @@ from typing import Any
 
 import numpy as np
 
-from experiments.either_alone.cases import Case, make_cases
-from experiments.either_alone.trial import EVERY, Attempt, attempt, begun, trained
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.reaching.arm import LEARNED, PART, JudgedPlant, arm_belief
+from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained
+from experiments.kit.reaching.planner_peer import PlannerPeer
+from experiments.kit.reaching.targets import GOOD
 from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from experiments.reach_vs_planners.figure import draw
 from experiments.reach_vs_planners.findings import CLAIMS, SCENES, claims, summary
 from experiments.reach_vs_planners.two_arms import query
-from experiments.reaching.arm import arm_belief
-from experiments.reaching.judged_plant import JudgedPlant
-from experiments.reaching.planner_peer import PlannerPeer
-from experiments.reaching.scene import LEARNED, PART
-from experiments.reaching.targets import GOOD
 from mobee import MotorParameters
 from mobee.reach import reward_of
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.reaching.targets import GOOD
 from experiments.kit.statistics import decides, interquartile_mean, interval, told
-from experiments.reaching.targets import GOOD
 from mobee.robot.robot import Array
 
 SCENES = ("perfect", "noise", "moving")

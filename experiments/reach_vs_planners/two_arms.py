@@ -11,10 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.control.ride import place
-from experiments.reaching.arm import body
-from experiments.reaching.peer_belief import PeerBelief
-from experiments.reaching.peer_goals import approach
-from experiments.reaching.rrt_connect import rrt_connect, shortened
+from experiments.kit.reaching.arm import body
+from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, shortened
 from mobee import Gains, Model, OfflinePlant, World, box, cylinder
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.live import write_job
+from experiments.kit.walking import launch
 from experiments.replanning.job import Job
 from experiments.replanning.scene import RATE, SIMULATED, SPEED, WORLD
-from experiments.walking.live import launch
 
 MODULE = "experiments.replanning.performer"
 LONGEST = 60.0  # s for a crossing

@@ -10,10 +10,10 @@ import numpy as np
 from experiments.babbling.contacts import read_touches
 from experiments.babbling.measured import CONTACTS, POSITIONS
 from experiments.kit.run_folder import read, write
+from experiments.kit.walking import launch
 from experiments.roadmap_from_scratch.settings import PART, RATE, SPEED, WORLD, offline_plant, robot
 from experiments.roadmap_from_scratch.settings import explorer as made
 from experiments.roadmap_from_scratch.trial import agreement, outcome
-from experiments.walking.live import launch
 from mobee.roadmap.adaptive.map_store import MapStore
 
 MODULE = "experiments.roadmap_from_scratch.performer"

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.reaching.arm import reach_plant, reach_space
+from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.learning.truth import walk
-from experiments.reach_predictors.learners import LEARNERS
-from experiments.reaching.scene import reach_plant, reach_space
 from experiments.simultaneous.figure import draw
 from experiments.simultaneous.findings import CLAIMS, findings
 from experiments.simultaneous.trial import WAYS, trial

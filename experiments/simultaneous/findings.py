@@ -10,10 +10,10 @@ import numpy as np
 
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.reaching.arm import reach_space
 from experiments.kit.statistics import decides, interval, told
 from experiments.learning.model_error import l1
 from experiments.learning.truth import Truth, truth_of
-from experiments.reaching.scene import reach_space
 from experiments.simultaneous.trial import CONTACT, FIRST, WAYS
 from mobee import TransitionModel
 from mobee.robot.robot import Array, Ints

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
+from experiments.kit.reaching.learning import LEARNERS
+from experiments.kit.reaching.targets import grid, targets_at
 from experiments.learning.trial import begin_anywhere
-from experiments.reach_predictors.learners import LEARNERS
-from experiments.reaching.scene import MARKER, learned_beliefs, reach_plant, reach_space
-from experiments.reaching.targets import grid, targets_at
 from experiments.simultaneous.blame import BLAMES, BlamingPlant
 from mobee import TransitionModel
 from mobee.learning.reaching.reach_agent import ReachAgent

@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.cells import Cell, load_cells
+from experiments.kit.reaching.planner_peer import MEMORIES
 from experiments.kit.sweep import run_cells, sweep_arguments
 from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
-from experiments.reaching.planner_peer import MEMORIES
 from experiments.unmodelled.contestants import Contestant, Learner, Planner
 from experiments.unmodelled.figure import draw
 from experiments.unmodelled.findings import CLAIMS, claims, summary

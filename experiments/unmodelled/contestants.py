@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from experiments.reaching.arm import PART, learned_transitions, reach_agent, space
-from experiments.reaching.planner_peer import ENDS, Memory, PeerTry, PlannerPeer
-from experiments.reaching.targets import GOOD
+from experiments.kit.reaching.arm import PART, learned_transitions, reach_agent, space
+from experiments.kit.reaching.planner_peer import ENDS, Memory, PeerTry, PlannerPeer
+from experiments.kit.reaching.targets import GOOD
 from experiments.unmodelled.scene import Scene
 from mobee.learning.reaching.problems import Problems
 from mobee.reach import ReachTarget

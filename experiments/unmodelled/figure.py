@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.kit.cells import CellResult
 from experiments.kit.plots import draw_curve, new_figure
+from experiments.kit.reaching.planner_peer import MEMORIES
 from experiments.kit.statistics import interquartile_mean
-from experiments.reaching.planner_peer import MEMORIES
 from experiments.unmodelled.findings import EQUAL_BY, crossover, success
 from experiments.unmodelled.scene import WRONG
 from mobee.errors import InvalidValue

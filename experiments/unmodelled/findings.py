@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.kit.cells import CellResult
 from experiments.kit.claims import Claim
+from experiments.kit.reaching.planner_peer import MEMORIES
 from experiments.kit.statistics import decides, interval, told
-from experiments.reaching.planner_peer import MEMORIES
 from experiments.unmodelled.contestants import FATES
 from experiments.unmodelled.scene import WRONG
 from mobee.robot.robot import Array

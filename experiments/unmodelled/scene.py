@@ -8,11 +8,10 @@ from itertools import permutations
 
 import numpy as np
 
+from experiments.kit.reaching.arm import Errors, JudgedPlant, arm_belief, arm_plant, body, space, straight_paths
+from experiments.kit.reaching.belief import PeerBelief
+from experiments.kit.reaching.targets import grid, touchable, touchable_targets
 from experiments.learning.published import RIGHT
-from experiments.reaching.arm import arm_belief, arm_plant, body, space, straight_ways, touchable, touchable_targets
-from experiments.reaching.judged_plant import Errors, JudgedPlant
-from experiments.reaching.peer_belief import PeerBelief
-from experiments.reaching.targets import grid
 from mobee import World, sphere
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
@@ -85,7 +84,7 @@ def _ball(rng: np.random.Generator, targets: Array) -> Array:
     low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
     pairs = list(permutations(range(len(space())), 2))
     chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
-    ways = straight_ways(chosen).reshape(-1, len(RIGHT))
+    ways = straight_paths(chosen).reshape(-1, len(RIGHT))
     alone = arm_belief()
     before = 1.0 - alone.sound(ways).reshape(len(chosen), -1).all(axis=1).mean()
     for _ in range(DRAWS):

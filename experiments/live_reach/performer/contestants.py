@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
+from experiments.kit.reaching.learning import Course
+from experiments.kit.reaching.planner_peer import PlannerPeer
 from experiments.live_reach.job import Job
 from experiments.live_reach.performer.hand import Hand
 from experiments.live_reach.performer.mover import OBSTACLE, THING, Mover
 from experiments.live_reach.performer.peer_plant import PeerPlant
 from experiments.live_reach.problems import TARGET_MOVES, Problem
 from experiments.live_reach.settings import AIM, APART, GOOD, MARKER, PART, RATE, REACHES, belief
-from experiments.reaching.course import Course
-from experiments.reaching.planner_peer import PlannerPeer
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.robot.robot import Array

@@ -9,11 +9,11 @@ from pathlib import Path
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
 from experiments.kit.live import append_done, read_job
+from experiments.kit.walking import FeelingPlant
 from experiments.replanning.job import Crossing, Job
 from experiments.replanning.performer.config import Config
 from experiments.replanning.performer.crosser import Crosser
 from experiments.replanning.scene import BALL, LEFT, PART, RIGHT, new_map
-from experiments.walking.feeling import FeelingPlant
 from mobee import ActionInterrupted, load_robot
 from services.common.config import load_config
 from services.common.entry import explained

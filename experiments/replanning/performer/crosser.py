@@ -8,9 +8,9 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Place, SetRole
+from experiments.kit.walking import FeelingPlant
 from experiments.replanning.job import Acted, Crossing
 from experiments.replanning.scene import BALL, LEFT, RATE, RIGHT, ball, new_map
-from experiments.walking.feeling import FeelingPlant
 from mobee import MobeeError, Walker
 from mobee.plant import Outcome
 from mobee.robot.robot import Array

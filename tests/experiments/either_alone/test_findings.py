@@ -3,10 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.either_alone.cases import SCENES
 from experiments.either_alone.findings import CLAIMS, LAWS, better, claims, summary
-from experiments.either_alone.trial import WAYS
 from experiments.kit.cells import Cell
+from experiments.kit.reaching.cases import SCENES, WAYS
 
 
 class Done:

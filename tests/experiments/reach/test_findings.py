@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit.verdicts import all_hold, better
 from experiments.reach.findings import CLAIMS, THOSE, _choices, judged
-from experiments.reach.rules import all_hold, better
 from experiments.reach.runs import LOOKS, Runs
 
 STATES, TARGETS, SEEDS = 81, 27, 8

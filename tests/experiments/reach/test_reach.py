@@ -7,13 +7,13 @@ import pytest
 
 from experiments import reach
 from experiments.kit.cells import Cell
-from experiments.reaching import scene
-from experiments.reaching.scene import reach_plant
+from experiments.kit.reaching import arm
+from experiments.kit.reaching.arm import reach_plant
 
 
 @pytest.fixture
 def short(monkeypatch):
-    monkeypatch.setattr(reach, "learned_beliefs", lambda plant, seed: scene.learned_beliefs(plant, seed, 40))
+    monkeypatch.setattr(reach, "learned_beliefs", lambda plant, seed: arm.learned_beliefs(plant, seed, 40))
     monkeypatch.setattr(reach, "REPETITIONS", 1)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import mobee
 from experiments.kit.cells import Cell
-from experiments.reaching.scene import reach_space
+from experiments.kit.reaching.arm import reach_space
 from experiments.simultaneous.figure import draw
 from experiments.simultaneous.findings import findings
 from experiments.simultaneous.trial import WAYS
