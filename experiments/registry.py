@@ -34,7 +34,7 @@ EXPERIMENTS = {
     "pregrasp": "experiments.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
-    "reach": "experiments.reach",
+    "reach": "experiments.claims.ch8_reaching.reach",
     "reach-predictors": "experiments.claims.ch8_reaching.reach_predictors",
     "reach-vs-planners": "experiments.reach_vs_planners",
     "replanning": "experiments.replanning",

@@ -3,9 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.claims.ch8_reaching import reach
+from experiments.claims.ch8_reaching.reach import THOSE, _choices, measured, plot, trial
+from experiments.claims.ch8_reaching.reach_runs import LOOKS, Runs
+from experiments.kit.reaching import arm
 from experiments.kit.verdicts import all_hold, better
-from experiments.reach.findings import CLAIMS, THOSE, _choices, judged
-from experiments.reach.runs import LOOKS, Runs
+from tests.experiments.finished_cells import Cell, finished
 
 STATES, TARGETS, SEEDS = 81, 27, 8
 
@@ -40,7 +43,7 @@ def runs(**changes):
 
 
 def verdicts(found) -> dict[str, str]:
-    return {claim.text: claim.verdict for claim in judged(found)}
+    return {claim.text: claim.verdict for claim in measured(found)}
 
 
 def verdict_of_favourites(found) -> str:
@@ -69,10 +72,6 @@ def test_the_published_findings_confirm_the_claims():
         assert of(found, words) == "confirmed", words
     for words in ("many more negative", "about twice", "about as long", "less than 10 minutes"):
         assert of(found, words) == "confirmed", words
-
-
-def test_every_claim_is_judged_once():
-    assert sorted(verdicts(runs())) == sorted(claim.text for claim in CLAIMS)
 
 
 def test_a_better_greedy_agent_refutes_them():
@@ -126,3 +125,22 @@ def test_the_agreement_of_runs_is_the_overlap_of_their_choices():
     mine = Runs(tuple(pair), (1.0, 1.0), LOOKS)
     assert mine.agreement(100) == pytest.approx([0.25, 0.25])
     assert mine.favourites(100).tolist() == [1.0, 1.0]
+
+
+def test_the_settings_alone_decide_a_trial(monkeypatch):
+    monkeypatch.setattr(reach, "learned_beliefs", lambda plant, seed: arm.learned_beliefs(plant, seed, 40))
+    monkeypatch.setattr(reach, "REPETITIONS", 1)
+    settings = {"strategy": "intrinsic", "law": "published", "scale": 0.01, "looks": [4]}
+    first, second = trial(settings, 5), trial(settings, 5)
+    assert all(np.array_equal(first[name], second[name]) for name in first)
+    assert first["rewards_grid"].shape == (1, 1, 27) and 0.0 < first["rewards_grid"].sum() < 27.0
+    assert len(set(first["problem"].tolist())) == 4 and (first["duration"] > 2.0).all()
+
+
+def test_a_run_is_drawn(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(reach, "HEIGHT", 40)  # small pictures take no time
+    made = runs()
+    cells = [Cell(f"{name}-s{seed}", seed, {"strategy": name, "looks": list(LOOKS)}) for name in made for seed in range(2)]
+    plot(finished(lambda cell: made[cell.settings["strategy"]].values[cell.seed], cells)).savefig(tmp_path / "reach.png")
+    assert (tmp_path / "reach.png").stat().st_size > 50_000

@@ -1,4 +1,4 @@
-"""What is measured of the runs of a strategy."""
+"""The numbers of the runs of one exploration strategy: scores, choices of states, agreement, coverage and costs."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Runs:
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
     def chosen(self, look: int) -> Array:
-        """From which states the evaluations reached, as shares, (N, S): figures 8.4 to 8.6."""
+        """The share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
         at = self.looks.index(look)
         return np.array([_shares(one["states_grid"][at]) for one in self.values])
 
     def agreement(self, look: int) -> Array:
-        """How much of its choices each run shares with another, on average, (N,), 0 to 1: the overlap of their distributions."""
+        """The mean overlap of each run's choices with those of another run, (N,), 0 to 1."""
         chosen = self.chosen(look)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
         others = max(len(self) - 1, 1)
@@ -49,36 +49,36 @@ class Runs:
         return shared
 
     def favourites(self, look: int) -> Array:
-        """From how many states a run reached in half of its reaches, the most frequent first, (N,)."""
+        """The least number of states that make half of a run's reaches, (N,)."""
         ordered = -np.sort(-self.chosen(look), axis=1)
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, look: int) -> Array:
-        """How much higher than the mean of all states the palm is in the states that it reached from, (N,) m."""
+        """The mean height of the palm in the chosen states above that in all states, (N,) m."""
         heights = palms()[:, 2]
         above: Array = self.chosen(look) @ heights - heights.mean()
         return above
 
     def tried(self, tries: int) -> Array:
-        """Which share of all pairs of a state and a target was tried in the first so many problem-tries, (N,)."""
+        """The share of all pairs of a state and a target that were tried in the first so many problem-tries, (N,)."""
         return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
 
     def exploration(self, tries: int) -> Array:
-        """How often each state was reached from for each target in the first so many problem-tries, mean of the runs, (27, S): fig. 8.7."""
+        """The mean number of reaches by target and state in the first so many problem-tries, (27, S): fig. 8.7."""
         mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
         return mean
 
     def concentration(self, first: int, last: int) -> Array:
-        """Which share of the problem-tries after the first so many reached from the two most frequent states, (N,)."""
+        """The share of the two most frequent states among the reaches of problem-tries `first` to `last`, (N,)."""
         sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
         return np.array([one[:2].sum() / one.sum() for one in sums])
 
     def failures(self) -> Array:
-        """How many negative rewards each run got while it explored, (N,)."""
+        """The number of negative rewards of each run while it explored, (N,)."""
         return np.array([float(one["failures"].sum()) for one in self.values])
 
     def hours(self) -> Array:
-        """How long the robot would have explored, (N,) h."""
+        """The robot's time of exploration, (N,) h."""
         return np.array([float(one["duration"].sum()) / 3600.0 for one in self.values])
 
     def actions(self) -> Array:
@@ -87,7 +87,7 @@ class Runs:
 
 
 def palms() -> Array:
-    """Where the palm is in each state, (S, 3) m."""
+    """The position of the palm in each state, (S, 3) m."""
     return hands_of(reach_space(), MARKER)
 
 

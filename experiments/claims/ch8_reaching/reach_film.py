@@ -1,10 +1,10 @@
 """Selected reaches as a filmstrip (thesis figs. A.1-A.3).
 
-    python -m experiments.reach.film [RUN.sqlite] [--out reach_film.png]
+    python -m experiments.claims.ch8_reaching.reach_film [RUN.sqlite] [--out reach_film.png]
 
 The iCub at its table under the default law, its right arm offline.  RUN: the file of a run that learned to reach, as of a `ReachStore`;
 one that is not there is made, by 3000 curious transitions and 800 problem-tries on the 27 targets of the thesis.  Of 60 reaches for
-targets drawn at random, each from a random state, those are drawn that tell most: from above, far, around the target.
+targets drawn at random, each from a random state, the clearest examples are drawn: from above, far, around the target.
 """
 
 from __future__ import annotations
@@ -26,23 +26,25 @@ from experiments.drawing.motion import Motion, recorded
 from experiments.kit.reaching.arm import LEARNED, MARKER, PART
 from experiments.kit.reaching.targets import grid, targets_at
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, RIGHT
-from experiments.reach.telling import selected
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget
+from mobee.robot.robot import Array
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60
 REACHED = 0.02  # m from the target's surface
 NEAR = 0.002  # m: the hand has arrived
 VIEWS = ("oblique", "left")
+LAST = 0.10  # m: the least distance that a detour is divided by
+LEAST = 0.15  # m: the shortest path that is shown, and the last piece of a path, which may be from above
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Episode:
-    """A reach that succeeded: what was reached for, what was done, and how that looked until the hand was there."""
+    """A reach that succeeded: its target, its actions, and the motion until the hand arrived."""
 
     target: ReachTarget
     done: Try
@@ -94,6 +96,40 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
     return found
 
 
+def selected(paths: Sequence[Array]) -> dict[str, int]:
+    """The number of the clearest example of each kind among paths (T, 3) m, none of them for two kinds."""
+    left = [number for number, path in enumerate(paths) if _length(path) >= LEAST]
+    chosen: dict[str, int] = {}
+    for name, measure in KINDS.items():
+        if left:
+            chosen[name] = left.pop(int(np.argmax([measure(paths[number]) for number in left])))
+    return chosen
+
+
+def _length(path: Array) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def _descent(path: Array) -> float:
+    """The slope of the last piece of a path: 1 vertically down, 0 level."""
+    before = path[np.linalg.norm(path - path[-1], axis=1) >= LAST]
+    if not len(before):
+        return -np.inf
+    return float((before[-1] - path[-1])[2] / np.linalg.norm(before[-1] - path[-1]))
+
+
+def _distance(path: Array) -> float:
+    return float(np.linalg.norm(path[-1] - path[0]))
+
+
+def _detour(path: Array) -> float:
+    """The length over the straight distance."""
+    return _length(path) / max(float(np.linalg.norm(path[-1] - path[0])), LAST)
+
+
+KINDS = {"From above": _descent, "Far": _distance, "Around the target": _detour}
+
+
 def _strip(name: str, one: Episode, marker: str, poses: int) -> Strip:
     """From the view in which the target hides least of the hand that is at it."""
     behind = one.motion.poses[-1].position(marker) - one.target.position
@@ -108,7 +144,7 @@ def _title(name: str, one: Episode) -> str:
 
 def _caption(marker: str, motion: Motion, moment: int) -> str:
     target = motion.objects[moment][TARGET]
-    left = np.linalg.norm(motion.poses[moment].position(marker) - target.position) - target.size[0]
+    left = float(np.linalg.norm(motion.poses[moment].position(marker) - target.position)) - target.size[0]
     return f"{motion.times[moment]:.1f} s, {100 * max(left, 0.0):.0f} cm"
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.reach.film import episodes, learn, main, table_plant
+from experiments.claims.ch8_reaching.reach_film import episodes, learn, main, selected, table_plant
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.reach import TARGET
 
@@ -34,7 +34,7 @@ def test_the_command_draws_what_a_run_has_learned(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("matplotlib")
-    monkeypatch.setattr("experiments.reach.film.EPISODES", 4)
+    monkeypatch.setattr("experiments.claims.ch8_reaching.reach_film.EPISODES", 4)
     main([str(run), "--out", str(tmp_path / "film.png"), "--poses", "2", "--height", "30"])
     assert (tmp_path / "film.png").stat().st_size > 1000
     assert "From above: state" in capsys.readouterr().out
@@ -44,3 +44,20 @@ def test_a_run_that_has_not_learned_to_reach_is_refused(tmp_path: Path) -> None:
     (tmp_path / "none.sqlite").touch()
     with pytest.raises(SystemExit, match=r"none\.sqlite"):
         main([str(tmp_path / "none.sqlite")])
+
+
+STRAIGHT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.3, 0.0], 20)
+FAR = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.5, 0.0], 20)
+ABOVE = np.linspace([-0.2, 0.3, 0.3], [-0.2, 0.3, 0.1], 20)
+TURNING = np.concatenate([STRAIGHT, STRAIGHT[::-1] + [0.0, 0.0, 0.05]])
+SHORT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], 20)
+
+
+def test_each_kind_of_way_is_selected_once() -> None:
+    found = selected([STRAIGHT, SHORT, ABOVE, TURNING, FAR])
+    assert found == {"From above": 2, "Far": 4, "Around the target": 3}
+
+
+def test_of_fewer_ways_than_kinds_each_is_selected_once_and_short_ones_never() -> None:
+    assert selected([SHORT]) == {}
+    assert selected([SHORT, FAR]) == {"From above": 1}
