@@ -17,7 +17,7 @@ EXPERIMENTS = {
     "connectivity": "experiments.connectivity",
     "coverage": "experiments.coverage",
     "decay": "experiments.claims.ch7_learning.decay",
-    "either-alone": "experiments.either_alone",
+    "either-alone": "experiments.claims.ch8_reaching.either_alone",
     "flood": "experiments.flood",
     "graze": "experiments.graze",
     "hypercube": "experiments.hypercube",
