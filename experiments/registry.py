@@ -36,7 +36,7 @@ EXPERIMENTS = {
     "rank4": "experiments.rank4",
     "reach": "experiments.claims.ch8_reaching.reach",
     "reach-predictors": "experiments.claims.ch8_reaching.reach_predictors",
-    "reach-vs-planners": "experiments.reach_vs_planners",
+    "reach-vs-planners": "experiments.claims.ch8_reaching.reach_vs_planners",
     "replanning": "experiments.replanning",
     "roadmap-from-scratch": "experiments.roadmap_from_scratch",
     "sensitivity": "experiments.sensitivity",

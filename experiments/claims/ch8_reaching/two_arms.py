@@ -30,7 +30,7 @@ NEAR = 0.02  # m
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """Whether a way was found, s of processor time to find and to shorten it, corners; and what the palms missed in the end, m."""
+    """The result of a query: whether a path was found, s of processor time to find and to shorten it, its corners, the palms' error [m]."""
 
     found: bool
     seconds: float
@@ -40,7 +40,7 @@ class Query:
 
 
 def query(seed: int) -> Query:
-    """Draw where the hands begin, plan, and go through MoBeE."""
+    """Draw where the hands begin, plan a path, and follow it through MoBeE."""
     rng = np.random.default_rng([seed, 15])
     model = Model(body(), table_and_cup())
     both = _belief(model, tuple(SIDES))
@@ -58,7 +58,7 @@ def query(seed: int) -> Query:
 
 
 def table_and_cup() -> World:
-    """The world."""
+    """The world with the table and the cup."""
     world = World()
     world.add("table", box(0.6, WIDE, 0.5), position=(EDGE - 0.3, 0.0, TOP - 0.25))
     world.add("cup", cylinder(0.03, 0.1), position=CUP)
@@ -75,7 +75,7 @@ def _belief(model: Model, parts: tuple[str, ...]) -> PeerBelief:
 def _beside(part: str, rng: np.random.Generator) -> Array:
     """Poses of an arm (K, 6) rad with the hand beside the table and low."""
     belief = _belief(Model(body()), (part,))
-    q = rng.uniform(*belief.limits.T, (DRAWS, JOINTS))
+    q = rng.uniform(belief.limits[:, 0], belief.limits[:, 1], (DRAWS, JOINTS))
     palm = belief.model.evaluate(belief.whole(q)).position(belief.marker)
     q = q[(SIDES[part] * palm[:, 1] > BESIDE) & (palm[:, 2] < TOP + BELOW)]
     found: Array = q[belief.sound(q)]
@@ -86,7 +86,8 @@ def _at_cup(part: str, rng: np.random.Generator) -> Array:
     """Poses of an arm (K, 6) rad with the palm beside the cup."""
     belief = _belief(Model(body()), (part,))
     grip = CUP + GRIP * (1.0, SIDES[part], 1.0)
-    q, missing = approach(belief, rng.uniform(*belief.limits.T, (256, JOINTS)), grip, 0.0, belief.limits)
+    starts = rng.uniform(belief.limits[:, 0], belief.limits[:, 1], (256, JOINTS))
+    q, missing = approach(belief, starts, grip, 0.0, belief.limits)
     q = q[missing < NEAR / 10.0]
     found: Array = q[belief.sound(q)]
     return found
@@ -103,7 +104,7 @@ def _sound(both: PeerBelief, arms: list[Array], rng: np.random.Generator) -> Arr
 
 
 def _followed(both: PeerBelief, path: Array, seed: int) -> float:
-    """Go along the corners with both arms; what the worse palm misses of where the last corner has it, m."""
+    """Follow the corners with both arms; the larger distance of a palm from its place at the last corner, m."""
     plant = OfflinePlant(Model(body(), table_and_cup()), seed, active=tuple(body().motors[i] for i in both.columns))
     place(plant, both.whole(path[0]))
     for corner in path[1:]:
