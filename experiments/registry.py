@@ -48,7 +48,7 @@ EXPERIMENTS = {
     "trm": "experiments.trm",
     "tune": "experiments.tune",
     "uniformity": "experiments.uniformity",
-    "unmodelled": "experiments.unmodelled",
+    "unmodelled": "experiments.claims.ch8_reaching.unmodelled",
     "urdf-files": "experiments.urdf_files",
     "wall": "experiments.wall",
 }

@@ -1,4 +1,4 @@
-"""What is true of an arm and its workspace, and what its planners do not know of it."""
+"""An arm and its workspace, with the errors and the ball that are hidden from planners, or from everyone (experiment `unmodelled`)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from mobee.reach import ReachTarget
 from mobee.robot.robot import Array
 
 WRONG = ("nothing", "planners", "everyone")
-"""Who is mistaken: nobody; the planners alone; also MoBeE, which pulls where it sees the target by the encoders that it has."""
-SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m by which targets, rad by which joints are not where they are believed
+"""Whose knowledge is wrong: nobody's; the planners' alone; also MoBeE's, which sees the same wrong encoders and targets."""
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad by which targets and joints differ from what is believed
 UNSEEN = "unseen"
-RADIUS = 0.05  # m, of the ball that nobody sees
+RADIUS = 0.05  # m, of the hidden ball
 AWAY = 0.12  # m, from its middle to that of any of the thesis' targets
-LEAST, MOST = 0.08, 0.3  # share of the straight ways between two states that it blocks
+LEAST, MOST = 0.08, 0.3  # share of the straight paths between two states that it blocks
 DRAWS = 400
 
 
@@ -45,18 +45,18 @@ class Scene:
         return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
 
     def belief(self) -> PeerBelief:
-        """What its planners know."""
+        """The belief of its planners."""
         if self.wrong == "nothing":
             return arm_belief(_world(self.ball))
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
 
     def seen(self, target: ReachTarget) -> ReachTarget:
-        """Where its planners believe a target."""
+        """A target where its planners believe it to be."""
         return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
 
 
 def make_scene(seed: int, wrong: str) -> Scene:
-    """A ball in the way of many motions, and errors of the sizes above; the same for all who are `wrong`.
+    """A ball that blocks many motions, and errors of the sizes above; they are the same for every `wrong`.
 
     Targets of `touchable_targets` that cannot be touched beside the ball are left out.
     """
@@ -80,13 +80,13 @@ def _world(ball: Array) -> World:
 
 
 def _ball(rng: np.random.Generator, targets: Array) -> Array:
-    """Where the palm may come, away from the targets and from the robot at home, in the way of some motions."""
+    """A place of the palm, away from the targets and from the robot at home, at which a ball blocks some motions."""
     low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
     pairs = list(permutations(range(len(space())), 2))
     chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
-    ways = straight_paths(chosen).reshape(-1, len(RIGHT))
+    paths = straight_paths(chosen).reshape(-1, len(RIGHT))
     alone = arm_belief()
-    before = 1.0 - alone.sound(ways).reshape(len(chosen), -1).all(axis=1).mean()
+    before = 1.0 - alone.sound(paths).reshape(len(chosen), -1).all(axis=1).mean()
     for _ in range(DRAWS):
         q = rng.uniform(low, high)
         place = alone.model.evaluate(alone.whole(q)).position(alone.marker)
@@ -95,7 +95,7 @@ def _ball(rng: np.random.Generator, targets: Array) -> Array:
         belief = arm_belief(_world(place))
         if len(belief.model.evaluate(body().home).table):
             continue
-        blocked = 1.0 - belief.sound(ways).reshape(len(chosen), -1).all(axis=1).mean()
+        blocked = 1.0 - belief.sound(paths).reshape(len(chosen), -1).all(axis=1).mean()
         if LEAST <= blocked - before <= MOST:
             found: Array = place
             return found
