@@ -42,7 +42,7 @@ EXPERIMENTS = {
     "sensitivity": "experiments.sensitivity",
     "settle": "experiments.settle",
     "shove": "experiments.shove",
-    "simultaneous": "experiments.simultaneous",
+    "simultaneous": "experiments.claims.ch8_reaching.simultaneous",
     "table": "experiments.table",
     "transfer": "experiments.transfer",
     "trm": "experiments.trm",

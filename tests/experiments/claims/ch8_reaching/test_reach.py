@@ -7,7 +7,6 @@ from experiments.claims.ch8_reaching import reach
 from experiments.claims.ch8_reaching.reach import THOSE, _choices, measured, plot, trial
 from experiments.claims.ch8_reaching.reach_runs import LOOKS, Runs
 from experiments.kit.reaching import arm
-from experiments.kit.verdicts import all_hold, better
 from tests.experiments.finished_cells import Cell, finished
 
 STATES, TARGETS, SEEDS = 81, 27, 8
@@ -104,18 +103,6 @@ def test_the_favourites_are_those_of_the_thesis_or_not(first, second, verdict):
     for one in made["intrinsic"].values:
         one["states_grid"][-1] = np.where(one["states_grid"][-1] == 0, first, second)
     assert verdict_of_favourites(made) == verdict
-
-
-def test_the_intervals_decide_whether_one_is_better():
-    many = {"a": np.arange(1.0, 11.0), "b": np.arange(1.0, 11.0) + 0.1, "c": np.arange(10.0) - 20.0}
-    text, found = better(many, "a", ("b", "c"))
-    assert found == [None, True] and "P 1.00" in text
-    assert better(many, "c", ("a",), worse=True)[1] == [True]
-
-
-@pytest.mark.parametrize(("given", "wanted"), [((True, True), True), ((True, None), None), ((None, False), False)])
-def test_all_hold_if_none_is_open_or_fails(given, wanted):
-    assert all_hold(given) is wanted
 
 
 def test_the_agreement_of_runs_is_the_overlap_of_their_choices():
