@@ -31,7 +31,7 @@ EXPERIMENTS = {
     "originals": "experiments.originals",
     "own-robots": "experiments.own_robots",
     "planner": "experiments.planner",
-    "pregrasp": "experiments.pregrasp",
+    "pregrasp": "experiments.claims.ch8_reaching.pregrasp",
     "prm-vs-mdp": "experiments.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.claims.ch8_reaching.reach",
