@@ -32,7 +32,7 @@ EXPERIMENTS = {
     "own-robots": "experiments.own_robots",
     "planner": "experiments.planner",
     "pregrasp": "experiments.claims.ch8_reaching.pregrasp",
-    "prm-vs-mdp": "experiments.prm_vs_mdp",
+    "prm-vs-mdp": "experiments.claims.ch8_reaching.prm_vs_mdp",
     "rank4": "experiments.rank4",
     "reach": "experiments.claims.ch8_reaching.reach",
     "reach-predictors": "experiments.claims.ch8_reaching.reach_predictors",

@@ -39,9 +39,9 @@ from experiments.live_reach.measured import BLOCK, Block, measure, read_block, w
 from experiments.live_reach.problems import fresh_problems, grid_problems, grid_targets, moving_problems, touchable
 from experiments.live_reach.settings import AIM, GOOD, RATE, belief, offline_plant
 from experiments.live_reach.training import TRANSITIONS, train
-from experiments.prm_vs_mdp.ompl_roadmap import require_ompl
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
+from mobee.roadmap.ompl_base import require_ompl
 from mobee.store import STORE
 
 NAME = "live-reach"

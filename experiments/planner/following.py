@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.control.ride import place
+from experiments.kit.rivals import Rival
 from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, clear, whole
 from experiments.planner.table import DOWN, UP, TablePlant
-from experiments.prm_vs_mdp.rivals import Rival
 from mobee import Lattice
 from mobee.errors import MobeeError
 from mobee.learning.planner import Plan, Planner

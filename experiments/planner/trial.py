@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.kit.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_goals
+from experiments.kit.rivals import PlannedOnce, Repaired, Rival
 from experiments.learning.arm_poses import arm_clauses
 from experiments.planner.following import Followed, Frozen, Queries, follow, promises, queries, through, zone
 from experiments.planner.table import DOWN, UP, TablePlant
-from experiments.prm_vs_mdp.belief import Belief
-from experiments.prm_vs_mdp.graphs import NEIGHBOURS, make_roadmap, with_goals
-from experiments.prm_vs_mdp.rivals import PlannedOnce, Repaired, Rival
 from mobee import Lattice
 from mobee.learning.value_iteration import OutcomeModel
 

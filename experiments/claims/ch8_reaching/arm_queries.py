@@ -1,4 +1,4 @@
-"""A robot among balls, what to reach in it, and by how much its planners are mistaken about it."""
+"""Queries of the published arm among balls, how far its planners' beliefs are off, and rivals sent to the goals of the queries."""
 
 from __future__ import annotations
 
@@ -8,20 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.control.ride import place
-from experiments.learning.arm_poses import JOINTS, PART, columns, whole
+from experiments.kit.arm_roadmap import Belief
+from experiments.kit.rivals import Rival
+from experiments.learning.arm_poses import JOINTS, PART, arm_clauses, columns, whole
 from experiments.learning.published import ARM_NEIGHBOURS, RANK3, arm_plant, arm_space, robot
 from mobee import Lattice, Model, OfflinePlant, World, sphere
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Array, Ints
 
+BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
 BALLS, RADIUS = 4, 0.03  # m
-SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m by which a ball, rad by which a joint is not where it is believed
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad by which a ball and a joint differ from what is believed
 MOST_TRIES = 20_000  # of motions among which the queries are found
+LIMIT = 120.0  # s of plant time, for a query
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What is true, what is believed, and Q queries, each from rest at `starts` to the cell of a lattice state."""
+    """The true world, the errors of what is believed, and Q queries, each from rest at `starts` to the cell of a lattice state."""
 
     balls: Array  # (B, 3) m
     shifts: Array  # (B, 3) m, believed minus true places
@@ -52,7 +56,7 @@ def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
 
 
 def make_scene(seed: int, queries: int) -> Scene:
-    """Balls where the hand can come, and queries of which every other one is not reached by going straight, or as many as are found."""
+    """Balls in the workspace, and queries of which half, or as many as are found, are not reached by going straight."""
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)
     shifts = rng.normal(size=balls.shape)
@@ -75,7 +79,7 @@ def _balls(rng: np.random.Generator) -> Array:
 
 
 def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> tuple[Array, Ints, NDArray[np.bool_]]:
-    """Wander straight from sample to sample; what was tried becomes a query, if its goal was ever reached."""
+    """Move straight from sample to sample; a motion that was tried becomes a query, if its goal was ever reached."""
     lattice = space()
     plant = arm_plant(seed, world=world_of(balls))
     free = [s for s in range(len(lattice)) if not len(plant.model.evaluate(whole(lattice.samples[s])).table)]
@@ -108,3 +112,49 @@ def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> t
 
 def _some(rng: np.random.Generator, queries: list[tuple[Array, int, bool]], count: int) -> list[tuple[Array, int, bool]]:
     return [queries[i] for i in rng.permutation(len(queries))[:count]]
+
+
+def believed(scene: Scene, kind: str) -> Belief:
+    """A belief about a scene, of one of the BELIEFS: "true", or with hidden parts.
+
+    Hidden are with "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and joints 3
+    degrees off), "both", "gross" (both, three times as much off).
+    """
+    times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
+    clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+    return Belief(Model(robot(), world_of(scene.balls + times * scene.shifts)), times * scene.turns, clauses)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """The results of Q queries."""
+
+    success: NDArray[np.bool_]  # (Q,)
+    seconds: Array  # (Q,) of plant time, LIMIT where there was no success
+    actions: Ints  # (Q,)
+    repairs: Ints  # (Q,)
+
+
+def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
+    """Send the rival to every goal, in order; the same noise for all rivals."""
+    lattice = space()
+    rows = []
+    for number, goal in enumerate(scene.goals):
+        plant = plant_of(scene, 1000 * seed + number, scene.starts[number])
+        begun, before, actions = plant.time, rival.repairs, 0
+        rival.begin(int(goal))
+        here = plant.measure(PART)[:JOINTS]
+        while lattice.state_of(here) != goal and plant.time - begun < LIMIT:
+            aim = rival.aim(here)
+            if aim is None:
+                break
+            target = lattice.target(int(goal))
+            target[:JOINTS] = aim
+            end = plant.act(PART, target).q[:JOINTS]
+            rival.observe(here, end)
+            here, actions = end, actions + 1
+        success, seconds = lattice.state_of(here) == goal, plant.time - begun
+        success = success and seconds <= LIMIT
+        rows.append((success, seconds if success else LIMIT, actions, rival.repairs - before))
+    success, seconds, actions, repairs = zip(*rows, strict=True)
+    return Answers(np.array(success), np.array(seconds), np.array(actions), np.array(repairs))

@@ -3,11 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.claims.ch8_reaching.arm_queries import LIMIT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
+from experiments.kit.rivals import Straight
 from experiments.learning.arm_poses import whole
-from experiments.prm_vs_mdp.belief import believed
-from experiments.prm_vs_mdp.queries import LIMIT, answer
-from experiments.prm_vs_mdp.rivals import Straight
-from experiments.prm_vs_mdp.scene import SHIFT, TURN, Scene, make_scene, space, world_of
 from mobee import Model, load_robot
 
 

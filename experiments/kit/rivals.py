@@ -1,4 +1,4 @@
-"""Who is sent to the goals: straight there, along a roadmap that is repaired, or by the learned MDP."""
+"""Planners that follow their plans action by action: straight, along a roadmap planned once or repaired, or by a learned MDP."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from experiments.prm_vs_mdp.roadmap import Edge, Roadmap, edge
+from experiments.kit.arm_roadmap import Edge, Roadmap, edge
 from mobee import Lattice, TransitionModel
 from mobee.learning.planner import Planner
 from mobee.robot.robot import Array
@@ -16,10 +16,10 @@ ARRIVED = 0.125  # of every joint's range: half the distance of two samples of t
 
 
 class Rival(Protocol):
-    """Says where to go next, and sees what came of it."""
+    """Chooses the next pose to go to, and observes the outcome."""
 
     repairs: int
-    """How often what it had planned did not happen, so far."""
+    """How often an action did not end as planned, so far."""
 
     def begin(self, goal: int) -> None:
         """A new query, to a state of the lattice."""
@@ -28,7 +28,7 @@ class Rival(Protocol):
         """The pose (4,) rad to go to from here; None: it gives up."""
 
     def observe(self, start: Array, end: Array) -> None:
-        """Where the robot, sent to the last aim, has come from and to."""
+        """The poses (4,) rad from which the robot was sent to the last aim, and in which it ended."""
 
 
 class Straight:
@@ -53,7 +53,7 @@ class Straight:
 
 
 class PlannedOnce:
-    """Plans a way through a roadmap and passes its vertices, wherever the robot really comes to rest: plan first, act later."""
+    """Plans a path through a roadmap and passes its vertices, wherever the robot comes to rest: plan first, act later."""
 
     repairs = 0
 
@@ -70,8 +70,8 @@ class PlannedOnce:
         """See Rival."""
         if self._left is None:
             near = self._roadmap.reachable(q, self._neighbours)
-            way = self._roadmap.way({v: self._roadmap.cost(q, v) for v in near}, self._goal, ())
-            self._left = iter(way or ())
+            path = self._roadmap.path({v: self._roadmap.cost(q, v) for v in near}, self._goal, ())
+            self._left = iter(path or ())
         vertex = next(self._left, None)
         return None if vertex is None else self._roadmap.pose(vertex)
 
@@ -80,13 +80,13 @@ class PlannedOnce:
 
 
 class Repaired:
-    """Follows the cheapest way through a roadmap; a motion that fails is taken out, and the way is planned anew (thesis 4.2).
+    """Follows the cheapest path through a roadmap; a motion that fails is taken out, and the path is planned anew (thesis 4.2).
 
     Args:
         roadmap: which is not changed.
         vertex_of: the vertex of every goal.
         neighbours: to how many near vertices it may return when it has been pushed off the roadmap.
-        remembers: whether what was taken out stays out when a new query begins.
+        remembers: whether the motions taken out stay out when a new query begins.
     """
 
     def __init__(self, roadmap: Roadmap, vertex_of: dict[int, int], neighbours: int, remembers: bool) -> None:
@@ -104,13 +104,13 @@ class Repaired:
 
     def aim(self, q: Array) -> Array | None:
         """See Rival."""
-        way = self._way(q)
-        if not way:  # too much was taken out, for some motions fail but now and then
+        path = self._path(q)
+        if not path:  # too much was taken out, for some motions fail but now and then
             self._out.clear()
-            way = self._way(q)
-        if not way:
+            path = self._path(q)
+        if not path:
             return None
-        self._to = way[0]
+        self._to = path[0]
         return self._roadmap.pose(self._to)
 
     def observe(self, start: Array, end: Array) -> None:
@@ -123,14 +123,14 @@ class Repaired:
         self._at = None
         self.repairs += 1
 
-    def _way(self, q: Array) -> list[int] | None:
+    def _path(self, q: Array) -> list[int] | None:
         """The vertices still to pass; the goal's own is passed again if the robot rests near it and yet not in the goal's cell."""
         roadmap = self._roadmap
         if self._at is not None and self._at != self._goal:
-            way = roadmap.way({self._at: 0.0}, self._goal, self._out)
-            return None if way is None else way[1:]
+            path = roadmap.path({self._at: 0.0}, self._goal, self._out)
+            return None if path is None else path[1:]
         starts = [v for v in roadmap.reachable(q, self._neighbours) if self._edge(q, v) not in self._out]
-        return roadmap.way({v: roadmap.cost(q, v) for v in starts}, self._goal, self._out)
+        return roadmap.path({v: roadmap.cost(q, v) for v in starts}, self._goal, self._out)
 
     def _edge(self, q: Array, vertex: int) -> Edge:
         """The motion from here to a vertex; beside the roadmap, from the vertex that is nearest, which has a negative number then."""
@@ -138,7 +138,7 @@ class Repaired:
 
 
 class Learned:
-    """Follows the plan of a learned transition model, made anew after every action, and goes on learning from what it sees."""
+    """Follows the plan of a learned transition model, made anew after every action, and goes on learning."""
 
     def __init__(self, space: Lattice, model: TransitionModel) -> None:
         self._space, self._model = space, model

@@ -1,13 +1,10 @@
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 import pytest
 
+from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK, EXPERIMENT, measured, summary_of
 from experiments.kit.cells import Cell, load_cells, write_cell
-from experiments.prm_vs_mdp import _claims, add_arguments, cells, figure
-from experiments.prm_vs_mdp.summary import BLOCK, summarise
 from mobee.errors import InvalidValue
 
 HARD = np.tile([True, False], BLOCK)
@@ -32,7 +29,7 @@ def folder(tmp_path):
 
 
 def test_a_row_is_a_rival_under_a_belief_with_all_its_seeds(folder):
-    summary = summarise(load_cells(folder).values())
+    summary = summary_of(load_cells(folder))
     once = summary.row("OMPL, planned once", "both")
     assert (once.success.mean, once.hard.mean, once.seconds.mean, once.price) == (0.5, 0.5, 60.0, 7.0)
     learned = summary.row("MDP, 4000 learned", "")
@@ -42,7 +39,7 @@ def test_a_row_is_a_rival_under_a_belief_with_all_its_seeds(folder):
 
 
 def test_planning_once_fails_and_a_graph_that_is_repaired_does_not(folder):
-    first, second = _claims(summarise(load_cells(folder).values()))
+    first, second = measured(summary_of(load_cells(folder)))
     assert (first.verdict, second.verdict) == ("confirmed", "refuted")
     assert "0.50" in first.ours and "7.0 h" in second.ours
 
@@ -55,29 +52,17 @@ def test_a_roadmap_falls_short_where_it_neither_works_well_nor_as_well_as_the_md
         write_cell(tmp_path, Cell(f"roadmaps-both-s{seed}", seed, {"belief": "both"}), {"hard": all_hard, **both}, 1.0)
         learned = {"hard": all_hard, **rival("MDP, 4000 learned", mdp, 18.0)}
         write_cell(tmp_path, Cell(f"mdp-s{seed}", seed, {"learned": 4000}), learned, 1.0)
-    claims = _claims(summarise(load_cells(tmp_path).values()))
+    claims = measured(summary_of(load_cells(tmp_path)))
     assert [claim.verdict for claim in claims] == [verdict, verdict]
 
 
 def test_a_scene_with_fewer_queries_counts_as_far_as_it_goes(folder):
     few = {key: values[:BLOCK] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
     write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK], **few}, 1.0)
-    curve = summarise(load_cells(folder).values()).row("MDP, 4000 learned", "").curve
+    curve = summary_of(load_cells(folder)).row("MDP, 4000 learned", "").curve
     assert curve[:, 0].tolist() == [19.5, 19.0]
 
 
-def test_the_figure_is_drawn_from_what_is_there(folder, tmp_path):
+def test_the_figure_is_drawn_from_what_is_there(folder):
     pytest.importorskip("matplotlib")
-    assert figure(folder).stat().st_size > 10_000
-    with pytest.raises(InvalidValue, match="no finished cells"):
-        figure(tmp_path / "none")
-
-
-def test_a_quick_run_asks_less_of_the_same_rivals():
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    given = (["--seeds", "2"], ["--seeds", "2", "--quick"])
-    whole, quick = (cells(argparse.Namespace(**vars(parser.parse_args(one)), seed=5)) for one in given)
-    assert [cell.name for cell in whole] == [cell.name for cell in quick] and len({cell.name for cell in whole}) == len(whole) == 18
-    assert {cell.seed for cell in whole} == {5, 6}
-    assert all(a.settings != b.settings for a, b in zip(whole, quick, strict=True))
+    assert EXPERIMENT.method.figure(folder).stat().st_size > 10_000

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit.arm_roadmap import Roadmap
+from experiments.kit.rivals import Learned, PlannedOnce, Repaired, Straight
 from experiments.learning.published import arm_space
-from experiments.prm_vs_mdp.rivals import Learned, PlannedOnce, Repaired, Straight
-from experiments.prm_vs_mdp.roadmap import Roadmap
 from mobee import TransitionModel
 
 A, B, C, D = (np.array([x, y, 0.0, 0.0]) for x, y in ((0.0, 0.0), (0.0, 0.4), (0.3, 0.6), (0.6, 0.4)))
