@@ -39,6 +39,7 @@ LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
 WELL = 0.95  # success, also where going straight fails, of what "works well"
 BLOCK = 20  # queries, of which one point of a curve is the mean
+NUMBERS = ("success", "hard", "seconds", "actions", "repairs")
 
 FAILS = Claim("paper 3.1", "a plan first, act later approach, such as a PRM, does not work well: plans fail at run time", "no number")
 INSUFFICIENT = Claim(
@@ -154,9 +155,8 @@ class Summary:
 
     def table(self) -> list[dict[str, Any]]:
         """For the results, as text."""
-        shown = ("success", "hard", "seconds", "actions", "repairs")
         return [
-            {"rival": row.rival, "belief": row.belief, **{name: str(getattr(row, name)) for name in shown}, "price": round(row.price, 2)}
+            {"rival": row.rival, "belief": row.belief, **{name: str(getattr(row, name)) for name in NUMBERS}, "price": round(row.price, 2)}
             for row in self.rows
         ]
 
@@ -177,9 +177,7 @@ def summary_of(found: Cells) -> Summary:
 
 
 def _row(rival: str, belief: str, measures: dict[str, list[Array]]) -> Row:
-    numbers = {
-        name: Number.of(np.array([a.mean() for a in measures[name]])) for name in ("success", "hard", "seconds", "actions", "repairs")
-    }
+    numbers = {name: Number.of(np.array([values.mean() for values in measures[name]])) for name in NUMBERS}
     seconds = measures["seconds"]  # of each seed; a scene may have fewer queries than were asked for
     firsts = range(0, max(map(len, seconds)), BLOCK)
     blocks = [Number.of(np.array([one[first : first + BLOCK].mean() for one in seconds if len(one) > first])) for first in firsts]
