@@ -24,7 +24,7 @@ EXPERIMENTS = {
     "identify": "experiments.identify",
     "kail": "experiments.kail",
     "lattice": "experiments.lattice",
-    "live-reach": "experiments.live_reach",
+    "live-reach": "experiments.claims.ch8_reaching.live_reach.claim",
     "live-table": "experiments.live_table",
     "nes": "experiments.nes",
     "ngik": "experiments.ngik",

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.claims.ch8_reaching.live_reach.problems import space
 from experiments.kit.reaching.arm import MARKER, reach_space
 from experiments.kit.reaching.learning import Course, learn
 from experiments.kit.reaching.targets import between, grid, targets_at
-from experiments.live_reach.settings import space
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.plant import Outcome
 from tests.experiments.kit.reaching.test_truth import ExactPlant

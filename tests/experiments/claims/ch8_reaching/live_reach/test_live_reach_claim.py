@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from experiments.babbling.contacts import Touch
-from experiments.live_reach.figure import draw
-from experiments.live_reach.findings import CLAIMS, claims, enough, misses, share, table
-from experiments.live_reach.measured import Block, Judged
-from experiments.live_reach.problems import FRESH, GRID
+from experiments.claims.ch8_reaching.live_reach.claim import enough, measured, misses, plot, share, table
+from experiments.claims.ch8_reaching.live_reach.problems import FRESH, GRID
+from experiments.claims.ch8_reaching.live_reach.tries import Block, Judged
 
 KNOWN, LEFT = frozenset(range(20)), frozenset(range(1, 20))
 
@@ -27,13 +26,13 @@ def both(missed: int) -> list[Block]:
 
 
 def verdicts(blocks: list[Block]) -> list[str]:
-    return [claim.verdict for claim in claims(blocks, KNOWN, LEFT)]
+    return [claim.verdict for claim in measured(blocks, KNOWN, LEFT)]
 
 
 def test_shares_are_judged_against_what_can_be_reached() -> None:
     assert verdicts(both(1)) == ["confirmed", "confirmed", "confirmed", "open", "confirmed"]
     assert verdicts(both(8))[:2] == ["refuted", "refuted"]
-    assert all(text in claims(both(1), KNOWN, LEFT)[0].ours for text in ("19 of 20", "of the 19 that", "19 of 19", "of all 27 19 of 27"))
+    assert all(text in measured(both(1), KNOWN, LEFT)[0].ours for text in ("19 of 20", "of the 19 that", "19 of 19", "of all 27 19 of 27"))
 
 
 def test_a_share_below_what_is_wanted_is_open_while_chance_may_have_made_it() -> None:
@@ -44,14 +43,14 @@ def test_a_share_below_what_is_wanted_is_open_while_chance_may_have_made_it() ->
 
 def test_a_deep_contact_of_the_learner_refutes_one_of_the_peer_does_not() -> None:
     touch = Touch("r_hand table", 1, 2, 0.004)
-    assert claims([*both(1), block("refine", [], [touch])], KNOWN, LEFT)[2].verdict == "refuted"
-    assert claims([*both(1), block("peer", [], [touch])], KNOWN, LEFT)[2].verdict == "confirmed"
+    assert measured([*both(1), block("refine", [], [touch])], KNOWN, LEFT)[2].verdict == "refuted"
+    assert measured([*both(1), block("peer", [], [touch])], KNOWN, LEFT)[2].verdict == "confirmed"
 
 
 def test_the_first_motion_is_that_of_the_slowest_reach() -> None:
     quick, slow = (block("first motion", [judged(FRESH, 0, 0.0, 2), judged(FRESH, 1, 0.0, ticks)], rate=500.0) for ticks in (2, 3))
-    assert claims([*both(1), quick], KNOWN, LEFT)[3].verdict == "confirmed"
-    assert claims([*both(1), slow], KNOWN, LEFT)[3].verdict == "refuted"
+    assert measured([*both(1), quick], KNOWN, LEFT)[3].verdict == "confirmed"
+    assert measured([*both(1), slow], KNOWN, LEFT)[3].verdict == "refuted"
 
 
 def test_tables_and_a_figure_come_of_them(tmp_path) -> None:
@@ -59,5 +58,4 @@ def test_tables_and_a_figure_come_of_them(tmp_path) -> None:
     assert [row["targets"] for row in table(blocks, KNOWN)] == 2 * ["20 of the 27", "the 7 others", "fresh"]
     missed = misses(blocks, KNOWN, lambda place: "too far")
     assert [row["why"] for row in missed if row["who"] == "learner"] == 12 * ["too far"]
-    assert draw(blocks, KNOWN, tmp_path / "live.png").exists()
-    assert len(CLAIMS) == len(claims(blocks, KNOWN, LEFT))
+    plot(blocks, KNOWN).savefig(tmp_path / "live.png")

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from experiments.babbling.measured import CONTACTS, POSITIONS
+from experiments.claims.ch8_reaching.live_reach.problems import FRESH, MARKER, PART, Problem, robot
+from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure, read_block, write_block
 from experiments.kit.live import append_done, read_done, read_job, write_job
-from experiments.live_reach.job import Job, Tried
-from experiments.live_reach.measured import measure, read_block, write_block
-from experiments.live_reach.problems import FRESH, Problem
-from experiments.live_reach.settings import MARKER, PART, robot
 from mobee import Model
 from mobee.reach import RADIUS
 

@@ -1,25 +1,43 @@
-"""The performer at work."""
+"""The performer process: it does one job on the live robot, and has the launcher end the system."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
 from bus_schema import keys
 from bus_schema.rpc import Done, Empty
-from experiments.kit.live import append_done
-from experiments.live_reach.job import Job, Tried
-from experiments.live_reach.performer.contestants import Ended, contestant
-from experiments.live_reach.performer.hand import Hand
-from experiments.live_reach.performer.mover import Mover
-from experiments.live_reach.problems import Problem, grid_targets
-from experiments.live_reach.settings import PART, WRIST
-from experiments.live_reach.training import learner
-from mobee import ActionInterrupted
+from experiments.claims.ch8_reaching.live_reach.performer.config import Config
+from experiments.claims.ch8_reaching.live_reach.performer.contestants import Ended, contestant
+from experiments.claims.ch8_reaching.live_reach.performer.hand import Hand, Mover
+from experiments.claims.ch8_reaching.live_reach.problems import RATE, WRIST, Problem, grid_targets, learner
+from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried
+from experiments.kit.live import append_done, read_job
+from experiments.kit.reaching.arm import PART
+from mobee import ActionInterrupted, load_robot
 from mobee.robot.robot import Robot
+from services.common.config import load_config
+from services.common.entry import explained
 from services.common.service import Service
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Do the job, and have the system end."""
+    config = load_config(Config, argv, "experiments.claims.ch8_reaching.live_reach.performer")
+    with explained("experiments.claims.ch8_reaching.live_reach.performer"):
+        robot = load_robot(config.robot)
+        folder = Path(config.run_dir)
+        job = read_job(folder, Job)
+        with Service("performer", config, robot) as service, ExitStack() as stack:
+            mover = None
+            if job.kind == "moving":
+                other = stack.enter_context(Service("mover", config, robot, inbox=service.inbox))
+                mover = Mover(other, 1.0 / RATE)
+                other.ready()
+            perform(service, robot, job, folder, mover)
 
 
 def perform(service: Service, robot: Robot, job: Job, folder: Path, mover: Mover | None) -> None:
@@ -69,3 +87,7 @@ def _tried(hand: Hand, problem: Problem, attempt: Callable[[Problem], Ended]) ->
         why=why,
         there=made.there,
     )
+
+
+if __name__ == "__main__":
+    main()

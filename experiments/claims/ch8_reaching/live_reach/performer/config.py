@@ -1,4 +1,4 @@
-"""What the performer is told."""
+"""The configuration of the performer."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The performer's settings."""
 
     run_dir: str = ""
-    """Folder of its job, and of what came of it."""
+    """Folder of its job and of its record."""

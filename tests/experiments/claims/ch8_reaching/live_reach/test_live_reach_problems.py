@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.live_reach.problems import (
+from experiments.claims.ch8_reaching.live_reach.problems import (
     GRID,
+    MARKER,
     OBSTACLE_MOVES,
     TARGET_MOVES,
+    WRIST,
+    belief,
     fresh_problems,
     grid_problems,
     grid_targets,
     moving_problems,
     touchable,
 )
-from experiments.live_reach.settings import MARKER, WRIST, belief
 
 
 def test_of_the_27_targets_21_can_be_touched_and_no_other_solid_is_in_the_way() -> None:

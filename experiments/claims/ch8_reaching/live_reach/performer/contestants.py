@@ -1,4 +1,4 @@
-"""Who brings the palm to a target: the learner, the planner, or the reach alone."""
+"""The contestants on the live robot: the learner, the planner, and the reach alone, each as a function of a problem."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from functools import partial
 
 import numpy as np
 
+from experiments.claims.ch8_reaching.live_reach.performer.hand import OBSTACLE, THING, Hand, Mover
+from experiments.claims.ch8_reaching.live_reach.problems import AIM, APART, GOOD, RATE, REACHES, TARGET_MOVES, Problem, belief
+from experiments.claims.ch8_reaching.live_reach.tries import Job
+from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.learning import Course
 from experiments.kit.reaching.planner_peer import PlannerPeer
-from experiments.live_reach.job import Job
-from experiments.live_reach.performer.hand import Hand
-from experiments.live_reach.performer.mover import OBSTACLE, THING, Mover
-from experiments.live_reach.performer.peer_plant import PeerPlant
-from experiments.live_reach.problems import TARGET_MOVES, Problem
-from experiments.live_reach.settings import AIM, APART, GOOD, MARKER, PART, RATE, REACHES, belief
+from mobee import Model
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.plant import Outcome
+from mobee.reach import ReachTarget
 from mobee.robot.robot import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How an attempt ended.
+    """The result of an attempt.
 
     `ends`: ticks at which the palm was to be there.  `actions`: how many, reaches included.  `believed`: m that were missing in the end, by
     the encoders.  `thinking`: s of processor time spent on plans.  `first`: ticks from the request of the last reach to the first command
@@ -40,21 +41,21 @@ class Ended:
 
 
 def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem], Ended]:
-    """Who does a job, with all that is needed loaded."""
+    """The contestant of a job, with all that it needs loaded."""
     if job.kind == "peer":
         return partial(planned, hand, job.seed)
     if job.kind in ("learner", "moving"):
         agent = load_reaches(job.store, hand, PART)
         for problem in job.problems:
-            agent.predictor.mean(problem.target.position)  # what a target costs that was never asked about is paid here
+            agent.predictor.mean(problem.target.position)  # the first prediction for a target is slow: it is made before the try
         return partial(learned, hand, agent, job.seed, mover)
     if job.kind == "first motion":
-        hand.look_at_commands()
+        hand.watch_commands()
     return partial(at_once, hand)
 
 
 def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, problem: Problem) -> Ended:
-    """Go to where a reach is expected to bring most, and reach; who missed does so again from elsewhere."""
+    """Go to the state with the highest expected reward, and reach; after a miss, again from another state."""
     where = _present(hand, mover, problem)
     course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), APART)
     ends: list[int] = []
@@ -72,7 +73,7 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 
 
 def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], Array]:
-    """Show the target, and let move what moves; where the target is now, (3,) m."""
+    """Present the target, and start what moves; returns a function of the target's position now, (3,) m."""
     target = problem.target
     if mover is not None and problem.way is not None:
         mover.start(THING if problem.kind == TARGET_MOVES else OBSTACLE, problem.way)
@@ -84,7 +85,7 @@ def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], 
 
 
 def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
-    """Inverse kinematics and RRT-Connect, planned anew whenever something came otherwise."""
+    """Inverse kinematics and RRT-Connect, planned anew after every unexpected outcome."""
     plant = PeerPlant(hand, 1.0 / RATE)
     peer = PlannerPeer(plant, belief(), PART, "none", seed + problem.number)
     made = peer.try_problem(problem.target)
@@ -96,3 +97,41 @@ def at_once(hand: Hand, problem: Problem) -> Ended:
     hand.present(problem.target)
     missing = hand.reach(PART, MARKER).missing
     return Ended([hand.end], 1, missing, first=hand.first)
+
+
+class PeerPlant:
+    """The live arm as the planner peer drives it; the target repels nothing during motions, for the planner has planned around it."""
+
+    def __init__(self, hand: Hand, tick: float) -> None:
+        """`tick`: s."""
+        self.robot, self.ends = hand.robot, list[int]()
+        """Ticks at which the marker was to be at the target."""
+        self._hand, self._model, self._dt = hand, Model(hand.robot), tick
+        self._target: ReachTarget | None = None
+
+    @property
+    def time(self) -> float:
+        """Of the robot, s."""
+        return self._hand.tick * self._dt
+
+    def measure(self, part: str) -> Array:
+        """See Plant."""
+        return self._hand.measure(part)
+
+    def go(self, part: str, target: Array, marker: str) -> Outcome:
+        """See JudgedPlant."""
+        self._hand.present(None)
+        return self._hand.act(part, target)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """See ReachPlant."""
+        self._target = target
+        self._hand.present(target)
+
+    def missing(self, marker: str) -> float:
+        """How far the marker is from the target by the encoders, now; m."""
+        self.ends.append(self._hand.tick)
+        whole = self.robot.home.copy()
+        whole[self.robot.part(PART).slice] = self.measure(PART)
+        target = self._target
+        return np.inf if target is None else target.missing(self._model.evaluate(whole).position(marker))
