@@ -1,6 +1,6 @@
 """A roadmap of the published arm by what a planner believes: sound poses and motions, shortest paths, OMPL's PRM or the lattice.
 
-The left arm of the published robot, four joints; `experiments.kit.rivals` has who follows such a roadmap.
+The left arm of the published robot, four joints; the planners of `experiments.kit.rivals` follow such roadmaps.
 """
 
 from __future__ import annotations

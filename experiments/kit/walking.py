@@ -17,7 +17,7 @@ from services.common.bus_plant import BusPlant
 from services.common.lockstep import Participant
 from services.common.service import Service
 
-PATIENCE = 60.0  # s for a tick of lockstep: a way is looked for in one
+PATIENCE = 60.0  # s for a tick of lockstep: a path is planned within one
 
 _SCENARIO = """# Written by an experiment of thesis 4.3.
 title = "{title}"
@@ -39,7 +39,7 @@ world = "{world}"
 [services.controller]
 speed_scale = {speed:g}
 
-[services.{who}]
+[services.{name}]
 module = "{module}"
 run_dir = "{folder}"
 """
@@ -47,7 +47,7 @@ run_dir = "{folder}"
 
 def launch(
     folder: Path,
-    who: str,
+    name: str,
     module: str,
     *,
     title: str,
@@ -67,9 +67,9 @@ def launch(
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
-    told: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
-    told |= {"rate": rate, "speed": speed, "who": who, "module": module}
-    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **told))
+    values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
+    values |= {"rate": rate, "speed": speed, "name": name, "module": module}
+    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)
 
@@ -80,8 +80,8 @@ APART = 500_000_000  # ns for which an object must not be felt, so that it is to
 class FeelingPlant(BusPlant):
     """A BusPlant whose actions end, not settled, as soon as the model says that the part begins to touch one of some objects.
 
-    In lockstep a second service of the same process, the watcher, takes part in every tick, for a part under way is told of none;
-    it answers a tick when the forces of that tick have been looked at, so what is decided on them falls into that tick.
+    In lockstep a second service of the same process, the watcher, takes part in every tick, for a part in motion is sent none;
+    it answers a tick when the forces of that tick have been processed, so that decisions on them fall into that tick.
 
     Args:
         service, robot, part: see BusPlant.

@@ -31,7 +31,7 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import draw_bars, new_figure
 from experiments.kit.reaching.arm import LEARNED
-from experiments.kit.reaching.cases import SCENES, WAYS, attempt, make_cases, trained
+from experiments.kit.reaching.cases import METHODS, SCENES, attempt, make_cases, trained
 from experiments.kit.reaching.targets import GOOD
 from experiments.kit.statistics import interval, told
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -82,35 +82,35 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train the learner, and let all three attempt the same cases; arrays by "scene|way|measure"."""
+    """Train the learner, and let all three attempt the same cases; arrays by "scene|method|measure"."""
     law = settings["law"]
     agent = trained(seed, settings["transitions"], settings["tries"], law)
     found: dict[str, Any] = {}
     for scene in SCENES:
         cases = make_cases(scene, settings["cases"], seed, law)
-        for way in WAYS:
-            made = [attempt(way, agent, case, 1000 * seed + number, law=law) for number, case in enumerate(cases)]
+        for method in METHODS:
+            made = [attempt(method, agent, case, 1000 * seed + number, law=law) for number, case in enumerate(cases)]
             for measure in ("missing", "seconds", "reward"):
-                found[f"{scene}|{way}|{measure}"] = np.array([getattr(one, measure) for one in made])
+                found[f"{scene}|{method}|{measure}"] = np.array([getattr(one, measure) for one in made])
     return found
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The claims, and a row a law, scene and way."""
+    """The claims, and a row a law, scene and method."""
     groups = grouped(found, "law", LAWS)
     rows = []
-    for law, scene, way in product(groups, SCENES, WAYS):
-        row = {measure: told(means(groups, law, scene, way, measure)) for measure in ("success", "reward")}
-        missing = told([100.0 * float(np.median(values[f"{scene}|{way}|missing"])) for values in groups[law]], 1)
-        seconds = told(means(groups, law, scene, way, "seconds"), 1)
-        rows.append({"law": law, "scene": scene, "who": way, **row, "median missing [cm]": missing, "seconds": seconds})
+    for law, scene, method in product(groups, SCENES, METHODS):
+        row = {measure: told(means(groups, law, scene, method, measure)) for measure in ("success", "reward")}
+        missing = told([100.0 * float(np.median(values[f"{scene}|{method}|missing"])) for values in groups[law]], 1)
+        seconds = told(means(groups, law, scene, method, "seconds"), 1)
+        rows.append({"law": law, "scene": scene, "who": method, **row, "median missing [cm]": missing, "seconds": seconds})
     return {"claims": [claim.record() for claim in measured(groups)], "cases": rows}
 
 
-def means(groups: Groups, law: str, scene: str, way: str, measure: str) -> Array:
+def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Array:
     """The mean over the cases, (seeds,); "success": the palm within 2 cm of the surface."""
     name = "missing" if measure == "success" else measure
-    each = [values[f"{scene}|{way}|{name}"] for values in groups[law]]
+    each = [values[f"{scene}|{method}|{name}"] for values in groups[law]]
     return np.array([(values <= GOOD if measure == "success" else values).mean() for values in each])
 
 
@@ -121,9 +121,11 @@ def measured(groups: Groups) -> list[Claim]:
         if law not in groups:
             claims.append(claim.measured("not measured", None))
             continue
-        each = {way: means(groups, law, scene, way, MEASURE[law]) for way in WAYS}
-        numbers = ", ".join(f"{'both' if way == 'both' else way + ' alone'} {told(values)}" for way, values in each.items())
-        claims.append(claim.measured(f"{MEASURE[law]} {numbers}", does_more(each["both"], {way: each[way] for way in WAYS[:2]})))
+        each = {method: means(groups, law, scene, method, MEASURE[law]) for method in METHODS}
+        numbers = ", ".join(f"{'both' if method == 'both' else method + ' alone'} {told(values)}" for method, values in each.items())
+        claims.append(
+            claim.measured(f"{MEASURE[law]} {numbers}", does_more(each["both"], {method: each[method] for method in METHODS[:2]}))
+        )
     return claims
 
 
@@ -142,9 +144,9 @@ def plot(found: Cells) -> Any:
         raise InvalidValue("the run lacks finished cells: go on with --resume.")
     drawing = new_figure(14.0, 4.4)
     for axes, law in zip(drawing.subplots(1, len(LAWS)), LAWS, strict=True):
-        for number, way in enumerate(WAYS):
-            values = [means(groups, law, scene, way, MEASURE[law]) for scene in SCENES]
-            draw_bars(axes, np.arange(len(SCENES)) + 0.26 * (number - 1), values, 0.24, COLORS[way], LABELS[way])
+        for number, method in enumerate(METHODS):
+            values = [means(groups, law, scene, method, MEASURE[law]) for scene in SCENES]
+            draw_bars(axes, np.arange(len(SCENES)) + 0.26 * (number - 1), values, 0.24, COLORS[method], LABELS[method])
         axes.set_xticks(range(len(SCENES)), [TITLES[scene] for scene in SCENES])
         axes.set(title=f"{law} law", ylabel=LABEL_OF[MEASURE[law]], ylim=(0.0, None))
         axes.grid(alpha=0.2, axis="y")

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch8_reaching.reach_runs import LOOKS, STRATEGIES, Runs, runs_of
+from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, STRATEGIES, Runs, runs_of
 from experiments.drawing.filmstrip import pictures_of
 from experiments.drawing.picture import Picture
 from experiments.drawing.scene import robot_solids
@@ -53,12 +53,12 @@ MINUTES, CORES, RUNS = 10.0, 2, 5
 
 _SCORES, _CHOICES = "thesis 8.4.1, fig. 8.2", "thesis 8.4.2, figs. 8.4-8.6"
 BETTER = {
-    look: Claim(
+    checkpoint: Claim(
         _SCORES,
-        f"after {look} problem-tries intrinsic motivation has made a more competent agent than greedy and random exploration",
+        f"after {checkpoint} problem-tries intrinsic motivation has made a more competent agent than greedy and random exploration",
         "significantly more competent after about 800",
     )
-    for look in JUDGED
+    for checkpoint in JUDGED
 }
 WEAK = Claim(_SCORES, "the intrinsically motivated agent is less competent than the others after 100 problem-tries", "figure only")
 STEADY = Claim(_SCORES, "it improves steadily, from 100 to 3200 problem-tries", "figure only")
@@ -119,7 +119,7 @@ CLAIMS = (
 COLORS = {"intrinsic": "tab:red", "greedy": "tab:blue", "random": "0.4"}
 TITLES = {"intrinsic": "intrinsic motivation", "greedy": "greedy, optimistic", "random": "random"}
 STACKED = 5  # runs whose choices are drawn on top of each other, as published
-SHOWN = (0.0, 0.5, 1.0)  # which looks, as shares of their number
+SHOWN = (0.0, 0.5, 1.0)  # which checkpoints, as shares of their number
 
 FAVOURITES = 4  # poses that are drawn
 HEIGHT = 400  # pixels
@@ -138,7 +138,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Every strategy; --quick: 400 problem-tries."""
-    shared = {"law": arguments.law, "scale": arguments.scale, "looks": list(LOOKS[:3] if arguments.quick else LOOKS)}
+    shared = {"law": arguments.law, "scale": arguments.scale, "looks": list(CHECKPOINTS[:3] if arguments.quick else CHECKPOINTS)}
     return [Condition(strategy, {"strategy": strategy, **shared}, COST.get(strategy, 1.0)) for strategy in STRATEGIES]
 
 
@@ -162,20 +162,20 @@ def findings(found: Cells) -> dict[str, Any]:
 
 def measured(runs: Mapping[str, Runs]) -> list[Claim]:
     """The claims with our numbers."""
-    looks = runs["intrinsic"].looks
-    if looks[-1] < JUDGED[-1]:
+    checkpoints = runs["intrinsic"].checkpoints
+    if checkpoints[-1] < JUDGED[-1]:
         return list(CLAIMS)
     return [*_scores(runs), *_choices(runs), *_exploration(runs), *_costs(runs)]
 
 
 def _row(mine: Runs) -> dict[str, Any]:
-    last = mine.looks[-1]
+    last = mine.checkpoints[-1]
     return {
         "seeds": len(mine),
-        "scores": {str(look): told(mine.scores(look)) for look in mine.looks},
-        "agreement": {str(look): told(mine.agreement(look)) for look in mine.looks},
-        "states_of_half_the_reaches": {str(look): told(mine.favourites(look), 1) for look in mine.looks},
-        "pairs_tried": {str(look): told(mine.tried(look)) for look in mine.looks},
+        "scores": {str(checkpoint): told(mine.scores(checkpoint)) for checkpoint in mine.checkpoints},
+        "agreement": {str(checkpoint): told(mine.agreement(checkpoint)) for checkpoint in mine.checkpoints},
+        "states_of_half_the_reaches": {str(checkpoint): told(mine.favourites(checkpoint), 1) for checkpoint in mine.checkpoints},
+        "pairs_tried": {str(checkpoint): told(mine.tried(checkpoint)) for checkpoint in mine.checkpoints},
         "favourites": np.argsort(-mine.chosen(last).mean(axis=0))[:5].tolist(),
         "negative_rewards": told(mine.failures(), 0),
         "actions_a_try": told(mine.actions()),
@@ -185,17 +185,20 @@ def _row(mine: Runs) -> dict[str, Any]:
 
 
 def _scores(runs: Mapping[str, Runs]) -> list[Claim]:
-    def each(look: int) -> dict[str, Any]:
-        return {name: mine.scores(look) for name, mine in runs.items()}
+    def each(checkpoint: int) -> dict[str, Any]:
+        return {name: mine.scores(checkpoint) for name, mine in runs.items()}
 
     found = []
-    for look, claim in BETTER.items():
-        text, verdicts = better(each(look), "intrinsic", RIVALS)
+    for checkpoint, claim in BETTER.items():
+        text, verdicts = better(each(checkpoint), "intrinsic", RIVALS)
         found.append(claim.measured(text, all_hold(verdicts)))
     text, verdicts = better(each(100), "intrinsic", RIVALS, worse=True)
     found.append(WEAK.measured(text, all_hold(verdicts)))
     mine, random = runs["intrinsic"], runs["random"]
-    steps = [mine.scores(later) - mine.scores(sooner) for sooner, later in pairwise(look for look in mine.looks if look <= 3200)]
+    steps = [
+        mine.scores(later) - mine.scores(sooner)
+        for sooner, later in pairwise(checkpoint for checkpoint in mine.checkpoints if checkpoint <= 3200)
+    ]
     whole = mine.scores(3200) - mine.scores(100)
     falls = [rises(step) is False for step in steps]
     text = f"{changes(mine.scores(100), mine.scores(3200))}; significant falls between looks: {sum(falls)}"
@@ -269,11 +272,11 @@ def plot(found: Cells) -> Any:
     _draw_costs(costs, runs)
     _draw_failures(fails, runs)
     for row, (name, mine) in zip(middle.subplots(len(runs), 5, squeeze=False), runs.items(), strict=True):
-        looks = [mine.looks[round(share * (len(mine.looks) - 1))] for share in SHOWN]
-        for axes, look in zip(row[:3], looks, strict=True):
-            _draw_choices(axes, mine, look, f"{TITLES[name]}, {look}")
-        for axes, look in zip(row[3:], looks[1:], strict=True):
-            _draw_tries(axes, mine, look, f"{TITLES[name]}, {look}")
+        checkpoints = [mine.checkpoints[round(share * (len(mine.checkpoints) - 1))] for share in SHOWN]
+        for axes, checkpoint in zip(row[:3], checkpoints, strict=True):
+            _draw_choices(axes, mine, checkpoint, f"{TITLES[name]}, {checkpoint}")
+        for axes, checkpoint in zip(row[3:], checkpoints[1:], strict=True):
+            _draw_tries(axes, mine, checkpoint, f"{TITLES[name]}, {checkpoint}")
     _draw_poses(below, runs[next(iter(runs))])
     return drawing
 
@@ -281,15 +284,15 @@ def plot(found: Cells) -> Any:
 def _draw_scores(axes: Any, runs: Mapping[str, Runs]) -> None:
     """Interquartile mean and interval over the runs, and each run as a dot (fig. 8.2)."""
     for shift, (name, mine) in zip((0.97, 1.0, 1.03), runs.items(), strict=False):
-        scores = np.array([mine.scores(look) for look in mine.looks])
-        at = shift * np.array(mine.looks)
+        scores = np.array([mine.scores(checkpoint) for checkpoint in mine.checkpoints])
+        at = shift * np.array(mine.checkpoints)
         middle, spans = [interquartile_mean(one) for one in scores], np.array([interval(one) for one in scores]).T
         axes.plot(at, middle, color=COLORS[name], label=f"{TITLES[name]} ({len(mine)})")
         axes.fill_between(at, *spans, color=COLORS[name], alpha=0.15, linewidth=0.0)
         axes.plot(at, scores, ".", color=COLORS[name], markersize=3.0, alpha=0.4)
     axes.set(xscale="log", xlabel="problem-tries", ylabel="cumulative reward, 27 targets", ylim=(0.0, None), title="fig. 8.2: competence")
-    looks = next(iter(runs.values())).looks
-    axes.set_xticks(looks, looks)
+    checkpoints = next(iter(runs.values())).checkpoints
+    axes.set_xticks(checkpoints, checkpoints)
     axes.minorticks_off()
     axes.legend(fontsize=8)
     axes.grid(alpha=0.2)
@@ -318,9 +321,9 @@ def _draw_failures(axes: Any, runs: Mapping[str, Runs]) -> None:
     axes.legend(fontsize=8, loc="upper center")
 
 
-def _draw_choices(axes: Any, mine: Runs, look: int, title: str) -> None:
+def _draw_choices(axes: Any, mine: Runs, checkpoint: int, title: str) -> None:
     """From where the first runs reached when evaluated, stacked (figs. 8.4 to 8.6)."""
-    chosen = mine.chosen(look)[:STACKED]
+    chosen = mine.chosen(checkpoint)[:STACKED]
     floor = np.zeros(chosen.shape[1])
     for number, one in enumerate(chosen):
         axes.stairs(floor + one, np.arange(len(one) + 1) - 0.5, baseline=floor, fill=True, color=f"C{number}")
@@ -329,17 +332,17 @@ def _draw_choices(axes: Any, mine: Runs, look: int, title: str) -> None:
     axes.set_xlabel("state reached from", fontsize=8)
 
 
-def _draw_tries(axes: Any, mine: Runs, look: int, title: str) -> None:
+def _draw_tries(axes: Any, mine: Runs, checkpoint: int, title: str) -> None:
     """How often each state was reached from for each target (fig. 8.7)."""
-    axes.imshow(np.log1p(mine.exploration(look)), aspect="auto", cmap="viridis", interpolation="nearest")
+    axes.imshow(np.log1p(mine.exploration(checkpoint)), aspect="auto", cmap="viridis", interpolation="nearest")
     axes.set_title(f"tries: {title}", fontsize=9)
     axes.set_xlabel("state", fontsize=8)
     axes.set_ylabel("target", fontsize=8)
 
 
 def _draw_poses(drawing: Any, mine: Runs) -> None:
-    """The favourites at the last look, by how often they were chosen; seen from the front and the robot's right."""
-    share = mine.chosen(mine.looks[-1]).mean(axis=0)
+    """The favourites at the last checkpoint, by how often they were chosen; seen from the front and the robot's right."""
+    share = mine.chosen(mine.checkpoints[-1]).mean(axis=0)
     states = np.argsort(-share)[:FAVOURITES].tolist()
     for axes, state, picture in zip(drawing.subplots(1, FAVOURITES), states, _pictures(states), strict=True):
         axes.imshow(picture)

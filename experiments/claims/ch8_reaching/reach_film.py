@@ -166,7 +166,9 @@ def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]
 def main(argv: Sequence[str] | None = None) -> None:
     """Learn if need be, and draw."""
     parser = argparse.ArgumentParser(description="Draw selected reaches of what was learned.")
-    parser.add_argument("run", nargs="?", type=Path, metavar="RUN.sqlite", help="who learned; made if not there (default: made, not kept)")
+    parser.add_argument(
+        "run", nargs="?", type=Path, metavar="RUN.sqlite", help="the record of a learner; made if not there (default: made, not kept)"
+    )
     parser.add_argument("--out", type=Path, default=Path("reach_film.png"), metavar="PNG", help="default: %(default)s")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the states and targets (default: %(default)s)")
     parser.add_argument("--poses", type=int, default=6, metavar="N", help="pictures of each reach (default: %(default)s)")

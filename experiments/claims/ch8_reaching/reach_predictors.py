@@ -1,4 +1,4 @@
-"""Predictors of reach rewards: how near do they come to one who knows the truth, and after how many problem-tries?
+"""Predictors of reach rewards: how near do they come to an oracle, and after how many problem-tries?
 
 Claim: a predictor that shares what it learns over poses and targets brings at least .80 of an oracle's score after 200 problem-tries, .90
 after 400 and .97 after 1600, and .80 on targets never tried after 800; the published one brings much less.
@@ -40,7 +40,7 @@ from mobee.robot.robot import Array
 ORACLE, TRUTH = "oracle", "truth"
 RECOMMENDED = "gp-ucb-alike"  # by docs/reaching.md
 PUBLISHED = "published"
-LOOKS = (100, 200, 400, 800, 1600)  # problem-tries after which everybody is evaluated
+CHECKPOINTS = (100, 200, 400, 800, 1600)  # problem-tries after which everybody is evaluated
 REPETITIONS = 5
 
 GRID, BETWEEN = "grid", "between"
@@ -48,12 +48,12 @@ AIMS = {(GRID, 200): 0.80, (GRID, 400): 0.90, (GRID, 1600): 0.97, (BETWEEN, 800)
 TIMES = 2.0  # the published predictor's score
 _SETS = {GRID: "on the 27 targets", BETWEEN: "on 8 targets never tried"}
 AIMED = {
-    (name, look): Claim(
+    (name, checkpoint): Claim(
         "aim of this reproduction",
-        f"the recommended predictor reaches at least {least:.2f} of the oracle's score after {look} problem-tries {_SETS[name]}",
+        f"the recommended predictor reaches at least {least:.2f} of the oracle's score after {checkpoint} problem-tries {_SETS[name]}",
         f"at least {least:.2f}",
     )
-    for (name, look), least in AIMS.items()
+    for (name, checkpoint), least in AIMS.items()
 }
 ABOVE = Claim(
     "thesis 8.5",
@@ -65,7 +65,7 @@ CLAIMS = (*AIMED.values(), ABOVE)
 TITLES = {GRID: "the 27 targets", BETWEEN: "8 targets never tried"}
 
 Found = Mapping[str, CellResult]
-Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, looks)
+Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, checkpoints)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,9 +98,9 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
     """The oracle and every learner with every seed; --quick: 200 problem-tries."""
     settings: dict[str, Any] = {"law": arguments.law, "scale": arguments.scale, "quick": arguments.quick}
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
-    looks = [100, 200] if arguments.quick else list(LOOKS)
+    checkpoints = [100, 200] if arguments.quick else list(CHECKPOINTS)
     learners = [
-        Cell(f"{name}-s{seed}", seed, settings | {"what": name, "looks": looks}, LEARNERS[name].cost)
+        Cell(f"{name}-s{seed}", seed, settings | {"what": name, "looks": checkpoints}, LEARNERS[name].cost)
         for name in arguments.only or LEARNERS
         for seed in seeds
     ]
@@ -176,7 +176,7 @@ def findings(found: Found) -> dict[str, Any]:
     """A row a learner and set, and the claims."""
     curves, at = fractions(found), evaluated_after(found)
     rows = {
-        f"{learner}, {_SETS[name]}": {str(look): told(column) for look, column in zip(at, curve.T, strict=True)}
+        f"{learner}, {_SETS[name]}": {str(checkpoint): told(column) for checkpoint, column in zip(at, curve.T, strict=True)}
         for (learner, name), curve in curves.items()
     }
     best = {_SETS[name]: told(oracle_scores(found, name)) for name in (GRID, BETWEEN) if len(oracle_scores(found, name))}
@@ -195,13 +195,13 @@ def findings(found: Found) -> dict[str, Any]:
 def measured(curves: Fractions, at: list[int]) -> list[Claim]:
     """The claims with our numbers; open where the learner or the evaluation is missing."""
     claims = []
-    for (name, look), claim in AIMED.items():
-        ours, published = (_column(curves, at, learner, name, look) for learner in (RECOMMENDED, PUBLISHED))
+    for (name, checkpoint), claim in AIMED.items():
+        ours, published = (_column(curves, at, learner, name, checkpoint) for learner in (RECOMMENDED, PUBLISHED))
         if ours is None:
             claims.append(claim)
             continue
         beside = "" if published is None else f"; the published predictor {told(published)}"
-        claims.append(claim.measured(f"{RECOMMENDED} {told(ours)}{beside}", decides(interval(ours), least=AIMS[name, look])))
+        claims.append(claim.measured(f"{RECOMMENDED} {told(ours)}{beside}", decides(interval(ours), least=AIMS[name, checkpoint])))
     ours, published = (_column(curves, at, learner, GRID, 400) for learner in (RECOMMENDED, PUBLISHED))
     if ours is None or published is None:
         return [*claims, ABOVE]
@@ -210,8 +210,8 @@ def measured(curves: Fractions, at: list[int]) -> list[Claim]:
     return [*claims, ABOVE.measured(text, decides((low, high), least=TIMES))]
 
 
-def _column(curves: Fractions, at: list[int], learner: str, name: str, look: int) -> Array | None:
-    return curves[learner, name][:, at.index(look)] if (learner, name) in curves and look in at else None
+def _column(curves: Fractions, at: list[int], learner: str, name: str, checkpoint: int) -> Array | None:
+    return curves[learner, name][:, at.index(checkpoint)] if (learner, name) in curves and checkpoint in at else None
 
 
 def plot(found: Found) -> Any:
@@ -224,7 +224,7 @@ def plot(found: Found) -> Any:
         for number, learner in enumerate(LEARNERS):
             if (learner, name) in curves:
                 _curve(axes, at, curves[learner, name], learner, f"C{number % 10}", "--" if number >= 10 else "-")
-        wanted = [(look, least) for (other, look), least in AIMS.items() if other == name]
+        wanted = [(checkpoint, least) for (other, checkpoint), least in AIMS.items() if other == name]
         axes.plot(*zip(*wanted, strict=True), "kx", markersize=9.0, label="aims")
         axes.axhline(1.0, color="k", linestyle=":", linewidth=0.8)
         axes.set(xscale="log", xlabel="problem-tries", title=title, ylim=(0.0, None))

@@ -16,7 +16,7 @@ from mobee.learning.reaching.where import hands_of
 from mobee.robot.robot import Array, Ints
 
 STRATEGIES = ("intrinsic", "greedy", "random")
-LOOKS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated
+CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,38 +25,38 @@ class Runs:
 
     values: tuple[Mapping[str, Any], ...]
     seconds: tuple[float, ...]
-    looks: tuple[int, ...]
+    checkpoints: tuple[int, ...]
 
     def __len__(self) -> int:
         return len(self.values)
 
-    def scores(self, look: int) -> Array:
+    def scores(self, checkpoint: int) -> Array:
         """The cumulative reward over the targets, mean of the evaluations, (N,): what figure 8.2 stacks."""
-        at = self.looks.index(look)
+        at = self.checkpoints.index(checkpoint)
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
-    def chosen(self, look: int) -> Array:
+    def chosen(self, checkpoint: int) -> Array:
         """The share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
-        at = self.looks.index(look)
+        at = self.checkpoints.index(checkpoint)
         return np.array([_shares(one["states_grid"][at]) for one in self.values])
 
-    def agreement(self, look: int) -> Array:
+    def agreement(self, checkpoint: int) -> Array:
         """The mean overlap of each run's choices with those of another run, (N,), 0 to 1."""
-        chosen = self.chosen(look)
+        chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
         others = max(len(self) - 1, 1)
         shared: Array = (overlaps.sum(axis=1) - overlaps.diagonal()) / others
         return shared
 
-    def favourites(self, look: int) -> Array:
+    def favourites(self, checkpoint: int) -> Array:
         """The least number of states that make half of a run's reaches, (N,)."""
-        ordered = -np.sort(-self.chosen(look), axis=1)
+        ordered = -np.sort(-self.chosen(checkpoint), axis=1)
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
-    def height(self, look: int) -> Array:
+    def height(self, checkpoint: int) -> Array:
         """The mean height of the palm in the chosen states above that in all states, (N,) m."""
         heights = palms()[:, 2]
-        above: Array = self.chosen(look) @ heights - heights.mean()
+        above: Array = self.chosen(checkpoint) @ heights - heights.mean()
         return above
 
     def tried(self, tries: int) -> Array:
@@ -98,8 +98,8 @@ def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
     for strategy in STRATEGIES:
         mine = [result for result in ordered if result.cell.settings["strategy"] == strategy]
         if mine:
-            looks = tuple(mine[0].cell.settings["looks"])
-            runs[strategy] = Runs(tuple(one.values for one in mine), tuple(one.seconds for one in mine), looks)
+            checkpoints = tuple(mine[0].cell.settings["looks"])
+            runs[strategy] = Runs(tuple(one.values for one in mine), tuple(one.seconds for one in mine), checkpoints)
     return runs
 
 

@@ -45,7 +45,7 @@ from mobee.robot.robot import Array
 TRIES, CASES, QUERIES = 800, 40, 20
 NOISE = np.deg2rad(0.5)  # rad
 SCENES = ("perfect", "noise", "moving")
-WHO = ("learner", "peer")
+CONTESTANTS = ("learner", "peer")
 ARMS = ("found", "seconds", "smoothing", "corners", "missing")  # what is measured of a query of both arms
 SITUATIONS = {"perfect": "a perfect model", "noise": "encoder noise five times the usual", "moving": "a target that never rests"}
 PEER = dict.fromkeys(SCENES, "inverse kinematics and RRT-Connect") | {
@@ -90,7 +90,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Both in the same cases, arrays by "scene|who|measure"; or the queries, arrays by measure."""
+    """Both in the same cases, arrays by "scene|contestant|measure"; or the queries, arrays by measure."""
     if settings["scene"] == "two arms":
         made = [query(1000 * seed + number) for number in range(settings["queries"])]
         return {name: np.array([getattr(one, name) for one in made]) for name in ARMS}
@@ -105,10 +105,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
             "learner": [attempt("both", agent, case, seed, motors) for case, seed in zip(cases, seeds, strict=True)],
             "peer": [planned(case, seed, motors) for case, seed in zip(cases, seeds, strict=True)],
         }
-        for who, each in attempts.items():
-            found[f"{scene}|{who}|success"] = np.array([one.missing <= GOOD for one in each])
+        for contestant, each in attempts.items():
+            found[f"{scene}|{contestant}|success"] = np.array([one.missing <= GOOD for one in each])
             for measure in ("missing", "seconds", "thinking"):
-                found[f"{scene}|{who}|{measure}"] = np.array([getattr(one, measure) for one in each])
+                found[f"{scene}|{contestant}|{measure}"] = np.array([getattr(one, measure) for one in each])
     return found
 
 
@@ -129,13 +129,13 @@ def findings(found: Cells) -> dict[str, Any]:
     rows = [
         {
             "scene": scene,
-            "who": who,
-            "success": told(of_cases(cases, scene, who, "success")),
-            "seconds": told(of_cases(cases, scene, who, "seconds"), 1),
-            "planning [ms]": told(1000.0 * of_cases(cases, scene, who, "thinking"), 1),
+            "who": contestant,
+            "success": told(of_cases(cases, scene, contestant, "success")),
+            "seconds": told(of_cases(cases, scene, contestant, "seconds"), 1),
+            "planning [ms]": told(1000.0 * of_cases(cases, scene, contestant, "thinking"), 1),
         }
         for scene in SCENES
-        for who in WHO
+        for contestant in CONTESTANTS
     ]
     numbers = {measure: of_queries(arms, measure) for measure in ARMS[1:]}
     return {
@@ -150,9 +150,9 @@ def _of(found: Cells, kind: str) -> Runs:
     return grouped(found, "scene", [kind]).get(kind, [])
 
 
-def of_cases(cases: Runs, scene: str, who: str, measure: str) -> Array:
+def of_cases(cases: Runs, scene: str, contestant: str, measure: str) -> Array:
     """The mean over the cases of each seed, (seeds,)."""
-    return np.array([values[f"{scene}|{who}|{measure}"].mean() for values in cases])
+    return np.array([values[f"{scene}|{contestant}|{measure}"].mean() for values in cases])
 
 
 def of_queries(arms: Runs, measure: str) -> Array:
@@ -165,8 +165,8 @@ def measured(cases: Runs, arms: Runs) -> list[Claim]:
     """The claims with our numbers."""
     claims = []
     for scene, claim in NO_WORSE.items():
-        learner, peer = (of_cases(cases, scene, who, "success") for who in WHO)
-        times = [f"{1000.0 * interquartile_mean(of_cases(cases, scene, who, 'thinking')):.1f} ms" for who in WHO]
+        learner, peer = (of_cases(cases, scene, contestant, "success") for contestant in CONTESTANTS)
+        times = [f"{1000.0 * interquartile_mean(of_cases(cases, scene, contestant, 'thinking')):.1f} ms" for contestant in CONTESTANTS]
         text = f"success {told(learner)}, peer {told(peer)}; planning a try {times[0]}, peer {times[1]}"
         claims.append(claim.measured(text, decides(interval(learner - peer), least=-EVEN)))
     share = np.array([values["found"].mean() for values in arms])
@@ -188,9 +188,9 @@ def plot(found: Cells) -> Any:
     drawing = new_figure(15.0, 4.2)
     success, thinking, both = drawing.subplots(1, 3)
     for axes, measure, factor in ((success, "success", 1.0), (thinking, "thinking", 1000.0)):
-        for number, who in enumerate(WHO):
-            values = [factor * of_cases(cases, scene, who, measure) for scene in SCENES]
-            draw_bars(axes, np.arange(3) + 0.4 * (number - 0.5), values, 0.38, COLORS[who], LABELS[who])
+        for number, contestant in enumerate(CONTESTANTS):
+            values = [factor * of_cases(cases, scene, contestant, measure) for scene in SCENES]
+            draw_bars(axes, np.arange(3) + 0.4 * (number - 0.5), values, 0.38, COLORS[contestant], LABELS[contestant])
         names = [SITUATIONS[scene].replace(" that", "\nthat").replace(" five", "\nfive") for scene in SCENES]
         axes.set_xticks(range(3), names, fontsize=8)
         axes.grid(alpha=0.2, axis="y")

@@ -43,7 +43,7 @@ from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachOutcome, ReachPlant, ReachTarget
 from mobee.robot.robot import Array, Ints
 
-LOOKS = (500, 1000, 1500, 2000, 3000, 3500, 4000)  # actions after which everybody is evaluated
+CHECKPOINTS = (500, 1000, 1500, 2000, 3000, 3500, 4000)  # actions after which everybody is evaluated
 QUICK = (500, 1000, 2000)
 LEARNER = "kernel-ucb"  # costs less than the plant; "gp-ucb-alike" many times that
 REPETITIONS = 2  # of an evaluation
@@ -54,15 +54,17 @@ Blame = Literal["model", "target"]
 BLAMES: tuple[Blame, ...] = ("model", "target")
 FIRST = {"first-3000": 3000, "first-1000": 1000}  # curious transitions before the first target
 CONTACT = "contact"
-WAYS = (CONTACT, *FIRST, *BLAMES)
+VARIANTS = (CONTACT, *FIRST, *BLAMES)
 
 SHARE = 0.9  # of the score that model first ends with: the score that both are to come to
 EVEN = 0.05  # of that score: as much below still counts as equal
 
 _SOURCE = "thesis 9.4.1"
 SOONER = {
-    way: Claim(_SOURCE, f"model and reaches at once need no more actions to {SHARE:.0%} of the final score of {start} first", "no number")
-    for way, start in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
+    variant: Claim(
+        _SOURCE, f"model and reaches at once need no more actions to {SHARE:.0%} of the final score of {start} first", "no number"
+    )
+    for variant, start in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
 }
 LEVEL = Claim(
     _SOURCE,
@@ -92,10 +94,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """The walks that find the truth, and every way of learning."""
-    looks = list(QUICK if arguments.quick else LOOKS)
-    ways = [Condition(way, {"way": way, "learner": arguments.learner, "looks": looks}) for way in WAYS]
-    return [Condition("truth", {"way": WALK}, 2.0, WALKS), *ways]
+    """The walks that find the truth, and every variant of learning."""
+    checkpoints = list(QUICK if arguments.quick else CHECKPOINTS)
+    variants = [Condition(variant, {"way": variant, "learner": arguments.learner, "looks": checkpoints}) for variant in VARIANTS]
+    return [Condition("truth", {"way": WALK}, 2.0, WALKS), *variants]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -107,32 +109,32 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     if settings["way"] == WALK:
         return {"seen": walk(reach_space(), reach_plant, TRIES, LONGEST_WALK, seed).astype(np.uint16)}
     agent, beliefs, before = _agent(settings["way"], settings["learner"], seed)
-    problems, looks = targets_at(grid()), settings["looks"]
+    problems, checkpoints = targets_at(grid()), settings["looks"]
     found: dict[str, Any] = {}
-    scores, counts, failed = np.full((len(looks), REPETITIONS), np.nan), np.zeros((len(looks), 2), dtype=np.intp), 0
-    for n, look in enumerate(looks):
-        while before + agent.steps < look:
+    scores, counts, failed = np.full((len(checkpoints), REPETITIONS), np.nan), np.zeros((len(checkpoints), 2), dtype=np.intp), 0
+    for n, checkpoint in enumerate(checkpoints):
+        while before + agent.steps < checkpoint:
             agent.learn(problems, 1)
             assert agent.last is not None
             failed += agent.last.failures
         counts[n] = agent.tries, failed
-        if look >= before:
+        if checkpoint >= before:
             scores[n] = agent.evaluate(problems, REPETITIONS).scores
             found[f"outcomes_{n}"], found[f"probabilities_{n}"] = beliefs.outcomes.astype(np.int16), beliefs.probabilities.copy()
     return found | {"scores": scores, "tries": counts[:, 0], "failed": counts[:, 1]}
 
 
-def _agent(way: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeModel, int]:
+def _agent(variant: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeModel, int]:
     """The learner, its transition model, and the number of actions spent on it before the first target."""
     chosen, space, arm = LEARNERS[learner], reach_space(), reach_plant(seed)
     agent = partial(
         ReachAgent, space, marker=MARKER, predictor=chosen.predictor, strategy=chosen.strategy, failures=chosen.failures, seed=seed
     )
-    if way in FIRST:
-        beliefs = learned_beliefs(arm, seed, FIRST[way])
-        return agent(plant=arm, beliefs=beliefs), beliefs, FIRST[way]
+    if variant in FIRST:
+        beliefs = learned_beliefs(arm, seed, FIRST[variant])
+        return agent(plant=arm, beliefs=beliefs), beliefs, FIRST[variant]
     begin_anywhere(space, arm, seed)
-    plant: ReachPlant = next((BlamingPlant(arm, space, blame) for blame in BLAMES if blame == way), arm)
+    plant: ReachPlant = next((BlamingPlant(arm, space, blame) for blame in BLAMES if blame == variant), arm)
     model = TransitionModel(space)
     return agent(plant=plant, model=model), model.debiased(), 0
 
@@ -173,7 +175,7 @@ class BlamingPlant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The N runs of one way of learning: `scores` and `errors` (N, L) after so many `actions` (L,); NaN: not evaluated.
+    """The N runs of one variant of learning: `scores` and `errors` (N, L) after so many `actions` (L,); NaN: not evaluated.
 
     `observed`: as `errors`, of those transitions alone that the model has observed.  `tries`, `failed`: (N,) problem-tries and failed
     transitions.
@@ -194,25 +196,25 @@ class _Beliefs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row a way, and the claims once every way has runs."""
+    """A row a variant, and the claims once every variant has runs."""
     runs = runs_of(found)
-    results: dict[str, Any] = {"ways": [_row(way, mine) for way, mine in runs.items()]}
-    if set(runs) == set(WAYS):
+    results: dict[str, Any] = {"ways": [_row(variant, mine) for variant, mine in runs.items()]}
+    if set(runs) == set(VARIANTS):
         results["claims"] = [claim.record() for claim in measured(runs)]
     return results
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """The runs by way, in the order of the seeds."""
+    """The runs by variant, in the order of the seeds."""
     walks = [values["seen"] for values in grouped(found, "way", [WALK]).get(WALK, [])]
     truth = truth_of(reach_space(), np.concatenate(walks).astype(np.intp)) if walks else None
-    looks_of = {one.cell.settings["way"]: one.cell.settings.get("looks", []) for one in found.values()}
+    checkpoints_of = {one.cell.settings["way"]: one.cell.settings.get("looks", []) for one in found.values()}
     runs = {}
-    for way, group in grouped(found, "way", WAYS).items():
-        looks = looks_of[way]
-        errors = np.array([_errors(values, len(looks), truth) for values in group])
-        runs[way] = Runs(
-            np.array(looks),
+    for variant, group in grouped(found, "way", VARIANTS).items():
+        checkpoints = checkpoints_of[variant]
+        errors = np.array([_errors(values, len(checkpoints), truth) for values in group])
+        runs[variant] = Runs(
+            np.array(checkpoints),
             np.array([values["scores"].mean(axis=-1) for values in group]),
             errors[..., 0],
             errors[..., 1],
@@ -223,23 +225,23 @@ def runs_of(found: Cells) -> dict[str, Runs]:
 
 
 def measured(runs: Mapping[str, Runs]) -> list[Claim]:
-    """The claims with our numbers; open where the run is too short for an evaluation of every way."""
+    """The claims with our numbers; open where the run is too short for an evaluation of every variant."""
     contact = runs[CONTACT]
-    ends = {way: mine.scores[:, -1] for way, mine in runs.items()}
+    ends = {variant: mine.scores[:, -1] for variant, mine in runs.items()}
     if not all(np.isfinite(scores).all() for scores in ends.values()):
         return list(CLAIMS)
     found = []
-    for way, claim in SOONER.items():
-        least = SHARE * float(ends[way].mean())
-        ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[way]))
+    for variant, claim in SOONER.items():
+        least = SHARE * float(ends[variant].mean())
+        ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[variant]))
         text = f"{_actions_text(ours)} against {_actions_text(theirs)} actions to a score of {least:.1f}"
         found.append(claim.measured(text, no_more(ours, theirs)))
-    text = "score " + ", ".join(f"{way} {told(ends[way])}" for way in (CONTACT, *FIRST))
-    found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[way] for way in FIRST])))
-    errors = {way: runs[way].errors[:, -1] for way in (CONTACT, "model", "target")}
-    text = "L1 " + ", ".join(f"{way} {told(values, 3)}{_of_observed(runs[way])}" for way, values in errors.items())
+    text = "score " + ", ".join(f"{variant} {told(ends[variant])}" for variant in (CONTACT, *FIRST))
+    found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[variant] for variant in FIRST])))
+    errors = {variant: runs[variant].errors[:, -1] for variant in (CONTACT, "model", "target")}
+    text = "L1 " + ", ".join(f"{variant} {told(values, 3)}{_of_observed(runs[variant])}" for variant, values in errors.items())
     found.append(CLEAN.measured(text, rises(errors["model"] - errors[CONTACT])))
-    text = "score " + ", ".join(f"{way} {told(ends[way])}" for way in (CONTACT, "target", "model"))
+    text = "score " + ", ".join(f"{variant} {told(ends[variant])}" for variant in (CONTACT, "target", "model"))
     found.append(HEARD.measured(text, rises(ends[CONTACT] - ends["target"])))
     return found
 
@@ -281,13 +283,13 @@ def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
     return all_hold(decides(interval(ours - other), least=-EVEN * float(other.mean())) for other in theirs)
 
 
-def _errors(values: Mapping[str, Any], looks: int, truth: Truth | None) -> Array:
+def _errors(values: Mapping[str, Any], checkpoints: int, truth: Truth | None) -> Array:
     """The mean L1 of the transition model at every evaluation: of all transitions, and of those observed, (L, 2).
 
     NaN where no model was kept, no truth is known, or no transition was observed.
     """
-    found = np.full((looks, 2), np.nan)
-    for n in range(looks):
+    found = np.full((checkpoints, 2), np.nan)
+    for n in range(checkpoints):
         if truth is not None and f"outcomes_{n}" in values:
             believed = _Beliefs(values[f"outcomes_{n}"].astype(np.intp), values[f"probabilities_{n}"])
             error, observed = l1(believed, truth), _observed(believed)
@@ -304,14 +306,14 @@ def _observed(believed: _Beliefs) -> Array:
     return changed
 
 
-def _row(way: str, mine: Runs) -> dict[str, Any]:
-    row: dict[str, Any] = {"way": way, "problem-tries": told(mine.tries, 0), "failed transitions": told(mine.failed, 0)}
-    for n, look in enumerate(mine.actions.tolist()):
+def _row(variant: str, mine: Runs) -> dict[str, Any]:
+    row: dict[str, Any] = {"way": variant, "problem-tries": told(mine.tries, 0), "failed transitions": told(mine.failed, 0)}
+    for n, checkpoint in enumerate(mine.actions.tolist()):
         if np.isfinite(mine.scores[:, n]).all():
-            row[f"score at {look}"] = told(mine.scores[:, n])
-    for n, look in enumerate(mine.actions.tolist()):
+            row[f"score at {checkpoint}"] = told(mine.scores[:, n])
+    for n, checkpoint in enumerate(mine.actions.tolist()):
         if np.isfinite(mine.errors[:, n]).all():
-            row[f"L1 at {look}"] = told(mine.errors[:, n], 3) + (_of_observed(mine) if n == len(mine.actions) - 1 else "")
+            row[f"L1 at {checkpoint}"] = told(mine.errors[:, n], 3) + (_of_observed(mine) if n == len(mine.actions) - 1 else "")
     return row
 
 
@@ -319,9 +321,9 @@ def plot(found: Cells) -> Any:
     """Scores and errors of the models against actions."""
     drawing = new_figure(12.0, 4.6)
     scores, errors = drawing.subplots(1, 2)
-    for way, mine in runs_of(found).items():
-        _curve(scores, mine.actions, mine.scores, way)
-        _curve(errors, mine.actions, mine.errors, way)
+    for variant, mine in runs_of(found).items():
+        _curve(scores, mine.actions, mine.scores, variant)
+        _curve(errors, mine.actions, mine.errors, variant)
     scores.set(xlabel="actions, the model's included", ylabel="cumulative reward, 27 targets", ylim=(0.0, None))
     errors.set(xlabel="actions", ylabel="mean L1 of the transition model", yscale="log")
     errors.legend(fontsize=8)
@@ -330,11 +332,11 @@ def plot(found: Cells) -> Any:
     return drawing
 
 
-def _curve(axes: Any, actions: Ints, values: Array, way: str) -> None:
+def _curve(axes: Any, actions: Ints, values: Array, variant: str) -> None:
     """Interquartile mean and interval of the runs, at the evaluations that all of them have."""
     known = np.isfinite(values).all(axis=0)
     if known.any():
-        draw_curve(axes, actions[known], values[:, known], COLORS[way], LABELS[way])
+        draw_curve(axes, actions[known], values[:, known], COLORS[variant], LABELS[variant])
 
 
 EXPERIMENT = Experiment(

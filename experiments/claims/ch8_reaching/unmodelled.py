@@ -89,26 +89,26 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """The learner and each peer, under each kind of error."""
     tries = list(TRIES[:4] if arguments.quick else TRIES)
     return [
-        Condition(f"{who}-{wrong}", {"who": who, "wrong": wrong, "tries": tries}, COSTS[who])
+        Condition(f"{contestant}-{wrong}", {"who": contestant, "wrong": wrong, "tries": tries}, COSTS[contestant])
         for wrong in WRONG
-        for who in (("learner", *MEMORIES) if wrong != "nothing" else ("none",))  # the learner has no planner's model
+        for contestant in (("learner", *MEMORIES) if wrong != "nothing" else ("none",))  # the learner has no planner's model
     ]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Learn, with an evaluation after so many tries."""
-    who = settings["who"]
+    contestant = settings["who"]
     scene = make_scene(seed, settings["wrong"])
-    contestant: Contestant = Learner(scene, seed) if who == "learner" else Planner(scene, who, seed)
+    player: Contestant = Learner(scene, seed) if contestant == "learner" else Planner(scene, contestant, seed)
     rows, made = [], 0
     for n in settings["tries"]:
-        if who != "none":  # which learns nothing
-            contestant.learn(n - made)
+        if contestant != "none":  # which learns nothing
+            player.learn(n - made)
             made = n
-        rows.append(contestant.evaluate(REPETITIONS).values() | {"hours": contestant.hours})
+        rows.append(player.evaluate(REPETITIONS).values() | {"hours": player.hours})
     found: dict[str, Any] = {"rows": rows, "targets": len(scene.targets)}
-    if isinstance(contestant, Planner):
-        found |= {"planning": contestant.planning, "remembered": contestant.peer.remembered}
+    if isinstance(player, Planner):
+        found |= {"planning": player.planning, "remembered": player.peer.remembered}
     return found
 
 
@@ -224,7 +224,7 @@ def findings(done: Cells) -> dict[str, Any]:
     """The claims, a row a contestant and kind of error, and where the learner crossed over."""
     rows, crossings = [], []
     for wrong in WRONG:
-        rows += [_row(done, who, wrong) for who in ("learner", *MEMORIES) if _of(done, who, wrong)]
+        rows += [_row(done, contestant, wrong) for contestant in ("learner", *MEMORIES) if _of(done, contestant, wrong)]
         for memory in MEMORIES:
             tries, learner, peer = *success(done, "learner", wrong), success(done, memory, wrong)[1]
             if len(learner) and learner.shape == peer.shape:
@@ -234,14 +234,14 @@ def findings(done: Cells) -> dict[str, Any]:
     return {"claims": [claim.record() for claim in measured(done)], "success": rows, "crossover": crossings}
 
 
-def _row(done: Cells, who: str, wrong: str) -> dict[str, Any]:
-    found = _of(done, who, wrong)
+def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
+    found = _of(done, contestant, wrong)
     last = [one.values["rows"][-1] for one in found]
-    points, values = success(done, who, wrong)
-    row = {"hidden from": wrong, "who": who} | {f"success at {n}": told(values[:, i]) for i, n in enumerate(points)}
+    points, values = success(done, contestant, wrong)
+    row = {"hidden from": wrong, "who": contestant} | {f"success at {n}": told(values[:, i]) for i, n in enumerate(points)}
     row |= {fate: told([one["fates"][i] for one in last]) for i, fate in enumerate(FATES) if i}
     row |= {name: told([one[name] for one in last], 1) for name in ("seconds", "actions", "hours")}
-    if who != "learner":
+    if contestant != "learner":
         row["planning a try [ms]"] = told([1000.0 * float(np.median(one.values["planning"])) for one in found], 1)
     return row
 
@@ -260,9 +260,9 @@ def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
     return all_hold(decides(interval(lead), least=least) for lead in leads.values())
 
 
-def success(done: Cells, who: str, wrong: str) -> tuple[list[int], Array]:
+def success(done: Cells, contestant: str, wrong: str) -> tuple[list[int], Array]:
     """After how many tries, and the success of each seed then, (seeds, points)."""
-    found = _of(done, who, wrong)
+    found = _of(done, contestant, wrong)
     points = list(found[0].cell.settings["tries"]) if found else []
     return points, np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(len(found), len(points))
 
@@ -297,9 +297,9 @@ def _perfect(done: Cells) -> Claim:
     return CLAIMS[4].measured(text, decides(interval(values[:, -1]), least=PERFECT))
 
 
-def _of(done: Cells, who: str, wrong: str) -> list[CellResult]:
+def _of(done: Cells, contestant: str, wrong: str) -> list[CellResult]:
     """In the order of the seeds; to the learner it is all the same whether the planners are wrong."""
-    wanted = {"who": who, "wrong": HIDDEN[0] if who == "learner" and wrong == WRONG[0] else wrong}
+    wanted = {"who": contestant, "wrong": HIDDEN[0] if contestant == "learner" and wrong == WRONG[0] else wrong}
     found = [one for one in done.values() if wanted.items() <= one.cell.settings.items()]
     return sorted(found, key=lambda one: one.cell.seed)
 
@@ -308,10 +308,10 @@ def plot(done: Cells) -> Any:
     """Success against tries, one panel a kind of error; stars where the learner crosses over."""
     drawing = new_figure(15.0, 4.6)
     for axes, wrong in zip(drawing.subplots(1, len(WRONG), sharey=True), WRONG, strict=True):
-        for who, color in COLORS.items():
-            tries, values = success(done, who, wrong)
+        for contestant, color in COLORS.items():
+            tries, values = success(done, contestant, wrong)
             if len(values):
-                draw_curve(axes, tries, values, color, LABELS[who])
+                draw_curve(axes, tries, values, color, LABELS[contestant])
         _mark_crossover(axes, done, wrong)
         axes.axvline(EQUAL_BY, color="0.8", linewidth=0.8, zorder=0)
         axes.set(title=TITLES[wrong], xlabel="tries", xscale="log", ylim=(0.0, 1.02))

@@ -43,7 +43,7 @@ class Law:
 
 @cache
 def laws() -> dict[str, Law]:
-    """The published law, whose reaches pull against the attractor; and ours, whose reaches go all the way."""
+    """The published law, whose reaches pull against the attractor; and ours, whose reaches arrive at the target."""
     return {"published": Law(Gains.published_2014(), DT, "centre"), "default": Law(Gains.default(), 0.01, "surface")}
 
 

@@ -23,7 +23,7 @@ SCENES = ("free", "around", "against", "between", "moving")
 OBSTACLE, BALL = "obstacle", 0.04  # m, its radius
 APART = 0.14  # m, at least, from its middle to those of palm and target
 NEAR = 0.25  # m: the hand behind the target is no farther from it
-BEYOND = np.cos(np.deg2rad(70.0))  # between the way from shoulder to target and that from target to hand
+BEYOND = np.cos(np.deg2rad(70.0))  # between the vectors from shoulder to target and from target to hand
 TOUCH = 0.03  # m: so near to the target a link is "at" it
 MOVED = (0.05, 0.12)  # m that a target moves, at least and at most
 SPEED = 0.03  # m/s
@@ -54,10 +54,10 @@ class Case:
         """Where the target is so long after it was presented, (3,) m."""
         if self.to is None:
             return self.target.position
-        way = self.to - self.target.position
-        gone = SPEED * seconds / float(np.linalg.norm(way))
+        offset = self.to - self.target.position
+        gone = SPEED * seconds / float(np.linalg.norm(offset))
         share = 1.0 - abs(1.0 - gone % 2.0) if self.to_and_fro else min(1.0, gone)
-        found: Array = self.target.position + share * way
+        found: Array = self.target.position + share * offset
         return found
 
     def seen_at(self, seconds: float) -> ReachTarget:
@@ -84,15 +84,15 @@ def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Ge
     low, high = belief.limits.T
     q = rng.uniform(low, high)
     hand = belief.model.evaluate(belief.whole(q)).position(belief.marker)
-    way = target.position - hand
+    offset = target.position - hand
     if scene == "around" and not _behind(belief, target, hand):
         return None
     belief.present(target)
-    if not belief.sound(q[None])[0] or (scene == "against" and not _touches(belief, target, q, way)):
+    if not belief.sound(q[None])[0] or (scene == "against" and not _touches(belief, target, q, offset)):
         return None
     if scene == "between":
-        obstacle = hand + 0.5 * way
-        apart = float(np.linalg.norm(way)) / 2.0
+        obstacle = hand + 0.5 * offset
+        apart = float(np.linalg.norm(offset)) / 2.0
         return Case(target, q, obstacle) if apart > APART and _leaves_path(belief, target, q, obstacle) else None
     if scene == "moving":
         to = _goal_of(target, belief, rng)
@@ -118,25 +118,25 @@ def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
     return bool(length < NEAR and out @ beyond > BEYOND * np.linalg.norm(out) * length)
 
 
-def _touches(belief: PeerBelief, target: ReachTarget, q: Array, way: Array) -> bool:
-    """Whether a solid of the arm is within TOUCH of the target, and the palm is turned away from it, which lies `way` (3,) m off."""
+def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -> bool:
+    """Whether a solid of the arm is within TOUCH of the target, and the palm is turned away from it, which is at `offset` (3,) m."""
     belief.present(ReachTarget(target.position, target.radius + TOUCH))
     near = not belief.sound(q[None])[0]
     belief.present(target)
-    return near and float(belief.model.evaluate(belief.whole(q)).normal(belief.marker) @ way) < 0.0
+    return near and float(belief.model.evaluate(belief.whole(q)).normal(belief.marker) @ offset) < 0.0
 
 
 def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Array | None:
     """A place at the distance MOVED from the target that the palm can touch too; None if the one drawn is not."""
-    way = rng.normal(size=3)
-    place = target.position + rng.uniform(*MOVED) * way / np.linalg.norm(way)
+    offset = rng.normal(size=3)
+    place = target.position + rng.uniform(*MOVED) * offset / np.linalg.norm(offset)
     low, high = belief.limits.T
     starts = rng.uniform(low, high, (16, len(belief.limits)))
     missing = approach(belief, starts, place, target.radius, belief.limits)[1]
     return place if missing.min() < 1e-3 else None
 
 
-WAYS = ("planner", "reach", "both")
+METHODS = ("planner", "reach", "both")
 EVERY = 5  # ticks between two positions of a target that moves
 REACHES = {"published": 1, "default": 3}  # a case; the thesis reached once
 
@@ -163,7 +163,7 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
     return agent
 
 
-def attempt(way: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
+def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
     """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other.
 
     A reach that misses is repeated, up to REACHES in all.
@@ -172,12 +172,12 @@ def attempt(way: str, agent: ReachAgent, case: Case, seed: int, motors: MotorPar
     start = plant.time
     plant.present(case.target)
     plant.every(EVERY, (lambda now: plant.present(case.seen_at(now - start))) if case.to is not None else None)
-    worth = partial(_nearness, hands(law)) if way == "planner" else agent.predictor.mean
+    worth = partial(_nearness, hands(law)) if method == "planner" else agent.predictor.mean
     course = Course(plant, agent, worth, lambda: case.target_at(plant.time - start), np.random.default_rng([seed, 88]))
-    for _ in range(1 if way == "planner" else REACHES[law]):
-        if way != "reach":
+    for _ in range(1 if method == "planner" else REACHES[law]):
+        if method != "reach":
             course.go()
-        aimed = _missing(plant, case, start) if way == "planner" else plant.reach(PART, MARKER).missing
+        aimed = _missing(plant, case, start) if method == "planner" else plant.reach(PART, MARKER).missing
         missing = aimed if case.target.aim == "surface" else max(aimed - case.target.radius, 0.0)
         if missing <= GOOD:
             break

@@ -9,7 +9,7 @@ learner (gp, ucb, alike) of 3000 curious transitions and 800 tries of the 27 tar
 54 live tries in the same record; then, without learning, each of the 27 and 50 fresh targets from a pose of its own, up to three
 reaches a try.  The planner peer (inverse kinematics and RRT-Connect, planned anew on every change) has the same targets, poses and
 robot, and the true model; the target repels nothing while it moves, for it plans around it.  Besides, 8 targets that move to and fro over
-15 cm at 3 cm/s, and 8 with a ball of 8 cm, in model and simulator, that crosses the hand's way as fast.
+15 cm at 3 cm/s, and 8 with a ball of 8 cm, in model and simulator, that crosses the hand's path as fast.
 A target can be reached if inverse kinematics finds a pose that holds limits and cables, with the palm within 2 cm of the surface, and in
 which no solid touches anything but the hand the target (experiments/kit/reaching/README.md has which grid it is).  Fresh targets are such.
 Judged by the simulator's joints, not by encoders: where the palm was when the force ended, or the planner held that it was there.
@@ -65,7 +65,7 @@ from mobee.store import STORE
 TRIES, LIVE, FRESH_TARGETS, MOVING_THINGS = 800, 54, 50, 8
 PIECE = 27  # tries of a launch
 FAST, FIRST = 500.0, 10  # Hz; reaches whose first motion is timed
-WHO, MOVING = ("learner", "peer"), "moving"
+CONTESTANTS, MOVING = ("learner", "peer"), "moving"
 NAMES = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
 LEAST = {GRID: 0.95, FRESH: 0.9}
 SOON = 5e-3  # s
@@ -171,9 +171,9 @@ def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, floa
     for made in range(0, sizes.live, PIECE):
         yield f"refine-{made:03}", Job("refine", seed, store, tries=sizes.tries + min(made + PIECE, sizes.live)), RATE
     pieces = [grid, *(fresh[i : i + PIECE] for i in range(0, len(fresh), PIECE))]
-    for who in ("learner", "peer"):
+    for contestant in ("learner", "peer"):
         for number, piece in enumerate(pieces):
-            yield f"{who}-{number}", Job(who, seed, store, piece), RATE
+            yield f"{contestant}-{number}", Job(contestant, seed, store, piece), RATE
     yield "moving", Job("moving", seed, store, moving_problems(seed, sizes.moving)), RATE
     yield "first", Job("first motion", seed, store, fresh[: sizes.first]), FAST
 
@@ -226,9 +226,9 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
     return bool(summary["lockstep"]["repeatable"])
 
 
-def tries_of(blocks: Sequence[Block], who: str, kind: str, numbers: frozenset[int] | None = None) -> list[Judged]:
+def tries_of(blocks: Sequence[Block], contestant: str, kind: str, numbers: frozenset[int] | None = None) -> list[Judged]:
     """All tries of a contestant on one set of targets, or on those numbers of it."""
-    found = [tried for block in blocks if block.kind == who for tried in block.tries if tried.kind == kind]
+    found = [tried for block in blocks if block.kind == contestant for tried in block.tries if tried.kind == kind]
     return [tried for tried in found if numbers is None or tried.number in numbers]
 
 
@@ -258,7 +258,7 @@ def measured(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset
     hours = sum(block.seconds for block in blocks if block.kind in ("refine", "learner")) / 3600.0
     first = [1e3 * tried.first / block.rate for block in blocks if block.kind == "first motion" for tried in block.tries if tried.first > 0]
     ticks = sorted({1e3 / block.rate for block in blocks if block.kind == "first motion"})
-    rivals = {who: tries_of(blocks, who, GRID, touchable) + tries_of(blocks, who, FRESH) for who in WHO}
+    rivals = {contestant: tries_of(blocks, contestant, GRID, touchable) + tries_of(blocks, contestant, FRESH) for contestant in CONTESTANTS}
     worst = f"deepest {1e3 * max(touch.depth for touch in deep):.1f} mm ({max(deep, key=lambda t: t.depth).pair}), " if deep else ""
     apart = (
         f"of the {len(left)} that the robot's own fields let a palm come to {share(tries_of(blocks, 'learner', GRID, left))}; "
@@ -274,13 +274,13 @@ def measured(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset
             else "none",
             max(first) <= 1e3 * SOON if first else None,
         ),
-        CLAIMS[4].measured("; ".join(f"{NAMES[who]} {share(made)}" for who, made in rivals.items()), _no_worse(rivals)),
+        CLAIMS[4].measured("; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items()), _no_worse(rivals)),
     ]
 
 
 def _no_worse(rivals: Mapping[str, Sequence[Judged]]) -> bool | None:
     """Whether the learner succeeds at least as often in the tries, which are the same for both."""
-    learner, peer = (np.array([tried.success for tried in rivals[who]]) for who in WHO)
+    learner, peer = (np.array([tried.success for tried in rivals[contestant]]) for contestant in CONTESTANTS)
     if len(learner) < FEW or len(learner) != len(peer):
         return None
     return bool(learner.mean() >= peer.mean()) or None
@@ -295,11 +295,11 @@ def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, 
     }
     sets |= {TARGET_MOVES: (TARGET_MOVES, None), OBSTACLE_MOVES: (OBSTACLE_MOVES, None)}
     rows = []
-    for who in (*WHO, MOVING):
+    for contestant in (*CONTESTANTS, MOVING):
         for name, (kind, numbers) in sets.items():
-            tries = tries_of(blocks, who, kind, numbers)
+            tries = tries_of(blocks, contestant, kind, numbers)
             if tries:
-                rows.append({"who": NAMES.get(who, NAMES["learner"]), "targets": name, "success": share(tries), **_spent(tries)})
+                rows.append({"who": NAMES.get(contestant, NAMES["learner"]), "targets": name, "success": share(tries), **_spent(tries)})
     return rows
 
 
@@ -322,10 +322,10 @@ def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tu
             "target": f"{tried.kind} {tried.number} at {tuple(round(x, 2) for x in tried.position)}",
             "off [mm]": None if np.isinf(tried.off) else round(1e3 * tried.off),
             "reaches": tried.reaches,
-            "why": tried.why or (why((tried.position[0], tried.position[1], tried.position[2])) if block.kind == WHO[0] else ""),
+            "why": tried.why or (why((tried.position[0], tried.position[1], tried.position[2])) if block.kind == CONTESTANTS[0] else ""),
         }
         for block in blocks
-        if block.kind in WHO
+        if block.kind in CONTESTANTS
         for tried in block.tries
         if not tried.success and (tried.kind == FRESH or tried.number in touchable)
     ]
@@ -336,19 +336,25 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
     drawing = new_figure(14.0, 4.2)
     *distances, times = drawing.subplots(1, 3)
     for axes, kind in zip(distances, (GRID, FRESH), strict=True):
-        for who in WHO:
-            off = np.sort([1e3 * tried.off for tried in tries_of(blocks, who, kind, touchable if kind == GRID else None)])
+        for contestant in CONTESTANTS:
+            off = np.sort([1e3 * tried.off for tried in tries_of(blocks, contestant, kind, touchable if kind == GRID else None)])
             if len(off):
-                axes.step(np.minimum(off, 200.0), np.arange(1, len(off) + 1) / len(off), where="post", color=COLORS[who], label=NAMES[who])
+                axes.step(
+                    np.minimum(off, 200.0),
+                    np.arange(1, len(off) + 1) / len(off),
+                    where="post",
+                    color=COLORS[contestant],
+                    label=NAMES[contestant],
+                )
         axes.axvline(1e3 * GOOD, color="0.5", linestyle="--", linewidth=0.8)
         axes.set(title=TITLES[kind], xlabel="palm to surface at the end, in truth [mm]", ylabel="share of tries", ylim=(0.0, 1.02))
         axes.set_xlim(-1.0, 100.0)
         axes.grid(alpha=0.2)
         axes.legend(fontsize=8, loc="lower right")
-    for who in WHO:
-        took = np.sort([t.seconds for kind in (GRID, FRESH) for t in tries_of(blocks, who, kind) if t.success])
+    for contestant in CONTESTANTS:
+        took = np.sort([t.seconds for kind in (GRID, FRESH) for t in tries_of(blocks, contestant, kind) if t.success])
         if len(took):
-            times.step(took, np.arange(1, len(took) + 1) / len(took), where="post", color=COLORS[who], label=NAMES[who])
+            times.step(took, np.arange(1, len(took) + 1) / len(took), where="post", color=COLORS[contestant], label=NAMES[contestant])
     times.set(title="those that succeeded", xlabel="robot time to the target [s]", ylabel="share", ylim=(0.0, 1.02))
     times.grid(alpha=0.2)
     return drawing

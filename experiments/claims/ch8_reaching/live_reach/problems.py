@@ -83,7 +83,7 @@ class Problem(Struct, frozen=True):
     number: int
     position: list[float]  # m, root frame
     start: list[float]  # rad
-    way: list[list[float]] | None = None
+    path: list[list[float]] | None = None
     """Between which places, m, the target or an obstacle moves to and fro; None: nothing moves."""
 
     @property
@@ -137,11 +137,11 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
             to = rng.uniform(-1.0, 1.0, 3)
             other = problem.target.position + FAR * to / np.linalg.norm(to)
             if touchable(known, ReachTarget(other, aim=AIM)):
-                found.append(structs.replace(problem, kind=TARGET_MOVES, number=len(found), way=[problem.position, other.tolist()]))
+                found.append(structs.replace(problem, kind=TARGET_MOVES, number=len(found), path=[problem.position, other.tolist()]))
         elif len(found) < 2 * count:
-            way = _across(known, problem, rng)
-            if way is not None:
-                found.append(structs.replace(problem, kind=OBSTACLE_MOVES, number=len(found), way=way))
+            path = _across(known, problem, rng)
+            if path is not None:
+                found.append(structs.replace(problem, kind=OBSTACLE_MOVES, number=len(found), path=path))
     return found
 
 

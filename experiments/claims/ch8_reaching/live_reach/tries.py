@@ -71,7 +71,7 @@ class Tried(Struct, frozen=True):
     why: str = ""  # it ended without a reach
     asked: int = 0  # tick of the last request
     there: list[float] | None = None  # m, where a target that moves was at the last of the ends
-    first: int = -1  # ticks from the last request to the first command that moves, where that was looked at
+    first: int = -1  # ticks from the last request to the first command that moves, where it was timed
 
 
 class Judged(Struct, frozen=True):
@@ -89,8 +89,8 @@ class Judged(Struct, frozen=True):
     deep: list[Touch]  # solid contacts deeper than 2 mm from when the arm set out from home to its rest
     begun_off: float  # rad, from the posture to begin in
     why: str  # it came to no end
-    first: int  # ticks from request to the first command that moves, -1: not looked at
-    first_motion: int  # ticks from request to where a joint first truly moves, -1: not looked at
+    first: int  # ticks from request to the first command that moves, -1: not timed
+    first_motion: int  # ticks from request to where a joint first truly moves, -1: not timed
 
 
 class Block(Struct, frozen=True):

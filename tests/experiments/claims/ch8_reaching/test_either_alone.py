@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching.either_alone import LAWS, does_more, findings
-from experiments.kit.reaching.cases import SCENES, WAYS
+from experiments.kit.reaching.cases import METHODS, SCENES
 from tests.experiments.finished_cells import Cell, finished
 
 
@@ -12,10 +12,10 @@ def sweep(**shares):
     def work(cell):
         values = {}
         for scene in SCENES:
-            for way in WAYS:
-                values[f"{scene}|{way}|missing"] = np.where(np.arange(10) < 10 * shares[way], 0.01, 0.1)
-                values[f"{scene}|{way}|seconds"] = np.full(10, 5.0)
-                values[f"{scene}|{way}|reward"] = np.full(10, shares[way] / 10.0)
+            for method in METHODS:
+                values[f"{scene}|{method}|missing"] = np.where(np.arange(10) < 10 * shares[method], 0.01, 0.1)
+                values[f"{scene}|{method}|seconds"] = np.full(10, 5.0)
+                values[f"{scene}|{method}|reward"] = np.full(10, shares[method] / 10.0)
         return values
 
     return finished(work, [Cell(f"{law}-s{seed}", seed, {"law": law}) for seed in range(6) for law in LAWS])
@@ -35,5 +35,5 @@ def test_each_scene_is_a_claim_of_its_own_by_what_decides_under_the_law():
 
 def test_the_table_has_success_and_the_remaining_distance():
     rows = findings(sweep(planner=0.3, reach=0.5, both=0.9))["cases"]
-    assert len(rows) == len(LAWS) * len(SCENES) * len(WAYS)
+    assert len(rows) == len(LAWS) * len(SCENES) * len(METHODS)
     assert rows[0]["success"].startswith("0.30") and rows[0]["median missing [cm]"].startswith("10.0")

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.claims.ch8_reaching import reach
 from experiments.claims.ch8_reaching.reach import THOSE, _choices, measured, plot, trial
-from experiments.claims.ch8_reaching.reach_runs import LOOKS, Runs
+from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, Runs
 from experiments.kit.reaching import arm
 from tests.experiments.finished_cells import Cell, finished
 
@@ -18,7 +18,7 @@ def values(seed: int, scores, favourites: int, failures: int, hours: float):
     rewards = np.array([np.full((5, TARGETS), score / TARGETS) for score in scores]) * rng.uniform(0.98, 1.02)
     states = rng.integers(favourites, size=(len(scores), 5, TARGETS))
     states[0] = rng.integers(STATES, size=(5, TARGETS))
-    tries = LOOKS[-1]
+    tries = CHECKPOINTS[-1]
     fails = np.zeros((STATES, 8), dtype=int)
     fails[0, 0] = failures + seed
     return {
@@ -38,7 +38,7 @@ def runs(**changes):
         "greedy": ((5.2, 5.2, 5.4, 5.5, 5.7, 5.8, 6.0), 40, 120, 21.8),
         "random": ((5.3, 5.0, 4.9, 5.0, 5.1, 5.4, 5.6), 60, 500, 41.4),
     } | changes
-    return {name: Runs(tuple(values(seed, *given) for seed in range(SEEDS)), (30.0,) * SEEDS, LOOKS) for name, given in made.items()}
+    return {name: Runs(tuple(values(seed, *given) for seed in range(SEEDS)), (30.0,) * SEEDS, CHECKPOINTS) for name, given in made.items()}
 
 
 def verdicts(found) -> dict[str, str]:
@@ -109,7 +109,7 @@ def test_the_agreement_of_runs_is_the_overlap_of_their_choices():
     pair = [dict(values(0, (1.0,) * 7, 2, 0, 1.0)) for _ in range(2)]
     for one, states in zip(pair, ([0, 0, 1, 1], [0, 2, 2, 2]), strict=True):
         one["states_grid"] = np.tile(states, (7, 1))
-    mine = Runs(tuple(pair), (1.0, 1.0), LOOKS)
+    mine = Runs(tuple(pair), (1.0, 1.0), CHECKPOINTS)
     assert mine.agreement(100) == pytest.approx([0.25, 0.25])
     assert mine.favourites(100).tolist() == [1.0, 1.0]
 
@@ -128,6 +128,6 @@ def test_a_run_is_drawn(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(reach, "HEIGHT", 40)  # small pictures take no time
     made = runs()
-    cells = [Cell(f"{name}-s{seed}", seed, {"strategy": name, "looks": list(LOOKS)}) for name in made for seed in range(2)]
+    cells = [Cell(f"{name}-s{seed}", seed, {"strategy": name, "looks": list(CHECKPOINTS)}) for name in made for seed in range(2)]
     plot(finished(lambda cell: made[cell.settings["strategy"]].values[cell.seed], cells)).savefig(tmp_path / "reach.png")
     assert (tmp_path / "reach.png").stat().st_size > 50_000

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching import reach_predictors
-from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, GRID, LOOKS, ORACLE, PUBLISHED, RECOMMENDED, fractions, measured
+from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, CHECKPOINTS, GRID, ORACLE, PUBLISHED, RECOMMENDED, fractions, measured
 from experiments.kit.cells import Cell
 from experiments.kit.reaching.learning import LEARNERS
 from mobee.learning.reaching.failures import FAILURES
@@ -18,9 +18,9 @@ SEEDS, TARGETS = 6, {GRID: 27, BETWEEN: 8}
 
 
 def result(what: str, seed: int, level: float):
-    looks = 1 if what == ORACLE else len(LOOKS)
-    values = {f"rewards_{name}": np.full((looks, 5, count), level) for name, count in TARGETS.items()}
-    settings = {"what": what} | ({} if what == ORACLE else {"looks": list(LOOKS)})
+    checkpoints = 1 if what == ORACLE else len(CHECKPOINTS)
+    values = {f"rewards_{name}": np.full((checkpoints, 5, count), level) for name, count in TARGETS.items()}
+    settings = {"what": what} | ({} if what == ORACLE else {"looks": list(CHECKPOINTS)})
     return SimpleNamespace(cell=Cell(f"{what}-s{seed}", seed, settings), seconds=1.0, values=values)
 
 
@@ -30,13 +30,13 @@ def found(recommended: float, published: float):
 
 
 def verdicts(cells) -> list[str]:
-    return [claim.verdict for claim in measured(fractions(cells), list(LOOKS))]
+    return [claim.verdict for claim in measured(fractions(cells), list(CHECKPOINTS))]
 
 
 def test_scores_are_divided_by_the_oracles():
     curves = fractions(found(0.9, 0.4))
-    assert curves[RECOMMENDED, GRID] == pytest.approx(np.full((SEEDS, len(LOOKS)), 0.9))
-    assert curves[PUBLISHED, BETWEEN] == pytest.approx(np.full((SEEDS, len(LOOKS)), 0.4))
+    assert curves[RECOMMENDED, GRID] == pytest.approx(np.full((SEEDS, len(CHECKPOINTS)), 0.9))
+    assert curves[PUBLISHED, BETWEEN] == pytest.approx(np.full((SEEDS, len(CHECKPOINTS)), 0.4))
 
 
 def test_the_aims_decide():

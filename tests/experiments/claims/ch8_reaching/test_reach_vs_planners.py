@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.reach_vs_planners import SCENES, WHO, findings
+from experiments.claims.ch8_reaching.reach_vs_planners import CONTESTANTS, SCENES, findings
 from tests.experiments.finished_cells import Cell, finished
 
 
@@ -14,10 +14,10 @@ def sweep(learner=0.9, peer=0.9, seconds=0.01, smoothing=0.1):
             return arms | {"corners": np.full(4, 3), "missing": np.full(4, 0.01)}
         values = {}
         for scene in SCENES:
-            for who, share in zip(WHO, (learner, peer), strict=True):
-                values[f"{scene}|{who}|success"] = np.arange(10) < 10 * share
-                values[f"{scene}|{who}|seconds"] = np.full(10, 5.0)
-                values[f"{scene}|{who}|thinking"] = np.full(10, 0.001)
+            for contestant, share in zip(CONTESTANTS, (learner, peer), strict=True):
+                values[f"{scene}|{contestant}|success"] = np.arange(10) < 10 * share
+                values[f"{scene}|{contestant}|seconds"] = np.full(10, 5.0)
+                values[f"{scene}|{contestant}|thinking"] = np.full(10, 0.001)
         return values
 
     kinds = ("cases", "two arms")
@@ -40,5 +40,5 @@ def test_a_planner_is_slow_if_it_takes_a_tenth_of_the_published_time(seconds, sm
 
 def test_the_table_has_planning_in_milliseconds():
     table = sweep()
-    assert len(table["cases"]) == len(SCENES) * len(WHO) and table["cases"][0]["planning [ms]"].startswith("1.0")
+    assert len(table["cases"]) == len(SCENES) * len(CONTESTANTS) and table["cases"][0]["planning [ms]"].startswith("1.0")
     assert table["both arms"]["seconds"].startswith("0.010")

@@ -8,7 +8,7 @@ import pytest
 from experiments.claims.ch8_reaching.simultaneous import (
     CLAIMS,
     EVEN,
-    WAYS,
+    VARIANTS,
     BlamingPlant,
     Runs,
     actions_to,
@@ -26,7 +26,7 @@ from tests.experiments.finished_cells import Cell, finished
 from tests.mobee.learning.reaching import toy
 
 SEEDS = 6
-LOOKS = np.array([1000, 2000, 4000])
+CHECKPOINTS = np.array([1000, 2000, 4000])
 SPREAD = np.array([-1.0, 1.0, -0.8, 0.9, 0.0, 0.1])
 
 
@@ -40,15 +40,15 @@ def runs(**changes):
         "target": ((3.0, 5.0, 6.0), 0.3),
     } | changes
     return {
-        way: Runs(
-            LOOKS,
+        variant: Runs(
+            CHECKPOINTS,
             np.tile(scores, (SEEDS, 1)),
             np.full((SEEDS, 3), error),
             np.full((SEEDS, 3), error),
             np.full(SEEDS, 900),
             np.full(SEEDS, 80),
         )
-        for way, (scores, error) in given.items()
+        for variant, (scores, error) in given.items()
     }
 
 
@@ -58,7 +58,7 @@ def verdicts(found):
 
 def test_a_score_is_come_to_between_two_looks():
     scores = np.array([[2.0, 4.0, 8.0], [6.0, 2.0, 6.0], [1.0, 2.0, 3.0], [np.nan, 6.0, 7.0]])
-    assert actions_to(5.0, LOOKS, scores).tolist() == [2500.0, 1000.0, np.inf, 2000.0]
+    assert actions_to(5.0, CHECKPOINTS, scores).tolist() == [2500.0, 1000.0, np.inf, 2000.0]
 
 
 @pytest.mark.parametrize(("ours", "expected"), [(2000.0, True), (3000.0, True), (3500.0, False)])
@@ -111,11 +111,11 @@ def test_claims_are_open_where_a_run_ends_before_the_model_is_learned():
 
 def test_nothing_is_judged_before_everybody_has_run():
     assert findings({}) == {"ways": []}
-    assert set(WAYS) == set(runs())
+    assert set(VARIANTS) == set(runs())
 
 
 def cells():
-    """Two runs of every way, whose models believe that a quarter of all transitions fail: none does."""
+    """Two runs of every variant, whose models believe that a quarter of all transitions fail: none does."""
     space, model = reach_space(), TransitionModel(reach_space())
     pairs = np.argwhere(space.goals >= 0)
     seen = np.column_stack([pairs, space.goals[tuple(pairs.T)]])
@@ -128,7 +128,7 @@ def cells():
             values["scores"][0] = np.nan
         return values | {"outcomes_1": model.outcomes, "probabilities_1": model.debiased(0.3, 0.1).probabilities}
 
-    learners = [Cell(f"{way}-s{seed}", seed, {"way": way, "looks": [1000, 2000]}) for way in WAYS for seed in range(2)]
+    learners = [Cell(f"{variant}-s{seed}", seed, {"way": variant, "looks": [1000, 2000]}) for variant in VARIANTS for seed in range(2)]
     return finished(work, [Cell("truth", 9001, {"way": "walk"}), *learners])
 
 
@@ -143,7 +143,7 @@ def test_runs_are_drawn_and_their_models_compared_with_what_was_walked(tmp_path)
 
 
 class Stuck:
-    """Goes half of the way, and touches what it is told to touch."""
+    """Goes half of the variant, and touches what it is told to touch."""
 
     robot = None
 

@@ -75,8 +75,8 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], Array]:
     """Present the target, and start what moves; returns a function of the target's position now, (3,) m."""
     target = problem.target
-    if mover is not None and problem.way is not None:
-        mover.start(THING if problem.kind == TARGET_MOVES else OBSTACLE, problem.way)
+    if mover is not None and problem.path is not None:
+        mover.start(THING if problem.kind == TARGET_MOVES else OBSTACLE, problem.path)
         if problem.kind == TARGET_MOVES:
             hand.present_object(THING, AIM)
             return mover.now

@@ -97,9 +97,9 @@ class Mover:
 
     def at(self, k: int) -> Array:
         """Where it is at a tick, (3,) m."""
-        way = self._ends[1] - self._ends[0]
-        gone = SPEED * self._dt * ((k - self._begin) // EVERY * EVERY) / max(float(np.linalg.norm(way)), 1e-9)
-        found: Array = self._ends[0] + (1.0 - abs(1.0 - gone % 2.0)) * way
+        path = self._ends[1] - self._ends[0]
+        gone = SPEED * self._dt * ((k - self._begin) // EVERY * EVERY) / max(float(np.linalg.norm(path)), 1e-9)
+        found: Array = self._ends[0] + (1.0 - abs(1.0 - gone % 2.0)) * path
         return found
 
     def now(self) -> Array:

@@ -45,6 +45,6 @@ def test_an_obstacle_crosses_the_way_of_the_hand_clear_of_target_and_arm() -> No
     assert [one.kind for one in problems] == [TARGET_MOVES] * 2 + [OBSTACLE_MOVES] * 2
     for one in problems[2:]:
         hand = known.model.evaluate(known.whole(np.array(one.start[:WRIST]))).position(MARKER)
-        first, last = np.array(one.way)
+        first, last = np.array(one.path)
         assert np.allclose(0.5 * (first + last), 0.5 * (hand + one.position))
         assert abs((last - first) @ (hand - one.position)) < 1e-9
