@@ -18,6 +18,7 @@ from services.common.lockstep import Participant
 from services.common.service import Service
 
 PATIENCE = 60.0  # s for a tick of lockstep: a path is planned within one
+APART = 500_000_000  # ns for which an object must not be felt, so that it is touched anew: at a field's border noise decides
 
 _SCENARIO = """# Written by an experiment of thesis 4.3.
 title = "{title}"
@@ -39,7 +40,7 @@ world = "{world}"
 [services.controller]
 speed_scale = {speed:g}
 
-[services.{name}]
+[services.performer]
 module = "{module}"
 run_dir = "{folder}"
 """
@@ -47,7 +48,6 @@ run_dir = "{folder}"
 
 def launch(
     folder: Path,
-    name: str,
     module: str,
     *,
     title: str,
@@ -68,13 +68,10 @@ def launch(
     mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
     values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
-    values |= {"rate": rate, "speed": speed, "name": name, "module": module}
+    values |= {"rate": rate, "speed": speed, "module": module}
     scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)
-
-
-APART = 500_000_000  # ns for which an object must not be felt, so that it is touched anew: at a field's border noise decides
 
 
 class FeelingPlant(BusPlant):

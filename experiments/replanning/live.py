@@ -19,7 +19,6 @@ def perform(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[s
     write_job(folder, job)
     return launch(
         folder,
-        "performer",
         MODULE,
         title="Re-planning",
         world=str(WORLD),

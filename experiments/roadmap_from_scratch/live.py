@@ -30,9 +30,7 @@ def finish(folder: Path, seed: int, most: int | None) -> None:
     place = folder / f"launch-{number:03}"
     place.mkdir()
     write(place / JOB, {"seed": seed, "most": most, "store": str((folder / STORE).resolve())})
-    summary = launch(
-        place, "performer", MODULE, title="Roadmap from scratch", world=str(WORLD), seed=seed, rate=RATE, speed=SPEED, seconds=LONGEST
-    )
+    summary = launch(place, MODULE, title="Roadmap from scratch", world=str(WORLD), seed=seed, rate=RATE, speed=SPEED, seconds=LONGEST)
     told = read(place / DONE)
     write(folder / DONE, {**told, "seed": seed, "repeatable": summary["lockstep"]["repeatable"]})
 
