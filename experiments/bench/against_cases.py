@@ -106,9 +106,9 @@ def _three_agents() -> Work:
 
 def _chapter_8() -> Work:
     """Of a run of each strategy 1/64: of the time of its 3000 transitions, its 6400 tries and its evaluations."""
-    from experiments.reaching.looks import learn
-    from experiments.reaching.scene import MARKER, laws, learned_beliefs, reach_plant, reach_space
-    from experiments.reaching.targets import grid, targets_at
+    from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
+    from experiments.kit.reaching.learning import learn
+    from experiments.kit.reaching.targets import grid, targets_at
     from mobee.learning.reaching.predictors.predictor import SCALE
     from mobee.learning.reaching.reach_agent import ReachAgent
 

@@ -34,13 +34,13 @@ class Condition(NamedTuple):
     """What the trials with one setting have in common.
 
     `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values.  `cost`: how long a trial takes beside the
-    others, in any unit.  `seeds`: of its own, whatever the options say; None: those of the options.
+    others, in any unit.  `seeds`: its own, if they are not those of the run.
     """
 
     name: str
     settings: dict[str, Any]
     cost: float = 1.0
-    seeds: Sequence[int] | None = None
+    seeds: tuple[int, ...] = ()
 
 
 Trial = Callable[[dict[str, Any], int], dict[str, Any]]
@@ -56,8 +56,8 @@ def no_options(parser: argparse.ArgumentParser) -> None:
     """Add nothing to what all sweeps have."""
 
 
-def nothing_required() -> None:
-    """For trials that need no package besides those of mobee."""
+def no_requirement() -> None:
+    """Need nothing that may be absent."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Sweep:
         plot: their figure, a matplotlib Figure; see experiments.kit.plots.
         seeds: how many there are unless --seeds says otherwise.
         add_options: adds options of its own.
-        require: raises, before anything is begun, where a package is missing that the trials need.
+        require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -81,7 +81,7 @@ class Sweep:
     plot: Callable[[Cells], Any]
     seeds: int = 10
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
-    require: Callable[[], object] = nothing_required
+    require: Callable[[], object] = no_requirement
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Options of the sweep."""
@@ -90,11 +90,9 @@ class Sweep:
 
     def cells(self, arguments: argparse.Namespace) -> list[Cell]:
         """Every condition with every seed."""
-        given = range(arguments.seed, arguments.seed + arguments.seeds)
+        seeds = range(arguments.seed, arguments.seed + arguments.seeds)
         return [
-            Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost)
-            for one in self.conditions(arguments)
-            for seed in (given if one.seeds is None else one.seeds)
+            Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in one.seeds or seeds
         ]
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:

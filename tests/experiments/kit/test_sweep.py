@@ -7,6 +7,7 @@ import pytest
 from experiments.kit.cells import Cell
 from experiments.kit.sweep import Condition, Sweep, grouped, grouped_by
 from mobee.errors import InvalidValue
+from mobee.roadmap.ompl_base import OmplMissing
 from tests.experiments.finished_cells import finished
 
 
@@ -45,3 +46,13 @@ def test_cells_are_grouped_by_one_setting_or_by_several_in_the_order_of_their_se
     assert {key: [one.cell.seed for one in mine] for key, mine in grouped_by(found, "a", "b").items()} == {
         (a, b): [9, 10] for a in (1, 2) for b in (3, 4)
     }
+
+
+def test_a_missing_package_is_named_before_anything_is_begun(tmp_path):
+    def missing():
+        raise OmplMissing("not installed")
+
+    sweep = Sweep(conditions, trial, findings=dict, plot=dict, require=missing)
+    with pytest.raises(OmplMissing, match="not installed"):
+        sweep.run(arguments("--seeds", "1"), tmp_path)
+    assert not list(tmp_path.iterdir())

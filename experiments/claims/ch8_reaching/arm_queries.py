@@ -1,0 +1,159 @@
+"""Queries of the published arm among balls, how far its planners' beliefs are off, and rivals sent to the goals of the queries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_clauses, arm_plant, arm_space, columns, robot, whole
+from experiments.kit.arm_roadmap import Belief
+from experiments.kit.control_runs import place
+from experiments.kit.rivals import Rival
+from mobee import Lattice, Model, OfflinePlant, World, sphere
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Array, Ints
+
+BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
+BALLS, RADIUS = 4, 0.03  # m
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad by which a ball and a joint differ from what is believed
+MOST_TRIES = 20_000  # of motions among which the queries are found
+LIMIT = 120.0  # s of plant time, for a query
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """The true world, the errors of what is believed, and Q queries, each from rest at `starts` to the cell of a lattice state."""
+
+    balls: Array  # (B, 3) m
+    shifts: Array  # (B, 3) m, believed minus true places
+    turns: Array  # (4,) rad, believed minus true joint angles
+    starts: Array  # (Q, 4) rad
+    goals: Ints  # (Q,)
+    is_hard: NDArray[np.bool_]  # (Q,): going straight there failed when it was tried
+
+
+def space() -> Lattice:
+    """The published lattice of rank 3 with 16 neighbours."""
+    return arm_space(RANK3, ARM_NEIGHBOURS)
+
+
+def world_of(balls: Array) -> World:
+    """Balls at these places (B, 3) m."""
+    world = World()
+    for number, position in enumerate(balls):
+        world.add(f"ball {number}", sphere(RADIUS), position=position)
+    return world
+
+
+def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
+    """The true robot among the true balls, at rest at `start` (4,) rad."""
+    plant = arm_plant(seed, world=world_of(scene.balls))
+    place(plant, whole(start[None])[0])
+    return plant
+
+
+def make_scene(seed: int, queries: int) -> Scene:
+    """Balls in the workspace, and queries of which half, or as many as are found, are not reached by going straight."""
+    rng = np.random.default_rng([seed, 75])
+    balls = _balls(rng)
+    shifts = rng.normal(size=balls.shape)
+    shifts *= SHIFT / np.linalg.norm(shifts, axis=1, keepdims=True)
+    turns = TURN * rng.choice([-1.0, 1.0], size=JOINTS)
+    return Scene(balls, shifts, turns, *_queries(seed, rng, balls, queries))
+
+
+def _balls(rng: np.random.Generator) -> Array:
+    """Places of the palm in random poses between the lattice's outer samples, that touch nothing of the robot at home."""
+    low, high = robot().limits[columns()].T
+    alone = Model(robot())
+    found: list[Array] = []
+    while len(found) < BALLS:
+        pose = low + rng.uniform(RANK3[0], RANK3[-1], JOINTS) * (high - low)
+        ball = alone.evaluate(whole(pose)).position("left_palm")
+        if not len(Model(robot(), world_of(ball[None])).evaluate(robot().home).table):
+            found.append(ball)
+    return np.array(found)
+
+
+def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> tuple[Array, Ints, NDArray[np.bool_]]:
+    """Move straight from sample to sample; a motion that was tried becomes a query, if its goal was ever reached."""
+    lattice = space()
+    plant = arm_plant(seed, world=world_of(balls))
+    free = [s for s in range(len(lattice)) if not len(plant.model.evaluate(whole(lattice.samples[s])).table)]
+    tried: list[tuple[Array, int, bool]] = []
+    reached: set[int] = set()
+    here = plant.measure(PART)[:JOINTS]
+    while len(tried) < MOST_TRIES:
+        goal = int(rng.choice(free))
+        end = plant.act(PART, lattice.target(goal)).q[:JOINTS]
+        succeeded = lattice.state_of(end) == goal
+        if lattice.state_of(here) != goal:
+            tried.append((here, goal, not succeeded))
+        reached |= {goal} if succeeded else set()
+        here = end
+        if len(tried) % 100 == 0:
+            hard = [query for query in tried if query[2] and query[1] in reached]
+            easy = [query for query in tried if not query[2]]
+            if min(len(hard), len(easy)) >= (count + 1) // 2:
+                break
+    if not hard or not easy:
+        raise InvalidValue(
+            f"scene {seed}: going straight reached {len(easy)} of {len(tried)} goals; leave this seed out, there is no choice."
+        )
+    half = count // 2
+    chosen = [*_some(rng, hard, count - half), *_some(rng, easy, half)]
+    chosen = [chosen[i] for i in rng.permutation(len(chosen))]
+    starts, goals, failed = zip(*chosen, strict=True)
+    return np.array(starts), np.array(goals, dtype=np.intp), np.array(failed)
+
+
+def _some(rng: np.random.Generator, queries: list[tuple[Array, int, bool]], count: int) -> list[tuple[Array, int, bool]]:
+    return [queries[i] for i in rng.permutation(len(queries))[:count]]
+
+
+def believed(scene: Scene, kind: str) -> Belief:
+    """A belief about a scene, of one of the BELIEFS: "true", or with hidden parts.
+
+    Hidden are with "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and joints 3
+    degrees off), "both", "gross" (both, three times as much off).
+    """
+    times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
+    clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+    return Belief(Model(robot(), world_of(scene.balls + times * scene.shifts)), times * scene.turns, clauses)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """The results of Q queries."""
+
+    success: NDArray[np.bool_]  # (Q,)
+    seconds: Array  # (Q,) of plant time, LIMIT where there was no success
+    actions: Ints  # (Q,)
+    repairs: Ints  # (Q,)
+
+
+def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
+    """Send the rival to every goal, in order; the same noise for all rivals."""
+    lattice = space()
+    rows = []
+    for number, goal in enumerate(scene.goals):
+        plant = plant_of(scene, 1000 * seed + number, scene.starts[number])
+        begun, before, actions = plant.time, rival.repairs, 0
+        rival.begin(int(goal))
+        here = plant.measure(PART)[:JOINTS]
+        while lattice.state_of(here) != goal and plant.time - begun < LIMIT:
+            aim = rival.aim(here)
+            if aim is None:
+                break
+            target = lattice.target(int(goal))
+            target[:JOINTS] = aim
+            end = plant.act(PART, target).q[:JOINTS]
+            rival.observe(here, end)
+            here, actions = end, actions + 1
+        success, seconds = lattice.state_of(here) == goal, plant.time - begun
+        success = success and seconds <= LIMIT
+        rows.append((success, seconds if success else LIMIT, actions, rival.repairs - before))
+    success, seconds, actions, repairs = zip(*rows, strict=True)
+    return Answers(np.array(success), np.array(seconds), np.array(actions), np.array(repairs))

@@ -1,0 +1,131 @@
+"""The live arm with the ticks of its reaches, and the mover of a target or an obstacle while the arm reaches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.chain import Commands
+from bus_schema.messages import Clock, Geometry, Reach
+from bus_schema.rpc import AddObject, Done, MoveObject, OneName, Place, Request
+from experiments.claims.ch8_reaching.live_reach.problems import SPEED
+from experiments.kit.reaching.arm import PART
+from mobee.reach import RADIUS
+from mobee.robot.robot import Array, Robot
+from services.common.bus_plant import BusPlant
+from services.common.lockstep import Participant
+from services.common.service import Service
+
+MOVES = 5e-3  # rad/s by which a command that moves differs from the last before the request
+THING, OBSTACLE = "thing", "obstacle"  # the target that moves; the world file's obstacle
+EVERY = 5  # ticks, after which it is moved on
+AWAY = np.array([0.6, 0.9, 0.6])  # m, where an obstacle disturbs nothing
+UPRIGHT, SPHERE = [1.0, 0.0, 0.0, 0.0], Geometry(kind="sphere", size=[RADIUS])
+
+
+class Hand(BusPlant):
+    """A BusPlant that records the ticks at which its reaches were asked for, moved it, and ended."""
+
+    def __init__(self, service: Service, robot: Robot) -> None:
+        super().__init__(service, robot, (PART,))
+        self._link, self._where = service, robot.part(PART).slice
+        self.end = 0
+        """Tick at which the force of the last reach ended."""
+        self.first = -1
+        """Ticks from the request of the last reach to the first command that moves; -1: not timed."""
+        self.asked = 0
+        """Tick of the last request."""
+        self._before: Array | None = None
+        service.on_each(keys.reach(PART), Reach, self._note_reach, part=PART)
+
+    @property
+    def tick(self) -> int:
+        """The tick now: in lockstep a service without a turn receives messages of its part alone."""
+        motion = self._motion.get(PART)
+        return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
+
+    def watch_commands(self) -> None:
+        """Time the first motion of reaches from now on; costs time in every tick."""
+        self._link.on_each(keys.COMMANDS, Commands, self._note_commands)
+
+    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
+        self.first = -1
+        self.asked = super()._ask(part, verb, request, **fields)
+        return self.asked
+
+    def _note_reach(self, reach: Reach) -> None:
+        self.end = reach.end_k
+
+    def _note_commands(self, commands: Commands) -> None:
+        """Those formed of tick k act from tick k + 1 on; what is asked for in tick k is known to those of the next."""
+        reference = np.array(commands.ref[self._where])
+        if commands.re_k <= self.asked:
+            self._before = reference
+        elif self.first < 0 and self._before is not None and np.abs(reference - self._before).max() > MOVES:
+            self.first = commands.re_k + 1 - self.asked
+
+
+class Mover:
+    """Moves one thing to and fro, in the model's world and, for an obstacle, in the simulator's; a service of its own in every tick."""
+
+    def __init__(self, service: Service, tick: float) -> None:
+        """`tick`: s."""
+        self._service, self._dt = service, tick
+        self._step = Participant(service)
+        self._name = ""
+        self._ends = np.zeros((2, 3))
+        self._begin = self._k = 0
+        service.on_clock(self._tick)
+
+    def start(self, name: str, ends: list[list[float]]) -> None:
+        """Move a thing between two places from now on, beginning at the first."""
+        self._ends, self._begin = np.array(ends), self._k
+        if name == THING:
+            self._service.call(
+                keys.world_rpc("add"), AddObject, Done, name=name, geometry=SPHERE, position=ends[0], quaternion=UPRIGHT, role="target"
+            )
+        self._name = name
+        self._put(self.at(self._k))
+
+    def stop(self) -> None:
+        """Take it away."""
+        name, self._name = self._name, ""
+        if name == THING:
+            self._service.call(keys.world_rpc("remove"), OneName, Done, name=name)
+        elif name:
+            self._place(name, AWAY)
+
+    def at(self, k: int) -> Array:
+        """Where it is at a tick, (3,) m."""
+        path = self._ends[1] - self._ends[0]
+        gone = SPEED * self._dt * ((k - self._begin) // EVERY * EVERY) / max(float(np.linalg.norm(path)), 1e-9)
+        found: Array = self._ends[0] + (1.0 - abs(1.0 - gone % 2.0)) * path
+        return found
+
+    def now(self) -> Array:
+        """Where it is."""
+        return self.at(self._k)
+
+    def leave(self) -> None:
+        """End its part in the lockstep."""
+        self._name = ""
+        self._step.done(self._k, last=True)
+
+    def _tick(self, clock: Clock) -> None:
+        self._k = clock.k
+        if self._name and (clock.k - self._begin) % EVERY == 0:
+            self._put(self.at(clock.k))
+        self._step.done(clock.k)
+
+    def _put(self, position: Array) -> None:
+        if self._name == THING:
+            self._move(THING, position)
+        else:
+            self._place(self._name, position)
+
+    def _place(self, name: str, position: Array) -> None:
+        self._move(name, position)
+        self._service.call(keys.sim("place"), Place, Done, name=name, position=position.tolist(), tries=3)
+
+    def _move(self, name: str, position: Array) -> None:
+        self._service.call(keys.world_rpc("move"), MoveObject, Done, name=name, position=position.tolist())

@@ -1,0 +1,211 @@
+"""The live arm and its problems: robot, law and states, targets, poses to begin in, and the learner that is trained offline.
+
+The problems are the thesis' 27 targets and fresh ones between them, each with a random pose to begin in, at rest or with a target or an
+obstacle that moves.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from msgspec import Struct, structs
+
+from experiments.babbling.modes import WORLD
+from experiments.kit.reaching.arm import MARKER, PART
+from experiments.kit.reaching.belief import PeerBelief, approach
+from experiments.kit.reaching.targets import grid
+from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World, load_robot, load_world
+from mobee.errors import InvalidValue
+from mobee.learning.learned import load_learned
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import ReachStore
+from mobee.reach import Aim, ReachPlant, ReachTarget
+from mobee.robot.robot import Array, Robot
+from mobee.store import TransitionStore
+
+ROBOT, GAINS, RATE = "icub", "default", 50  # Hz
+JOINTS, WRIST = 4, 7  # of the lattice; those of a reach, and of the planner
+LEVELS, NEIGHBOURS = (0.25, 0.5, 0.75), 16
+PREDICTOR, STRATEGY, FAILURES = "gp", "ucb", "alike"
+GOOD = 0.02  # m from the target's surface
+DEEP = 2e-3  # m, of a solid contact
+REACHES = 3  # a try, each from another pre-reach state
+APART = 0.25  # of the ranges: states no farther from one that missed are not reached from again in a try; one step of the lattice
+AIM: Aim = "surface"
+TRANSITIONS = 3000  # curious ones, before the first target (thesis 7.2.2: 2987)
+POSES = 256  # in which inverse kinematics begins
+CLOSE = 5e-3  # m, margin of inverse kinematics
+DRAWS = 1000
+AWAY = ReachTarget(np.array([0.0, 0.0, 10.0]))
+GRID, FRESH, TARGET_MOVES, OBSTACLE_MOVES = "grid", "fresh", "target moves", "obstacle moves"
+SPEED = 0.03  # m/s, of what moves
+FAR = 0.15  # m that a target moves, and an obstacle to either side
+OBSTACLE, CLEAR = 0.04, 0.05  # m, its radius, and how far its surface stays from that of the target
+SPARE = 6  # fresh targets a problem
+PATHS = 8  # across, that are drawn
+
+
+@cache
+def robot() -> Robot:
+    """The robot of the live system."""
+    return load_robot(ROBOT)
+
+
+def world(path: Path = WORLD) -> World:
+    """The world with the table."""
+    return load_world(str(path))
+
+
+@cache
+def space() -> Lattice:
+    """81 states of shoulder and elbow."""
+    return Lattice(robot(), robot().parts[PART].motors[:JOINTS], LEVELS, NEIGHBOURS)
+
+
+def offline_plant(seed: int) -> OfflinePlant:
+    """The arm with its wrist, at the table, with the motors that were identified on PyBullet."""
+    motors = MotorParameters.identified(ROBOT)
+    return OfflinePlant(Model(robot(), world()), seed, Gains.named(GAINS), motors, 1.0 / RATE, active=robot().parts[PART].motors[:WRIST])
+
+
+def belief() -> PeerBelief:
+    """The belief of a planner: everything that MoBeE's model knows."""
+    clauses = [clause for clause in robot().clauses if clause.part == PART]
+    return PeerBelief(Model(robot(), world()), robot().parts[PART].motors[:WRIST], MARKER, clauses, Gains.named(GAINS))
+
+
+class Problem(Struct, frozen=True):
+    """A target and the posture of the part to begin in."""
+
+    kind: str
+    number: int
+    position: list[float]  # m, root frame
+    start: list[float]  # rad
+    path: list[list[float]] | None = None
+    """Between which places, m, the target or an obstacle moves to and fro; None: nothing moves."""
+
+    @property
+    def target(self) -> ReachTarget:
+        """The sphere that is presented."""
+        return ReachTarget(np.array(self.position), aim=AIM)
+
+
+def grid_targets() -> list[ReachTarget]:
+    """The 27 targets of the thesis."""
+    return [ReachTarget(place, aim=AIM) for place in grid()]
+
+
+def touchable(known: PeerBelief, target: ReachTarget) -> bool:
+    """Whether inverse kinematics finds a sound pose with the palm within 2 cm of the target's surface.
+
+    Limits and cables hold in it, and no solid touches anything but the hand the target.
+    """
+    known.present(target)
+    low, high = known.range.T
+    starts = np.random.default_rng(27).uniform(low, high, (POSES, len(known.columns)))
+    poses, missing = approach(known, starts, target.position, target.radius + GOOD - CLOSE, known.range)
+    poses = poses[missing <= CLOSE]
+    return len(poses) > 0 and bool(known.sound(poses, "grasping").any())
+
+
+def grid_problems(seed: int) -> list[Problem]:
+    """Problems of the 27 targets, reachable or not, each with its own pose to begin in."""
+    rng, known = np.random.default_rng([seed, 271]), belief()
+    return [_begun(known, GRID, number, target, rng) for number, target in enumerate(grid_targets())]
+
+
+def fresh_problems(seed: int, count: int) -> list[Problem]:
+    """Problems of touchable targets drawn in the box around the 27."""
+    rng, known, places = np.random.default_rng([seed, 50]), belief(), grid()
+    found: list[Problem] = []
+    for _ in range(DRAWS):
+        target = ReachTarget(rng.uniform(places.min(axis=0), places.max(axis=0)), aim=AIM)
+        if touchable(known, target):
+            found.append(_begun(known, FRESH, len(found), target, rng))
+        if len(found) == count:
+            return found
+    raise InvalidValue(f"only {len(found)} of {count} targets in {DRAWS} draws: take another seed.")
+
+
+def moving_problems(seed: int, count: int) -> list[Problem]:
+    """Problems of fresh targets that move, and as many with an obstacle that crosses the path of the hand."""
+    rng, known, found = np.random.default_rng([seed, 51]), belief(), list[Problem]()
+    for problem in fresh_problems(seed + 1000, SPARE * count):
+        if len(found) < count:
+            to = rng.uniform(-1.0, 1.0, 3)
+            other = problem.target.position + FAR * to / np.linalg.norm(to)
+            if touchable(known, ReachTarget(other, aim=AIM)):
+                found.append(structs.replace(problem, kind=TARGET_MOVES, number=len(found), path=[problem.position, other.tolist()]))
+        elif len(found) < 2 * count:
+            path = _across(known, problem, rng)
+            if path is not None:
+                found.append(structs.replace(problem, kind=OBSTACLE_MOVES, number=len(found), path=path))
+    return found
+
+
+def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> list[list[float]] | None:
+    """Ends of a path across the middle between hand and target, which stays clear of the target and ends clear of the arm."""
+    start = np.array(problem.start)[: len(known.columns)]
+    target, hand = problem.target, known.model.evaluate(known.whole(start)).position(known.marker)
+    out = target.position - hand
+    for _ in range(PATHS):
+        across = np.cross(out, rng.normal(size=3))
+        ends = hand + 0.5 * out + FAR * np.array([[1.0], [-1.0]]) * across / np.linalg.norm(across)
+        places = ends[0] + np.linspace(0.0, 1.0, 9)[:, None] * (ends[1] - ends[0])
+        if np.linalg.norm(places - target.position, axis=1).min() < OBSTACLE + target.radius + CLEAR:
+            return None
+        if all(_is_clear(known, start, end) for end in ends):
+            return [end.tolist() for end in ends]
+    return None
+
+
+def _is_clear(known: PeerBelief, start: Array, place: Array) -> bool:
+    """Whether an obstacle there touches nothing of the robot in that pose."""
+    known.present(ReachTarget(place, OBSTACLE + CLEAR))
+    return bool(known.sound(start[None])[0])
+
+
+def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: np.random.Generator) -> Problem:
+    """A problem with a random pose in which no field feels anything, not even the target unless it lies in the body."""
+    low, high = known.limits.T
+    for there in (target, AWAY):
+        known.present(there)
+        for _ in range(DRAWS):
+            q: Array = rng.uniform(low, high)
+            if known.sound(q[None], "fields")[0] and known.sound(q[None])[0]:
+                return Problem(kind, number, target.position.tolist(), posture(known, q).tolist())
+    raise InvalidValue(f"no pose to begin in was found in {DRAWS} draws: take another seed.")
+
+
+def posture(known: PeerBelief, q: Array) -> Array:
+    """The angles of the whole part, rad, from those of the planned motors (d,); the others at home."""
+    found: Array = known.whole(q)[robot().parts[PART].slice]
+    return found
+
+
+def train(file: Path, seed: int, transitions: int, tries: int) -> None:
+    """Learn the transitions, and then the 27 targets, on the offline plant; goes on where an earlier call was broken off."""
+    plant = offline_plant(seed)
+    with TransitionStore(file, PART) as store:
+        agent = CuriousAgent(space(), plant, seed=seed, store=store)
+        agent.run(max(0, transitions - agent.transitions))
+    reacher = learner(plant, seed, file)
+    reacher.learn(grid_targets(), max(0, tries - reacher.tries))
+
+
+def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
+    """The learner that continues its record, or begins one."""
+    known = load_learned(file, PART, plant.robot)
+    return ReachAgent(
+        known.space,
+        plant,
+        known.model.debiased(),
+        marker=MARKER,
+        predictor=PREDICTOR,
+        strategy=STRATEGY,
+        failures=FAILURES,
+        seed=seed,
+        store=ReachStore(file, PART),
+    )

@@ -1,0 +1,205 @@
+"""Tries on the live robot: the job of a launch, its record, their judgement by the simulator's joints, and why targets were missed.
+
+    python -m experiments.claims.ch8_reaching.live_reach.tries
+
+prints, in some minutes, how near reaches from all states come to those of the 27 targets that can be reached, offline.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from experiments.claims.ch8_reaching.live_reach.problems import (
+    DEEP,
+    GOOD,
+    Problem,
+    belief,
+    grid_targets,
+    offline_plant,
+    robot,
+    space,
+    touchable,
+)
+from experiments.kit.control_runs import place
+from experiments.kit.live import read_done
+from experiments.kit.reaching.arm import MARKER, PART
+from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_touches
+from mobee import Model, OfflinePlant
+from mobee.reach import RADIUS, ReachTarget
+from mobee.robot.robot import Array
+
+BLOCK = "block.json"
+STILL = 20  # ticks before a request, in which the motion of joints at rest is measured
+MOVED = 1e-5  # rad beyond the motion at rest: a joint moves
+FELT = 2  # contacts that are named, the deepest
+
+Kind = Literal["refine", "learner", "peer", "moving", "first motion"]
+
+
+class Job(Struct, frozen=True):
+    """A block of tries on one launch of the system."""
+
+    kind: Kind
+    seed: int
+    store: str
+    """File of the learned transitions and reaches."""
+    problems: list[Problem] = []
+    tries: int = 0
+    """Their total number after the learner was refined."""
+
+
+class Tried(Struct, frozen=True):
+    """A try; ticks are robot_sim's."""
+
+    kind: str
+    number: int
+    out: int  # tick at which the arm set out for where it begins
+    begin: int  # at which the target was presented
+    ends: list[int]  # ticks at which the hand was to be there
+    over: int  # tick at which the arm rested again
+    off: float  # rad, from the posture to begin in
+    actions: int
+    believed: float  # m, that were missing by the encoders, in the end
+    thinking: float  # s of processor time spent on plans
+    why: str = ""  # it ended without a reach
+    asked: int = 0  # tick of the last request
+    there: list[float] | None = None  # m, where a target that moves was at the last of the ends
+    first: int = -1  # ticks from the last request to the first command that moves, where it was timed
+
+
+class Judged(Struct, frozen=True):
+    """A try as judged by the simulator."""
+
+    kind: str
+    number: int
+    position: list[float]  # m
+    off: float  # m, from the target's surface, when the hand was to be there for the last time
+    success: bool
+    seconds: float  # robot time from the presentation to that moment
+    actions: int
+    reaches: int
+    thinking: float  # s of processor time spent on plans
+    deep: list[Touch]  # solid contacts deeper than 2 mm from when the arm set out from home to its rest
+    begun_off: float  # rad, from the posture to begin in
+    why: str  # it came to no end
+    first: int  # ticks from request to the first command that moves, -1: not timed
+    first_motion: int  # ticks from request to where a joint first truly moves, -1: not timed
+
+
+class Block(Struct, frozen=True):
+    """All tries of a job."""
+
+    kind: str
+    rate: float  # Hz
+    seconds: float  # of robot time
+    repeatable: bool
+    tries: list[Judged]
+    deep: list[Touch]  # solid contacts deeper than 2 mm, of the whole block
+
+
+def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
+    """Judge the tries of a launch by the record in its folder."""
+    q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
+    deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > DEEP]
+    done = read_done(folder, Tried)
+    problems = {(problem.kind, problem.number): problem for problem in job.problems}
+    model = Model(robot())
+    judged = [judge(tried, np.array(tried.there or problems[tried.kind, tried.number].position), q, deep, model, rate) for tried in done]
+    return Block(job.kind, rate, len(q) / rate, repeatable, judged, deep)
+
+
+def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Model, rate: float) -> Judged:
+    """Judge a try; `q` (T, n) rad: row k - 2 holds the joints at the beginning of tick k."""
+    off = np.inf
+    if tried.ends:
+        palm = model.evaluate(q[tried.ends[-1] - 2]).position(MARKER)
+        off = max(0.0, float(np.linalg.norm(palm - position)) - RADIUS)
+    return Judged(
+        kind=tried.kind,
+        number=tried.number,
+        position=position.tolist(),
+        off=off,
+        success=off <= GOOD,
+        seconds=(tried.ends[-1] - tried.begin) / rate if tried.ends else 0.0,
+        actions=tried.actions,
+        reaches=len(tried.ends),
+        thinking=tried.thinking,
+        deep=[touch for touch in deep if tried.out <= touch.begin <= tried.over],
+        begun_off=tried.off,
+        why=tried.why,
+        first=tried.first,
+        first_motion=_first_motion(q, tried.asked) if tried.first >= 0 else -1,
+    )
+
+
+def _first_motion(q: Array, asked: int) -> int:
+    """Ticks from a request to the first in which a joint of the arm has gone further than it does at rest."""
+    arm = q[:, robot().parts[PART].slice]
+    before, after = arm[asked - STILL : asked], arm[asked:]
+    bound = MOVED + np.ptp(before, axis=0).max()
+    moved = np.abs(after - before[-1]).max(axis=1) > bound
+    return int(np.argmax(moved)) + 1 if moved.any() else -1
+
+
+def write_block(folder: Path, block: Block) -> None:
+    """Write it whole or not at all."""
+    new = (folder / BLOCK).with_suffix(".new")
+    new.write_bytes(msgspec.json.format(msgspec.json.encode(block), indent=1))
+    new.replace(folder / BLOCK)
+
+
+def read_block(folder: Path) -> Block:
+    """Read what `write_block` wrote."""
+    return msgspec.json.decode((folder / BLOCK).read_bytes(), type=Block)
+
+
+def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]:
+    """The least remaining error of a reach from a state, m, and the deepest contacts at its end, as pairs with depths in mm.
+
+    The search stops at the first that succeeds.
+    """
+    best, ending = np.inf, plant.robot.home
+    arm = plant.robot.part(PART).slice
+    for state in range(len(space())):
+        whole = plant.robot.home.copy()
+        whole[arm] = space().target(state)
+        plant.present(None)
+        place(plant, whole)
+        plant.present(target)
+        made = plant.reach(PART, MARKER, stay=True)
+        if made.missing < best:
+            best, ending = made.missing, whole.copy()
+            ending[arm] = made.q
+        if best <= GOOD:
+            break
+    return best, _felt(plant, ending)
+
+
+def _felt(plant: OfflinePlant, q: Array) -> str:
+    """The deepest contacts of a pose (n,) rad while the hand reaches."""
+    plant.model.reaching = MARKER
+    contacts = sorted(plant.model.evaluate(q).contacts, key=lambda contact: -contact.depth)
+    plant.model.reaching = None
+    return ", ".join(f"{one.first} {one.second} {1e3 * one.depth:.0f}" for one in contacts[:FELT])
+
+
+def main() -> None:
+    """Print the table."""
+    known, plant = belief(), offline_plant(0)
+    lines = ["| target | x | y | z | nearest reach [mm] | felt there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
+    for number, target in enumerate(grid_targets()):
+        if touchable(known, target):
+            off, felt = nearest_reach(plant, target)
+            where = " | ".join(f"{x:.1f}" for x in target.position)
+            lines.append(f"| {number} | {where} | {1e3 * off:.0f} | {felt if off > GOOD else ''} |")
+    sys.stdout.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,192 @@
+"""Selected reaches as a filmstrip (thesis figs. A.1-A.3).
+
+    python -m experiments.claims.ch8_reaching.reach_film [RUN.sqlite] [--out reach_film.png]
+
+The iCub at its table under the default law, its right arm offline.  RUN: the file of a run that learned to reach, as of a `ReachStore`;
+one that is not there is made, by 3000 curious transitions and 800 problem-tries on the 27 targets of the thesis.  Of 60 reaches for
+targets drawn at random, each from a random state, the clearest examples are drawn: from above, far, around the target.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+import mobee
+from experiments.drawing.camera import axes_named
+from experiments.drawing.filmstrip import Strip, filmstrip
+from experiments.drawing.motion import Motion, recorded
+from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.kit.reaching.arm import LEARNED, MARKER, PART
+from experiments.kit.reaching.targets import grid, targets_at
+from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
+from mobee.learning.reaching.learned_reaches import load_reaches
+from mobee.learning.reaching.store import ReachStore
+from mobee.learning.reaching.tries import Try
+from mobee.reach import TARGET, ReachTarget
+from mobee.robot.robot import Array
+from mobee.store import TransitionStore
+
+TRIES, EPISODES = 800, 60
+REACHED = 0.02  # m from the target's surface
+NEAR = 0.002  # m: the hand has arrived
+VIEWS = ("oblique", "left")
+LAST = 0.10  # m: the least distance that a detour is divided by
+LEAST = 0.15  # m: the shortest path that is shown, and the last piece of a path, which may be from above
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Episode:
+    """A reach that succeeded: its target, its actions, and the motion until the hand arrived."""
+
+    target: ReachTarget
+    done: Try
+    motion: Motion
+
+
+def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
+    """Joints of the right arm at the table, the ball taken off it; the others are rigid."""
+    world = mobee.load_world("table")
+    world.remove("ball")
+    return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
+
+
+def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = LEARNED) -> None:
+    """Learn transitions and then reaches at the table, on record in a file."""
+    plant = table_plant(seed)
+    space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)
+    with TransitionStore(file, PART) as store:
+        curious = CuriousAgent(space, plant, seed=seed, store=store)
+        curious.run(transitions)
+    with ReachStore(file, PART) as reaches:
+        agent = ReachAgent(
+            space,
+            plant,
+            curious.model.debiased(),
+            marker=MARKER,
+            predictor="gp",
+            strategy="ucb",
+            failures="alike",
+            seed=seed,
+            store=reaches,
+        )
+        agent.learn(targets_at(grid(), "surface"), tries)
+
+
+def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> list[Episode]:
+    """Reach that often for targets that the agent knows, drawn at random, each time from a random state; those that succeeded."""
+    rng, found = np.random.default_rng([seed, 8]), []
+    for _ in range(count):
+        agent.evaluate([], 1)  # puts the robot in a random state
+        target = agent.problems.targets[int(rng.integers(len(agent.problems.targets)))]
+        plant.present(target)
+        with recorded(plant) as recording:
+            done = agent.try_problem(target)
+        if done.reach_state is not None and done.missing <= REACHED:
+            motion = recording.motion()
+            away = np.linalg.norm(motion.way(agent.marker) - target.position, axis=1)
+            found.append(Episode(target, done, motion.part(0, int(np.argmax(away <= away.min() + NEAR)))))
+    return found
+
+
+def selected(paths: Sequence[Array]) -> dict[str, int]:
+    """The number of the clearest example of each kind among paths (T, 3) m, none of them for two kinds."""
+    left = [number for number, path in enumerate(paths) if _length(path) >= LEAST]
+    chosen: dict[str, int] = {}
+    for name, measure in KINDS.items():
+        if left:
+            chosen[name] = left.pop(int(np.argmax([measure(paths[number]) for number in left])))
+    return chosen
+
+
+def _length(path: Array) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def _descent(path: Array) -> float:
+    """The slope of the last piece of a path: 1 vertically down, 0 level."""
+    before = path[np.linalg.norm(path - path[-1], axis=1) >= LAST]
+    if not len(before):
+        return -np.inf
+    return float((before[-1] - path[-1])[2] / np.linalg.norm(before[-1] - path[-1]))
+
+
+def _distance(path: Array) -> float:
+    return float(np.linalg.norm(path[-1] - path[0]))
+
+
+def _detour(path: Array) -> float:
+    """The length over the straight distance."""
+    return _length(path) / max(float(np.linalg.norm(path[-1] - path[0])), LAST)
+
+
+KINDS = {"From above": _descent, "Far": _distance, "Around the target": _detour}
+
+
+def _strip(name: str, one: Episode, marker: str, poses: int) -> Strip:
+    """From the view in which the target hides least of the hand that is at it."""
+    behind = one.motion.poses[-1].position(marker) - one.target.position
+    view = min(VIEWS, key=lambda view: float(axes_named(view)[2] @ behind))
+    return Strip(one.motion, marker, (view,), poses, _title(name, one), partial(_caption, marker))
+
+
+def _title(name: str, one: Episode) -> str:
+    states = [s for s, *_ in one.done.path] + [one.done.reach_state]
+    return f"{name}: state {' → '.join(map(str, states))}, then reach: {1000 * one.done.missing:.0f} mm from the target"
+
+
+def _caption(marker: str, motion: Motion, moment: int) -> str:
+    target = motion.objects[moment][TARGET]
+    left = float(np.linalg.norm(motion.poses[moment].position(marker) - target.position)) - target.size[0]
+    return f"{motion.times[moment]:.1f} s, {100 * max(left, 0.0):.0f} cm"
+
+
+def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]:
+    """Draw the selected reaches of what is on record in a file; returns their titles."""
+    with ReachStore(file, PART, read_only=True) as store:
+        joints = store.settings()["space"]["joints"]
+    plant = table_plant(seed + 1, joints)
+    agent = load_reaches(file, plant, PART)
+    found = episodes(agent, plant, EPISODES, seed)
+    chosen = [(name, found[number]) for name, number in selected([one.motion.way(agent.marker) for one in found]).items()]
+    if not chosen:
+        raise MobeeError(f"{file}: none of {EPISODES} reaches ended within {REACHED} m of its target; let it learn more.")
+    strips = [_strip(name, one, agent.marker, poses) for name, one in chosen]
+    filmstrip(strips, out, height)
+    return [strip.title for strip in strips]
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Learn if need be, and draw."""
+    parser = argparse.ArgumentParser(description="Draw selected reaches of what was learned.")
+    parser.add_argument(
+        "run", nargs="?", type=Path, metavar="RUN.sqlite", help="the record of a learner; made if not there (default: made, not kept)"
+    )
+    parser.add_argument("--out", type=Path, default=Path("reach_film.png"), metavar="PNG", help="default: %(default)s")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the states and targets (default: %(default)s)")
+    parser.add_argument("--poses", type=int, default=6, metavar="N", help="pictures of each reach (default: %(default)s)")
+    parser.add_argument("--height", type=int, default=260, metavar="PIXELS", help="of each picture (default: %(default)s)")
+    options = parser.parse_args(argv)
+    with tempfile.TemporaryDirectory() as folder:
+        file = options.run or Path(folder) / "run.sqlite"
+        try:
+            if not file.exists():
+                learn(Path(folder) / "learning.sqlite")
+                shutil.move(Path(folder) / "learning.sqlite", file)  # whole, or not there
+            titles = film(file, options.out, options.seed, options.poses, options.height)
+        except MobeeError as error:
+            raise SystemExit(str(error)) from None
+    for title in titles:
+        print(title)
+    print(options.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""The numbers of the runs of one exploration strategy: scores, choices of states, agreement, coverage and costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.cells import CellResult
+from experiments.kit.reaching.arm import MARKER, reach_space
+from experiments.kit.reaching.targets import grid
+from mobee.learning.reaching.evaluation import NOWHERE
+from mobee.learning.reaching.where import hands_of
+from mobee.robot.robot import Array, Ints
+
+STRATEGIES = ("intrinsic", "greedy", "random")
+CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """The runs of one strategy, by seed: values of their cells, and the seconds that each took."""
+
+    values: tuple[Mapping[str, Any], ...]
+    seconds: tuple[float, ...]
+    checkpoints: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def scores(self, checkpoint: int) -> Array:
+        """The cumulative reward over the targets, mean of the evaluations, (N,): what figure 8.2 stacks."""
+        at = self.checkpoints.index(checkpoint)
+        return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
+
+    def chosen(self, checkpoint: int) -> Array:
+        """The share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
+        at = self.checkpoints.index(checkpoint)
+        return np.array([_shares(one["states_grid"][at]) for one in self.values])
+
+    def agreement(self, checkpoint: int) -> Array:
+        """The mean overlap of each run's choices with those of another run, (N,), 0 to 1."""
+        chosen = self.chosen(checkpoint)
+        overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
+        others = max(len(self) - 1, 1)
+        shared: Array = (overlaps.sum(axis=1) - overlaps.diagonal()) / others
+        return shared
+
+    def favourites(self, checkpoint: int) -> Array:
+        """The least number of states that make half of a run's reaches, (N,)."""
+        ordered = -np.sort(-self.chosen(checkpoint), axis=1)
+        return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
+
+    def height(self, checkpoint: int) -> Array:
+        """The mean height of the palm in the chosen states above that in all states, (N,) m."""
+        heights = palms()[:, 2]
+        above: Array = self.chosen(checkpoint) @ heights - heights.mean()
+        return above
+
+    def tried(self, tries: int) -> Array:
+        """The share of all pairs of a state and a target that were tried in the first so many problem-tries, (N,)."""
+        return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
+
+    def exploration(self, tries: int) -> Array:
+        """The mean number of reaches by target and state in the first so many problem-tries, (27, S): fig. 8.7."""
+        mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
+        return mean
+
+    def concentration(self, first: int, last: int) -> Array:
+        """The share of the two most frequent states among the reaches of problem-tries `first` to `last`, (N,)."""
+        sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
+        return np.array([one[:2].sum() / one.sum() for one in sums])
+
+    def failures(self) -> Array:
+        """The number of negative rewards of each run while it explored, (N,)."""
+        return np.array([float(one["failures"].sum()) for one in self.values])
+
+    def hours(self) -> Array:
+        """The robot's time of exploration, (N,) h."""
+        return np.array([float(one["duration"].sum()) / 3600.0 for one in self.values])
+
+    def actions(self) -> Array:
+        """Actions a problem-try, (N,)."""
+        return np.array([float(one["actions"].mean()) for one in self.values])
+
+
+def palms() -> Array:
+    """The position of the palm in each state, (S, 3) m."""
+    return hands_of(reach_space(), MARKER)
+
+
+def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
+    """The runs by strategy, in the order of the seeds."""
+    ordered = sorted(found.values(), key=lambda result: result.cell.seed)
+    runs = {}
+    for strategy in STRATEGIES:
+        mine = [result for result in ordered if result.cell.settings["strategy"] == strategy]
+        if mine:
+            checkpoints = tuple(mine[0].cell.settings["looks"])
+            runs[strategy] = Runs(tuple(one.values for one in mine), tuple(one.seconds for one in mine), checkpoints)
+    return runs
+
+
+def _shares(states: Ints) -> Array:
+    counts = np.bincount(states[states != NOWHERE], minlength=len(reach_space())).astype(np.float64)
+    shares: Array = counts / max(counts.sum(), 1.0)
+    return shares
+
+
+def _tried(one: Mapping[str, Any], part: slice) -> Ints:
+    tried = np.zeros((len(grid()), len(reach_space())), dtype=np.intp)
+    state, problem = one["reach_state"][part], one["problem"][part]
+    reached = state != NOWHERE
+    np.add.at(tried, (problem[reached], state[reached]), 1)
+    return tried

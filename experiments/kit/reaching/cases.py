@@ -1,0 +1,204 @@
+"""Cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), drawn at random: planner alone, reach alone, and both attempt them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from experiments.kit.control_runs import place
+from experiments.kit.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent
+from experiments.kit.reaching.belief import PeerBelief, approach
+from experiments.kit.reaching.learning import Course
+from experiments.kit.reaching.targets import GOOD, touchable, touchable_targets
+from mobee import MotorParameters, OfflinePlant, World, sphere
+from mobee.errors import InvalidValue
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.reach import RADIUS, ReachTarget, reward_of
+from mobee.robot.robot import Array
+
+SCENES = ("free", "around", "against", "between", "moving")
+"""From anywhere; the hand behind the target; the hand at it, and not with the palm; a ball between hand and target; a target that moves."""
+OBSTACLE, BALL = "obstacle", 0.04  # m, its radius
+APART = 0.14  # m, at least, from its middle to those of palm and target
+NEAR = 0.25  # m: the hand behind the target is no farther from it
+BEYOND = np.cos(np.deg2rad(70.0))  # between the vectors from shoulder to target and from target to hand
+TOUCH = 0.03  # m: so near to the target a link is "at" it
+MOVED = (0.05, 0.12)  # m that a target moves, at least and at most
+SPEED = 0.03  # m/s
+DRAWS = 20_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A target, the pose (4,) rad to begin in, and if there are, where an obstacle is and where the target goes, (3,) m.
+
+    `to_and_fro`: it never stops.
+    """
+
+    target: ReachTarget
+    start: Array
+    obstacle: Array | None = None
+    to: Array | None = None
+    to_and_fro: bool = False
+
+    def world(self) -> World:
+        """All but the target."""
+        world = World()
+        if self.obstacle is not None:
+            world.add(OBSTACLE, sphere(BALL), position=self.obstacle)
+        return world
+
+    def target_at(self, seconds: float) -> Array:
+        """Where the target is so long after it was presented, (3,) m."""
+        if self.to is None:
+            return self.target.position
+        offset = self.to - self.target.position
+        gone = SPEED * seconds / float(np.linalg.norm(offset))
+        share = 1.0 - abs(1.0 - gone % 2.0) if self.to_and_fro else min(1.0, gone)
+        found: Array = self.target.position + share * offset
+        return found
+
+    def seen_at(self, seconds: float) -> ReachTarget:
+        """The target so long after it was presented first."""
+        return replace(self.target, position=self.target_at(seconds))
+
+
+def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
+    """Draw so many cases of one of the SCENES with targets of `touchable_targets`; no solid touches anything in their starting poses."""
+    rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
+    targets, belief = touchable_targets(law, free), arm_belief(law=law)
+    found: list[Case] = []
+    for _ in range(DRAWS):
+        case = _case(scene, targets[rng.integers(len(targets))], belief, rng)
+        if case is not None:
+            found.append(case)
+        if len(found) == count:
+            return found
+    raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {DRAWS} draws: take another seed.")
+
+
+def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Case | None:
+    """Draw a pose to begin in; None if it does not suit the scene."""
+    low, high = belief.limits.T
+    q = rng.uniform(low, high)
+    hand = belief.model.evaluate(belief.whole(q)).position(belief.marker)
+    offset = target.position - hand
+    if scene == "around" and not _behind(belief, target, hand):
+        return None
+    belief.present(target)
+    if not belief.sound(q[None])[0] or (scene == "against" and not _touches(belief, target, q, offset)):
+        return None
+    if scene == "between":
+        obstacle = hand + 0.5 * offset
+        apart = float(np.linalg.norm(offset)) / 2.0
+        return Case(target, q, obstacle) if apart > APART and _leaves_path(belief, target, q, obstacle) else None
+    if scene == "moving":
+        to = _goal_of(target, belief, rng)
+        return None if to is None else Case(target, q, to=to)
+    return Case(target, q)
+
+
+def _leaves_path(belief: PeerBelief, target: ReachTarget, q: Array, obstacle: Array) -> bool:
+    """Whether no solid touches the obstacle in the pose, nor in some pose with the palm on the target."""
+    world = belief.model.world
+    world.add(OBSTACLE, sphere(BALL), position=obstacle)
+    leaves = bool(belief.sound(q[None])[0]) and touchable(belief, target, free=False)
+    world.remove(OBSTACLE)
+    return leaves
+
+
+def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
+    """Whether the hand is on the far side of the target, as seen from the shoulder."""
+    robot = belief.model.robot
+    shoulder = robot.joints[int(np.flatnonzero(robot.coupling[0][:, belief.columns[0]])[0])].point  # the torso is at home
+    out, beyond = target.position - shoulder, hand - target.position
+    length = float(np.linalg.norm(beyond))
+    return bool(length < NEAR and out @ beyond > BEYOND * np.linalg.norm(out) * length)
+
+
+def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -> bool:
+    """Whether a solid of the arm is within TOUCH of the target, and the palm is turned away from it, which is at `offset` (3,) m."""
+    belief.present(ReachTarget(target.position, target.radius + TOUCH))
+    near = not belief.sound(q[None])[0]
+    belief.present(target)
+    return near and float(belief.model.evaluate(belief.whole(q)).normal(belief.marker) @ offset) < 0.0
+
+
+def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Array | None:
+    """A place at the distance MOVED from the target that the palm can touch too; None if the one drawn is not."""
+    offset = rng.normal(size=3)
+    place = target.position + rng.uniform(*MOVED) * offset / np.linalg.norm(offset)
+    low, high = belief.limits.T
+    starts = rng.uniform(low, high, (16, len(belief.limits)))
+    missing = approach(belief, starts, place, target.radius, belief.limits)[1]
+    return place if missing.min() < 1e-3 else None
+
+
+METHODS = ("planner", "reach", "both")
+EVERY = 5  # ticks between two positions of a target that moves
+REACHES = {"published": 1, "default": 3}  # a case; the thesis reached once
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The result of an attempt.
+
+    `missing`: m from the target's surface to the palm.  `seconds`: of plant time.  `thinking`: s of processor time spent on
+    plans.  `reward`: thesis eq. 8.4, of what the law aims at.
+    """
+
+    missing: float
+    seconds: float
+    thinking: float
+    reward: float
+
+
+def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
+    """A reach learner that has tried the targets of `touchable_targets`, in an empty world."""
+    plant = arm_plant(seed + 500, law=law)
+    agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
+    agent.learn(touchable_targets(law, free), tries)
+    return agent
+
+
+def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
+    """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other.
+
+    A reach that misses is repeated, up to REACHES in all.
+    """
+    plant = begun(case, seed, motors, law)
+    start = plant.time
+    plant.present(case.target)
+    plant.every(EVERY, (lambda now: plant.present(case.seen_at(now - start))) if case.to is not None else None)
+    worth = partial(_nearness, hands(law)) if method == "planner" else agent.predictor.mean
+    course = Course(plant, agent, worth, lambda: case.target_at(plant.time - start), np.random.default_rng([seed, 88]))
+    for _ in range(1 if method == "planner" else REACHES[law]):
+        if method != "reach":
+            course.go()
+        aimed = _missing(plant, case, start) if method == "planner" else plant.reach(PART, MARKER).missing
+        missing = aimed if case.target.aim == "surface" else max(aimed - case.target.radius, 0.0)
+        if missing <= GOOD:
+            break
+        course.missed()
+    return Attempt(missing, plant.time - start, course.thinking, reward_of(aimed))
+
+
+def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
+    """The distance of the palm from its aim, now, m."""
+    whole = np.concatenate([plant.measure(part) for part in plant.robot.parts])
+    return case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
+
+
+def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
+    """A plant with the arm at rest in the starting pose of a case."""
+    plant = arm_plant(seed, case.world(), motors, law)
+    place(plant, arm_belief(law=law).whole(case.start))
+    return plant
+
+
+def _nearness(palms: Array, target: Array) -> Array:
+    """The worth of each state without a reach, (S,): the reward of the palm's position there."""
+    distances = np.maximum(np.linalg.norm(palms - target, axis=1) - RADIUS, 0.0)
+    return np.array([reward_of(float(distance)) for distance in distances])

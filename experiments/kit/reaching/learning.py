@@ -1,0 +1,168 @@
+"""Learning to reach in experiments: learners by name, learning with evaluations in between, and one try by plans."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mobee.learning.explorers import choose
+from mobee.learning.reaching.acting import move
+from mobee.learning.reaching.evaluation import NOWHERE, Evaluation
+from mobee.learning.reaching.failures import has_failed
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.tries import Try
+from mobee.plant import Plant
+from mobee.reach import ReachTarget
+from mobee.robot.robot import Array, Ints
+
+LIMIT = 10  # actions of a try, its reach included
+
+
+@dataclass(frozen=True)
+class Learner:
+    """A predictor, a strategy and a memory of failures, named as for ReachAgent; `cost`: relative time of a run."""
+
+    predictor: str
+    strategy: str
+    failures: str = "local"
+    cost: float = 1.0
+
+
+LEARNERS = {
+    "published": Learner("weighted", "intrinsic", "spread"),
+    "intrinsic": Learner("weighted", "intrinsic"),
+    "greedy": Learner("weighted", "greedy"),
+    "table": Learner("table", "greedy"),
+    "kernel-random": Learner("kernel", "random", cost=2.0),
+    "kernel-ucb": Learner("kernel", "ucb"),
+    "kernel-prior-ucb": Learner("kernel_prior", "ucb"),
+    "nearest-ucb": Learner("nearest", "ucb"),
+    "networks-thompson": Learner("networks", "thompson", cost=2.0),
+    "gp-greedy": Learner("gp", "greedy", cost=2.0),
+    "gp-ucb": Learner("gp", "ucb", cost=2.0),
+    "gp-ucb-alike": Learner("gp", "ucb", "alike", cost=2.0),
+    "gp-thompson": Learner("gp", "thompson", cost=2.0),
+    "gp-progress": Learner("gp", "progress", cost=2.0),
+    "gp-ucb-spread": Learner("gp", "ucb", "spread", cost=2.0),
+}
+
+
+def learn(
+    agent: ReachAgent,
+    problems: Sequence[ReachTarget],
+    checkpoints: Sequence[int],
+    repetitions: int,
+    sets: Mapping[str, Sequence[ReachTarget]],
+) -> dict[str, Any]:
+    """Learn from the problems, and evaluate the agent on each of the named sets at the checkpoints, which are numbers of tries.
+
+    Returns arrays: of the T problem-tries `problem`, `reach_state`, `reward`, `actions`, `duration` (s), each (T,); `failures`
+    (S, A), how often each transition failed in them; and of a set `rewards_NAME` and `states_NAME`, (L, R, P), and
+    `blocked_NAME` (L,), failed transitions of the L evaluations of R repetitions of P problems.
+    """
+    tries: list[Try] = []
+    found: dict[str, list[Evaluation]] = {name: [] for name in sets}
+    for checkpoint in checkpoints:
+        while len(tries) < checkpoint:
+            agent.learn(problems, 1)
+            assert agent.last is not None
+            tries.append(agent.last)
+        for name, evaluated in sets.items():
+            found[name].append(agent.evaluate(evaluated, repetitions))
+    values = _of_tries(tries, agent.space.goals.shape) | {"problem": _numbers(agent, problems)[[one.problem for one in tries]]}
+    for name, evaluations in found.items():
+        values |= of_evaluations(name, evaluations)
+    return values
+
+
+def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
+    """The evaluations on a set as arrays."""
+    return {
+        f"rewards_{name}": np.array([one.rewards for one in evaluations]),
+        f"states_{name}": np.array([one.states for one in evaluations], dtype=np.int16),
+        f"blocked_{name}": np.array([one.failures.sum() for one in evaluations]),
+    }
+
+
+def _numbers(agent: ReachAgent, problems: Sequence[ReachTarget]) -> Ints:
+    """The place of each of the agent's problems in this sequence."""
+    order = {problem.position.tobytes(): number for number, problem in enumerate(problems)}
+    return np.array([order[target.position.tobytes()] for target in agent.problems.targets], dtype=np.int16)
+
+
+def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
+    failures = np.zeros(shape, dtype=np.int32)
+    for one in tries:
+        for state, action, _, failed in one.path:
+            failures[state, action] += failed
+    return {
+        "reach_state": np.array([NOWHERE if one.reach_state is None else one.reach_state for one in tries], dtype=np.int16),
+        "reward": np.array([one.reward for one in tries], dtype=np.float32),
+        "actions": np.array([len(one.path) + (one.reach_state is not None) for one in tries], dtype=np.int16),
+        "duration": np.array([one.duration for one in tries], dtype=np.float32),
+        "failures": failures,
+    }
+
+
+class Course:
+    """One try by plans, as in an evaluation (thesis 8.3.3), on any plant and to any target, also one that moves; nothing is learned.
+
+    It goes to where reaching is worth most, and remembers in this try which transitions failed and from which states reaches missed.
+
+    Args:
+        plant: the robot.
+        agent: its transition model and its planning are used.
+        worth: the expected reward of reaching for a target (3,) m from each state, (S,).
+        where: the position of the target now, (3,) m.
+        rng: of draws among equal actions.
+        apart: sum of the motors' distances as shares of their ranges: states no farther from one that missed are expected to miss too.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        agent: ReachAgent,
+        worth: Callable[[Array], Array],
+        where: Callable[[], Array],
+        rng: np.random.Generator,
+        apart: float = 0.0,
+    ) -> None:
+        self._plant, self._agent, self._worth, self._where, self._rng = plant, agent, worth, where, rng
+        self._failures = agent.failures.copy()
+        self._state = -1
+        self._spent = np.zeros(len(agent.space), dtype=bool)
+        self._apart = apart
+        self.actions = 0
+        """Transitions made."""
+        self.thinking = 0.0
+        """s of processor time spent on plans."""
+
+    def go(self) -> None:
+        """Follow the plan to the state from which to reach, or until the actions are used up."""
+        space = self._agent.space
+        self._state = space.state_of(self._plant.measure(space.part)[space.columns])
+        for _ in range(LIMIT - 1):
+            target, asked = self._where(), time.process_time()
+            worth = np.maximum(self._worth(target), 0.0)
+            worth[self._spent] = 0.0
+            values, action_values = self._agent.planning.values(worth, self._failures.rewards(target))
+            action = choose(action_values[self._state], self._rng)
+            self.thinking += time.process_time() - asked
+            if action == space.goals.shape[1]:
+                return
+            self.actions += 1
+            _, following = move(self._plant, space, self._state, action)
+            failed = has_failed(values, self._state, following)
+            self._failures.add(self._state, action, target, self._agent.penalty if failed else 0.0)
+            self._state = following
+
+    def missed(self) -> None:
+        """Expect no reward of reaching from this state in this try."""
+        space = self._agent.space
+        spans = np.ptp(space.robot.limits[space.robot.part(space.part).slice][space.columns], axis=1)
+        distances = np.abs(space.samples - space.samples[self._state]) / spans
+        self._spent |= distances.sum(axis=1) <= self._apart + 1e-9

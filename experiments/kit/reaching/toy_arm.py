@@ -1,0 +1,313 @@
+"""A toy arm of four joints that reaches at once: a small world whose truth is known, to compare learners of reaches on.
+
+    python -m experiments.kit.reaching.toy_arm --seeds 3 --only gp
+
+Two links on a shoulder of three joints, with the ranges of the iCub's.  A reach draws the hand to the target by damped least squares and
+may leave its pose by half a radian a joint; the pose in which it begins is noisy.  Targets are balls, and most actions that sweep
+through one fail.
+
+The command prints a table by predictor and strategy.  Each row: the rewards of an evaluation on the 27 targets as a fraction of the
+oracle's, after so many problem-tries; the same on eight targets between them that are never tried, after 800; then the learning time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.kit.arm_learning import RIGHT, arm_space
+from mobee import Lattice
+from mobee.errors import InvalidValue
+from mobee.learning.draws import Draws
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.table import ReachTable
+from mobee.learning.tabular import ideal
+from mobee.reach import ReachOutcome, ReachTarget, reward_of
+from mobee.robot.robot import Array
+
+UPPER, FORE = 0.152, 0.20  # m: shoulder to elbow, elbow to palm
+TETHER = 0.5  # rad: how far a reach leaves its pose, a joint
+STEPS, DAMPING, PULL = 30, 0.02, 0.6  # of the least squares; DAMPING in m
+WAYPOINTS = 9  # poses of an action's path that are checked
+AWAY = 0.005  # m: an arm that is near the target already may leave
+
+
+def hands(poses: Array) -> Array:
+    """Where the palm is, (..., 3) m from the shoulder, at poses (..., 4) rad: shoulder pitch, roll, yaw, elbow."""
+    upper, fore = _links(poses)
+    return upper + fore
+
+
+def missing(starts: Array, target: Array, ranges: Array) -> Array:
+    """How far the palm ends from a target (3,) m, shape (...), in m, reaching from poses (..., 4) rad within ranges (4, 2) rad."""
+    low, high = np.maximum(starts - TETHER, ranges[:, 0]), np.minimum(starts + TETHER, ranges[:, 1])
+    q = np.clip(starts, low, high)
+    for _ in range(STEPS):
+        hand, jacobian = hands(q), jacobians(q)
+        square = jacobian @ np.swapaxes(jacobian, -1, -2) + DAMPING**2 * np.eye(3)
+        pulled = np.linalg.solve(square, (target - hand)[..., None])
+        q = np.clip(q + PULL * (np.swapaxes(jacobian, -1, -2) @ pulled)[..., 0], low, high)
+    distance: Array = np.linalg.norm(target - hands(q), axis=-1)
+    return distance
+
+
+def jacobians(poses: Array) -> Array:
+    """Derivatives of the palm's place, shape (..., 3, 4), by central differences."""
+    step = 1e-6
+    return np.stack([(hands(poses + step * unit) - hands(poses - step * unit)) / (2.0 * step) for unit in np.eye(4)], axis=-1)
+
+
+def swept(starts: Array, ends: Array, point: Array, clearance: float) -> NDArray[np.bool_]:
+    """Whether the arm comes nearer than that [m] to a point (3,) m, and nearer than it was, shape (S, A).
+
+    The paths are straight, from poses (S, 4) to (S, A, 4) rad.
+    """
+    shares = np.linspace(0.0, 1.0, WAYPOINTS)[:, None]
+    upper, fore = _links(starts[:, None, None] + shares * (ends - starts[:, None])[:, :, None])
+    near = np.minimum(_distance(np.zeros(3), upper, point), _distance(upper, fore, point))
+    passed: NDArray[np.bool_] = near.min(axis=-1) < np.minimum(clearance, near[..., 0] - AWAY)
+    return passed
+
+
+def _links(poses: Array) -> tuple[Array, Array]:
+    """The upper arm and the forearm as vectors, (..., 3) m each: x forward, y outward, z up."""
+    pitch, roll, yaw, elbow = np.moveaxis(np.asarray(poses), -1, 0)
+    none, bent = np.zeros_like(pitch), np.sin(elbow)
+    upper = np.stack([none, none, np.full_like(pitch, -UPPER)], axis=-1)
+    fore = FORE * np.stack([bent * np.cos(yaw), bent * np.sin(yaw), -np.cos(elbow)], axis=-1)
+    return _turned(upper, pitch, roll), _turned(fore, pitch, roll)
+
+
+def _turned(vector: Array, pitch: Array, roll: Array) -> Array:
+    x, y, z = np.moveaxis(vector, -1, 0)
+    y, z = np.cos(roll) * y - np.sin(roll) * z, np.sin(roll) * y + np.cos(roll) * z
+    return np.stack([np.cos(pitch) * x + np.sin(pitch) * z, y, np.cos(pitch) * z - np.sin(pitch) * x], axis=-1)
+
+
+def _distance(start: Array, along: Array, point: Array) -> Array:
+    """From a point to line pieces, shape (...)."""
+    share = np.clip(((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
+    gap: Array = np.linalg.norm(start + share[..., None] * along - point, axis=-1)
+    return gap
+
+
+MARKER = "toy_palm"
+NOISE = 0.04  # rad, standard deviation
+STARTS = 8  # poses, around a state's, from which its reaches begin
+CLEARANCE = 0.10  # m: an action whose path comes nearer to a target is blocked; 11 per cent are
+FAILS = 0.9  # probability that it fails then
+QUANTILES = (0.15, 0.5, 0.85)  # of the places that the hand can come to, a direction: where the targets stand
+SURE = 20  # failures after which an action is not tried again
+
+
+class ToyArm(ReachTable):
+    """The lattice of the right arm, 81 states, with the reaches of the toy arm."""
+
+    def __init__(self, seed: int = 0, start: int = 0) -> None:
+        space = toy_space()
+        super().__init__(space, *ideal(space), self._of, seed=seed, start=start)
+        self.hands: Array = hands(space.samples)
+        """(S, 3) m, from the shoulder."""
+        self.jacobians: Array = jacobians(space.samples)
+        """(S, 3, 4) m/rad, how the joints move the hand."""
+        self._starts = Draws("toy arm")
+        self._place: Array = np.empty(3)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Put the target into the world; None takes it away."""
+        super().present(target)
+        if target is not None:
+            self._place = target.position
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """End where a reach from one of the starting poses does."""
+        if self._presented is None:
+            raise InvalidValue("nothing to reach for: present a target first.")
+        start = int(self._starts.at(self.seed, self.actions).integers(STARTS))
+        self._presented = _missing(self._place.tobytes())[:, start], self._presented[1]
+        return super().reach(part, marker, stay)
+
+    @staticmethod
+    def _of(target: Array) -> tuple[Array, Array]:
+        return _missing(target.tobytes()).mean(axis=1), FAILS * blocked(target).astype(np.float64)
+
+
+class Truth:
+    """The predictor that knows the mean rewards of the toy arm."""
+
+    def add(self, state: int, target: Array, reward: float, expected: float) -> None:
+        """Learn nothing."""
+
+    def mean(self, target: Array) -> Array:
+        """The mean rewards, shape (S,)."""
+        return true_rewards(target)
+
+    def deviation(self, target: Array) -> Array:
+        """Zeros, shape (S,)."""
+        return np.zeros(len(toy_space()))
+
+    def sample(self, target: Array, rng: np.random.Generator) -> Array:
+        """The mean rewards, shape (S,)."""
+        return true_rewards(target)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its name."""
+        return {"name": "truth"}
+
+
+def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
+    """An agent on a toy arm of its own that knows all mean rewards and all blocked actions, and learns nothing."""
+    arm = ToyArm(seed)
+    agent = ReachAgent(
+        arm.space,
+        arm,
+        arm,
+        marker=MARKER,
+        predictor=Truth(),
+        strategy="greedy",
+        failures="local",
+        seed=seed,
+        hands=arm.hands,
+        jacobians=arm.jacobians,
+    )
+    for target in targets:
+        for state, action in np.argwhere(blocked(target.position)).tolist():
+            for _ in range(SURE):
+                agent.failures.add(state, action, target.position, agent.penalty)
+    return agent
+
+
+@cache
+def toy_space() -> Lattice:
+    """81 states of the four joints of the right arm."""
+    return arm_space(joints=RIGHT)
+
+
+def true_rewards(target: Array) -> Array:
+    """Mean rewards of reaching from each state, shape (S,)."""
+    rewards: Array = np.vectorize(reward_of)(_missing(target.tobytes()))
+    mean: Array = rewards.mean(axis=1)
+    return mean
+
+
+def blocked(target: Array) -> NDArray[np.bool_]:
+    """Which actions a target blocks, shape (S, A)."""
+    space = toy_space()
+    found: NDArray[np.bool_] = swept(space.samples, space.samples[space.goals], target, CLEARANCE) & (space.goals >= 0)
+    return found
+
+
+@cache
+def grid() -> list[ReachTarget]:
+    """27 targets at quantiles of the hand's positions, three a direction."""
+    low, high = _ranges().T
+    reached = hands(np.random.default_rng(0).uniform(low, high, size=(4000, 4)))
+    axes = np.quantile(reached, QUANTILES, axis=0).T
+    return [ReachTarget(np.array([x, y, z])) for x in axes[0] for y in axes[1] for z in axes[2]]
+
+
+def cell_centres() -> list[ReachTarget]:
+    """Eight targets that no learner tries: the middles of the cells of the grid."""
+    cube = np.array([target.position for target in grid()]).reshape(3, 3, 3, 3)
+    corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    return [ReachTarget(cube[i : i + 2, j : j + 2, k : k + 2].mean(axis=(0, 1, 2))) for i, j, k in corners]
+
+
+@cache
+def _ranges() -> Array:
+    robot = toy_space().robot
+    return robot.limits[[robot.motor_index(name) for name in RIGHT]]
+
+
+@cache
+def _missing(place: bytes) -> Array:
+    """How far reaches from each state end from a target, shape (S, STARTS), in m; the starts are the same for all targets."""
+    space = toy_space()
+    noise = NOISE * np.random.default_rng(0).standard_normal((len(space), STARTS, 4))
+    return missing(space.samples[:, None] + noise, np.frombuffer(place), _ranges())
+
+
+CHECKPOINTS = (50, 100, 200, 400, 800, 1600)
+UNSEEN_AFTER = 800
+REPETITIONS, REPETITIONS_UNSEEN = 3, 10
+ROWS = (
+    ("weighted", "random", "spread"),
+    ("weighted", "greedy", "spread"),
+    ("weighted", "intrinsic", "spread"),
+    ("weighted", "intrinsic", "local"),
+    ("gp", "ucb", "spread"),
+    ("gp", "ucb", "local"),
+    ("weighted", "intrinsic", "alike"),
+    ("weighted", "greedy", "alike"),
+    ("table", "ucb", "alike"),
+    ("kernel", "random", "alike"),
+    ("kernel", "progress", "alike"),
+    ("kernel", "ucb", "alike"),
+    ("kernel_prior", "ucb", "alike"),
+    ("nearest", "ucb", "alike"),
+    ("networks", "thompson", "alike"),
+    ("gp", "random", "alike"),
+    ("gp", "greedy", "alike"),
+    ("gp", "intrinsic", "alike"),
+    ("gp", "progress", "alike"),
+    ("gp", "thompson", "alike"),
+    ("gp", "ucb", "alike"),
+)
+
+
+def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
+    """Rewards as fractions of the oracle's after so many tries, shape (checkpoints,), and on targets never tried, NaN if not that far."""
+    arm, problems, unseen = ToyArm(seed), grid(), np.nan
+    agent = ReachAgent(
+        arm.space,
+        arm,
+        arm,
+        marker=MARKER,
+        predictor=predictor,
+        strategy=strategy,
+        failures=failures,
+        seed=seed,
+        hands=arm.hands,
+        jacobians=arm.jacobians,
+    )
+    found = []
+    for tries in checkpoints:
+        agent.learn(problems, tries - agent.tries)
+        found.append(_fraction(agent, problems, REPETITIONS))
+        if tries == UNSEEN_AFTER:
+            unseen = _fraction(agent, cell_centres(), REPETITIONS_UNSEEN)
+    return np.array(found), unseen
+
+
+def _fraction(agent: ReachAgent, problems: list[ReachTarget], repetitions: int) -> float:
+    best = oracle(problems, agent.seed).evaluate(problems, repetitions).rewards.sum()
+    return float(agent.evaluate(problems, repetitions).rewards.sum() / best)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description="Scores of learners on the toy arm, by predictor and strategy.")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--most", type=int, default=CHECKPOINTS[-1], help="problem-tries")
+    parser.add_argument("--only", nargs="*", default=[], help="words that rows must all have, such as: gp ucb")
+    arguments = parser.parse_args()
+    checkpoints = [n for n in CHECKPOINTS if n <= arguments.most]
+    print(f"{'predictor strategy failures':32}", *[f"{n:5}" for n in checkpoints], " new      s")
+    for row in ROWS:
+        if set(arguments.only) <= set(row):
+            start = time.perf_counter()
+            runs = [scores(*row, seed, checkpoints) for seed in range(arguments.seeds)]
+            taken = (time.perf_counter() - start) / arguments.seeds
+            known, unseen = np.mean([run[0] for run in runs], axis=0), np.mean([run[1] for run in runs])
+            print(f"{' '.join(row):32}", *[f"{one:5.2f}" for one in known], f"{unseen:5.2f} {taken:6.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

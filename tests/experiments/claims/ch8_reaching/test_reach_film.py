@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch8_reaching.reach_film import episodes, learn, main, selected, table_plant
+from mobee.learning.reaching.learned_reaches import load_reaches
+from mobee.reach import TARGET
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("film") / "run.sqlite"
+    learn(file, 0, tries=10, transitions=80)
+    return file
+
+
+def test_episodes_show_the_target_all_the_time_end_with_the_hand_at_it_and_leave_no_trace(run: Path) -> None:
+    before, plant = run.read_bytes(), table_plant(1)
+    agent = load_reaches(run, plant)
+    found = episodes(agent, plant, 4, 0)
+    assert found
+    for one in found:
+        for objects in one.motion.objects:
+            np.testing.assert_array_equal(objects[TARGET].position, one.target.position)
+        away = np.linalg.norm(one.motion.way(agent.marker) - one.target.position, axis=1)
+        assert away[-1] <= one.target.radius + 0.025 and (away[:-1] > away[-1]).all()
+    assert run.read_bytes() == before
+
+
+def test_the_command_draws_what_a_run_has_learned(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr("experiments.claims.ch8_reaching.reach_film.EPISODES", 4)
+    main([str(run), "--out", str(tmp_path / "film.png"), "--poses", "2", "--height", "30"])
+    assert (tmp_path / "film.png").stat().st_size > 1000
+    assert "From above: state" in capsys.readouterr().out
+
+
+def test_a_run_that_has_not_learned_to_reach_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "none.sqlite").touch()
+    with pytest.raises(SystemExit, match=r"none\.sqlite"):
+        main([str(tmp_path / "none.sqlite")])
+
+
+STRAIGHT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.3, 0.0], 20)
+FAR = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.5, 0.0], 20)
+ABOVE = np.linspace([-0.2, 0.3, 0.3], [-0.2, 0.3, 0.1], 20)
+TURNING = np.concatenate([STRAIGHT, STRAIGHT[::-1] + [0.0, 0.0, 0.05]])
+SHORT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], 20)
+
+
+def test_each_kind_of_way_is_selected_once() -> None:
+    found = selected([STRAIGHT, SHORT, ABOVE, TURNING, FAR])
+    assert found == {"From above": 2, "Far": 4, "Around the target": 3}
+
+
+def test_of_fewer_ways_than_kinds_each_is_selected_once_and_short_ones_never() -> None:
+    assert selected([SHORT]) == {}
+    assert selected([SHORT, FAR]) == {"From above": 1}

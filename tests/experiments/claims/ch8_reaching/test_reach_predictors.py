@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import argparse
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch8_reaching import reach_predictors
+from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, CHECKPOINTS, GRID, ORACLE, PUBLISHED, RECOMMENDED, fractions, measured
+from experiments.kit.cells import Cell
+from experiments.kit.reaching.learning import LEARNERS
+from mobee.learning.reaching.failures import FAILURES
+from mobee.learning.reaching.predictors import PREDICTORS
+from mobee.learning.reaching.strategies import STRATEGIES
+
+SEEDS, TARGETS = 6, {GRID: 27, BETWEEN: 8}
+
+
+def result(what: str, seed: int, level: float):
+    checkpoints = 1 if what == ORACLE else len(CHECKPOINTS)
+    values = {f"rewards_{name}": np.full((checkpoints, 5, count), level) for name, count in TARGETS.items()}
+    settings = {"what": what} | ({} if what == ORACLE else {"looks": list(CHECKPOINTS)})
+    return SimpleNamespace(cell=Cell(f"{what}-s{seed}", seed, settings), seconds=1.0, values=values)
+
+
+def found(recommended: float, published: float):
+    levels = {ORACLE: 0.5, RECOMMENDED: 0.5 * recommended, PUBLISHED: 0.5 * published}
+    return {one.cell.name: one for what, level in levels.items() for one in (result(what, seed, level) for seed in range(SEEDS))}
+
+
+def verdicts(cells) -> list[str]:
+    return [claim.verdict for claim in measured(fractions(cells), list(CHECKPOINTS))]
+
+
+def test_scores_are_divided_by_the_oracles():
+    curves = fractions(found(0.9, 0.4))
+    assert curves[RECOMMENDED, GRID] == pytest.approx(np.full((SEEDS, len(CHECKPOINTS)), 0.9))
+    assert curves[PUBLISHED, BETWEEN] == pytest.approx(np.full((SEEDS, len(CHECKPOINTS)), 0.4))
+
+
+def test_the_aims_decide():
+    assert verdicts(found(0.98, 0.4)) == ["confirmed"] * 5
+    assert verdicts(found(0.92, 0.5)) == ["confirmed", "confirmed", "refuted", "confirmed", "refuted"]
+    assert verdicts(found(0.5, 0.6)) == ["refuted"] * 5
+
+
+def test_what_was_not_run_stays_open():
+    cells = {name: one for name, one in found(0.98, 0.5).items() if one.cell.settings["what"] != RECOMMENDED}
+    assert verdicts(cells) == ["open"] * 5
+
+
+def test_all_learners_exist():
+    for learner in LEARNERS.values():
+        assert learner.predictor in PREDICTORS and learner.strategy in STRATEGIES and learner.failures in FAILURES
+
+
+def test_cells_are_distinct_and_every_target_has_its_truth():
+    parser = argparse.ArgumentParser()
+    reach_predictors.add_arguments(parser)
+    arguments = parser.parse_args(["--seeds", "2"])
+    arguments.seed = 0
+    names = [cell.name for cell in reach_predictors.cells(arguments) + reach_predictors.truths(arguments)]
+    assert len(set(names)) == len(names) == 2 * (len(LEARNERS) + 1) + 27 + 8
