@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.kit.arm_learning import JOINTS, PART, arm_clauses, arm_plant, clear, whole
+from experiments.kit.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_goals
 from experiments.kit.control_runs import place
-from experiments.prm_vs_mdp.belief import Belief
-from experiments.prm_vs_mdp.graphs import NEIGHBOURS, make_roadmap, with_goals
-from experiments.prm_vs_mdp.rivals import PlannedOnce, Repaired, Rival
+from experiments.kit.rivals import PlannedOnce, Repaired, Rival
 from mobee import Lattice, Outcome, World, box
 from mobee.errors import MobeeError
 from mobee.learning.planner import Plan, Planner

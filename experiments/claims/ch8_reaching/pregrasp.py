@@ -23,15 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp as example
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.roadmap_task import RIGHT
+from experiments.kit.roadmap_task import RIGHT, build
 from experiments.kit.statistics import interquartile_mean, interval, told
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from experiments.kit.verdicts import rises
-from experiments.trm.building import build
-from experiments.trm.pregrasp import example
 from mobee import MobeeError, Model, Roadmap, World, cylinder
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.playback import play

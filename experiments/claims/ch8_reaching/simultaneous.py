@@ -25,16 +25,15 @@ import numpy as np
 
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import begin_anywhere
 from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
 from experiments.kit.statistics import decides, interval, told
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from experiments.kit.truth import Truth, l1, truth_of, walk
 from experiments.kit.verdicts import all_hold, rises
-from experiments.learning.model_error import l1
-from experiments.learning.trial import begin_anywhere
-from experiments.learning.truth import Truth, truth_of, walk
 from mobee import TransitionModel
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.space import Space

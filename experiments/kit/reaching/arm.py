@@ -18,8 +18,8 @@ import numpy as np
 import mobee
 from experiments.kit.arm_learning import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_space
 from experiments.kit.arm_learning import robot as published_robot
+from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.reaching.belief import PeerBelief
-from experiments.learning.trial import begin_anywhere, explore
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.reach_agent import ReachAgent

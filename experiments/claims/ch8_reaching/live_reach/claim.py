@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from experiments.babbling.modes import WORLD
 from experiments.claims.ch8_reaching.live_reach.problems import (
     AIM,
     FRESH,
@@ -52,7 +51,7 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, Judged, measure, nearest_reach, read_block, write_block
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live import summary_of, write_job
+from experiments.kit.live import TABLE, summary_of, write_job
 from experiments.kit.options import positive_whole
 from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
@@ -215,7 +214,7 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
     `seed`: of the simulated robot.  Raises LaunchFailed.
     """
     write_job(folder, job)
-    world = WITH_OBSTACLE if job.kind == "moving" else WORLD
+    world = WITH_OBSTACLE if job.kind == "moving" else TABLE
     text = _SCENARIO.format(
         kind=job.kind, robot=ROBOT, world=world, gains=GAINS, seed=seed, patience=PATIENCE, rate=rate, folder=folder.resolve()
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from msgspec import Struct, structs
 
-from experiments.babbling.modes import WORLD
+from experiments.kit.live import TABLE
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.belief import PeerBelief, approach
 from experiments.kit.reaching.targets import grid
@@ -53,7 +53,7 @@ def robot() -> Robot:
     return load_robot(ROBOT)
 
 
-def world(path: Path = WORLD) -> World:
+def world(path: Path = TABLE) -> World:
     """The world with the table."""
     return load_world(str(path))
 
