@@ -8,6 +8,7 @@ for every line that it reads; each time it prints as JSON the processor time, an
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import resource
@@ -104,36 +105,47 @@ def _three_agents() -> Work:
     return work
 
 
+def _first(*names: str) -> Any:
+    """The first of these modules that the checkout has: where it is today, then where it was at 10a73fe."""
+    for name in names:
+        try:
+            return importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if not name.startswith(error.name or " "):
+                raise
+    raise ModuleNotFoundError(f"neither {' nor '.join(names)} is in this checkout")
+
+
 def _chapter_8() -> Work:
     """Of a run of each strategy 1/64: of the time of its 3000 transitions, its 6400 tries and its evaluations."""
-    from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
-    from experiments.kit.reaching.learning import learn
-    from experiments.kit.reaching.targets import grid, targets_at
+    arm = _first("experiments.kit.reaching.arm", "experiments.reaching.scene")
+    learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
+    targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")
     from mobee.learning.reaching.predictors.predictor import SCALE
     from mobee.learning.reaching.reach_agent import ReachAgent
 
-    problems = targets_at(grid(), laws()["published"].aim)
-    beliefs = learned_beliefs(reach_plant(0), 0, 3000)
+    problems = targets.targets_at(targets.grid(), arm.laws()["published"].aim)
+    beliefs = arm.learned_beliefs(arm.reach_plant(0), 0, 3000)
 
     def run(strategy: str) -> float:
-        plant = reach_plant(0)
-        agent = ReachAgent(reach_space(), plant, beliefs, marker=MARKER, strategy=strategy, scale=SCALE, seed=0)
-        learn(agent, problems, (TRIES,), 1, {"few": problems[::2]})
+        plant = arm.reach_plant(0)
+        agent = ReachAgent(arm.reach_space(), plant, beliefs, marker=arm.MARKER, strategy=strategy, scale=SCALE, seed=0)
+        learning.learn(agent, problems, (TRIES,), 1, {"few": problems[::2]})
         return plant.time
 
     def work() -> Done:
         count = len(STRATEGIES) * 3000 * TRIES // 6400
-        learning = _seconds(lambda: learned_beliefs(reach_plant(0), 0, count))
+        exploring = _seconds(lambda: arm.learned_beliefs(arm.reach_plant(0), 0, count))
         times: list[float] = []
         trying = _seconds(lambda: times.extend(map(run, STRATEGIES)))
-        return learning + trying, {"plant seconds": round(sum(times), 3)}
+        return exploring + trying, {"plant seconds": round(sum(times), 3)}
 
     return work
 
 
 def _lockstep() -> Work:
     """All services, without their start."""
-    from experiments.kit.live import summary_of
+    summary_of = _first("experiments.kit.live", "experiments.launched").summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -194,8 +206,9 @@ def _inverse_kinematics(method: Any, count: int) -> Work:
 
 
 def _roadmap(method: Any, spacing: float) -> Work:
-    from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp
-    from experiments.kit.roadmap_task import build
+    tasks = _first("experiments.claims.ch3_roadmaps.trm_tasks", "experiments.trm.pregrasp")
+    build = _first("experiments.kit.roadmap_task", "experiments.trm.building").build
+    pregrasp = getattr(tasks, "pregrasp", None) or tasks.example  # today all tasks are in one module, then each had its own
 
     wanted = replace(pregrasp(), margin=0.0, spacing=spacing)
 
