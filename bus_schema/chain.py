@@ -1,4 +1,4 @@
-"""The control chain: what robot_sim, model and controller tell each other in every tick, one message each.
+"""Messages of the control chain: one each of robot_sim, model and controller in every tick.
 
 Between `Tick` and `Commands` the model sends `Forces` (messages.py).  What parts say and are told one by one is in messages.py too.
 """

@@ -1,4 +1,4 @@
-"""msgpack on the wire: typed, versioned, length-checked and finite, or refused with a reason."""
+"""Encodes messages as msgpack; decodes them typed, versioned, length-checked and finite, or refuses them with a reason."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@
 
 namespace mobee {
 
-// Numbered as in mobee/roadmap/ik/aim_kinds.py.
+// Numbered as in mobee/roadmap/ik/aims.py.
 enum class AimKind : std::int64_t {
     place,       // the two points are one
     turned,      // the two frames are parallel

@@ -7,7 +7,7 @@
 
 namespace mobee {
 
-struct Neighbours;  // what one user remembers from pose to pose, of a robot in a scene; mobee/engine/track.py makes it
+struct Neighbours;  // what one user remembers from pose to pose, of a robot in a scene; mobee/model/track.py makes it
 
 // Find the contacts in the pose q (motors,); returns how many, in no order.
 std::int64_t find(Neighbours& near, const double* q);

@@ -26,7 +26,7 @@ struct OutcomeCounts {
     double forgetting;         // factor of the real counts before an observation
 };
 
-// Probabilities from the real counts alone over a weak prior, see mobee/learning/beliefs.py.
+// Probabilities from the real counts alone over a weak prior, see mobee/learning/transitions.py.
 struct DebiasedCounts {
     double* probability;  // (states, actions, bins)
     const double* prior;  // (bins,)

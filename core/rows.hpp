@@ -1,4 +1,4 @@
-// Contacts as Python gets them, see ContactTable in mobee/collision/contact.py: two arrays of numbers, a row a contact.
+// Contacts as Python gets them, see ContactTable in mobee/model/contact.py: two arrays of numbers, a row a contact.
 #pragma once
 
 #include <cstdint>

@@ -8,7 +8,7 @@
 
 namespace mobee {
 
-// One state of the world as Python makes it, see mobee/collision/snapshot.py; all is copied but the robot.
+// One state of the world as Python makes it, see mobee/model/snapshot.py; all is copied but the robot.
 struct WorldTables {
     std::int64_t objects, carried, side;  // side: cells of the grid along its longest side
     const VolumeRow* volume;              // (objects,)

@@ -16,7 +16,7 @@ namespace mobee::planning {
 enum Refused : std::int64_t { bad_reward = -1, bad_outcome = -2, bad_start = -3 };  // instead of the number of sweeps
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double rounding = 4.0 * 0x1p-52;      // of a value: changes as small as this may cycle for ever
+constexpr double rounding = 4.0 * 0x1p-52;      // of a value: changes as small as this may cycle indefinitely
 constexpr double soon = 50.0;                   // over 1 - discount: after so many sweeps a change is e^-50 of itself
 constexpr std::int64_t most_evaluated = 60;     // improvements that are followed by an evaluation; later ones are plain sweeps, which converge from anywhere
 constexpr std::int64_t most_evaluations = 5;    // sweeps of one evaluation at most

@@ -6,25 +6,26 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mobee.collision import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
     from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent
     from mobee.learning.lattice import Lattice
     from mobee.learning.parallel import run
     from mobee.learning.planner import Plan, Planner
-    from mobee.learning.policy_iteration import policy_iteration
     from mobee.learning.reaching.reach_agent import ReachAgent
     from mobee.learning.space import Space
     from mobee.learning.transitions import TransitionModel
-    from mobee.learning.value_iteration import value_iteration
+    from mobee.learning.value_iteration import policy_iteration, value_iteration
     from mobee.learning.voronoi import Voronoi
-    from mobee.model import Model, Pose
+    from mobee.model import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
+    from mobee.model.model import Model
+    from mobee.model.pose import Pose
+    from mobee.model.world_file import load_world
     from mobee.plant import Outcome, Plant
     from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
     from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+    from mobee.roadmap.adaptive.edge_beliefs import roadmap_space
     from mobee.roadmap.adaptive.explorer import MapExplorer
-    from mobee.roadmap.adaptive.state_space import roadmap_space
     from mobee.roadmap.adaptive.walker import Walker
     from mobee.roadmap.building import tasks
     from mobee.roadmap.building.build import build_roadmap
@@ -35,30 +36,30 @@ if TYPE_CHECKING:
     from mobee.roadmap.ik.ngik import IK, solve_ik
     from mobee.roadmap.roadmap import Roadmap, load_roadmap
     from mobee.robot.join import join_robots
-    from mobee.robot.load import load_robot, load_world
+    from mobee.robot.load import load_robot
     from mobee.robot.robot import Robot
     from mobee.simulation import MotorParameters, OfflinePlant, advance_together, run_batch, run_together
 
 _MODULES = {
-    "mobee.collision": "Contact Geometry World WorldObject box capsule cylinder sphere",
-    "mobee.control": "Command Controller Forces Gains Reacher ReachPath Term constraint_forces reach_path",
+    "mobee.control": "Command Controller Forces Gains ReachPath Reacher Term constraint_forces reach_path",
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent",
     "mobee.learning.lattice": "Lattice",
     "mobee.learning.parallel": "run",
     "mobee.learning.planner": "Plan Planner",
-    "mobee.learning.policy_iteration": "policy_iteration",
     "mobee.learning.reaching.reach_agent": "ReachAgent",
     "mobee.learning.space": "Space",
     "mobee.learning.transitions": "TransitionModel",
-    "mobee.learning.value_iteration": "value_iteration",
+    "mobee.learning.value_iteration": "policy_iteration value_iteration",
     "mobee.learning.voronoi": "Voronoi",
-    "mobee.model": "Model Pose",
+    "mobee.model": "Contact Geometry World WorldObject box capsule cylinder sphere",
+    "mobee.model.model": "Model",
+    "mobee.model.pose": "Pose",
     "mobee.plant": "Outcome Plant",
     "mobee.reach": "ReachOutcome ReachPlant ReachTarget",
     "mobee.roadmap.adaptive.adaptive": "AdaptiveRoadmap",
+    "mobee.roadmap.adaptive.edge_beliefs": "roadmap_space",
     "mobee.roadmap.adaptive.explorer": "MapExplorer",
-    "mobee.roadmap.adaptive.state_space": "roadmap_space",
     "mobee.roadmap.adaptive.walker": "Walker",
     "mobee.roadmap.building": "tasks",
     "mobee.roadmap.building.build": "build_roadmap",
@@ -69,7 +70,8 @@ _MODULES = {
     "mobee.roadmap.ik.ngik": "IK solve_ik",
     "mobee.roadmap.roadmap": "Roadmap load_roadmap",
     "mobee.robot.join": "join_robots",
-    "mobee.robot.load": "load_robot load_world",
+    "mobee.robot.load": "load_robot",
+    "mobee.model.world_file": "load_world",
     "mobee.robot.robot": "Robot",
     "mobee.simulation": "MotorParameters OfflinePlant advance_together run_batch run_together",
 }

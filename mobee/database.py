@@ -1,4 +1,4 @@
-"""The SQLite file of a run: opened, marked as ours, and its errors told in one line (DESIGN section 8)."""
+"""Opens the SQLite file of a run and translates its errors into one line."""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""The Plant: the one face through which an agent acts, offline and live."""
+"""The Plant: the interface through which agents act, offline and live."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

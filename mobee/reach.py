@@ -1,4 +1,4 @@
-"""Reaching through a Plant: what to reach for, and how a reach ended (thesis 8.2)."""
+"""Reaching through a plant: targets and outcomes (thesis 8.2)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.plant import Outcome, Plant
-from mobee.real_array import real_array
-from mobee.robot.robot import Array
 
 Aim = Literal["centre", "surface"]
 AIMS = ("centre", "surface")

@@ -1,15 +1,85 @@
-"""Transitions on disk: one SQLite file a run, each transition committed before its agent acts again (DESIGN section 8)."""
+"""Stores the transitions of an agent in the file of a run; each is on disk before the next action."""
 
 from __future__ import annotations
 
 import json
+import sqlite3
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
-from mobee.agent_file import AgentFile
-from mobee.database import explained
+from mobee.database import explained, opened, transaction
 from mobee.errors import MobeeError
+
+
+class AgentFile:
+    """What an agent keeps in the file of a run, which the processes of several agents may share.
+
+    Write-ahead log with full synchronisation: what was written survives a kill and a power cut.
+
+    Args:
+        path: the SQLite file; made if missing, its folder must exist.
+        agent: the name under which this agent's share is kept.
+        read_only: to look at what is on record, also where nothing may be written; nothing is made or changed then.
+
+    Raises:
+        MobeeError: from every method, in one line with the file and what to do.
+    """
+
+    def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
+        self.path, self.agent = Path(path), agent
+        self._db: sqlite3.Connection = opened(self.path, read_only)
+
+    def bind(self, settings: dict[str, Any]) -> None:
+        """Record the agent's settings (plain JSON values), or refuse if it has others on record."""
+        given = {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
+        with explained(self.path), transaction(self._db):
+            known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
+            if not known:
+                self._db.executemany("INSERT INTO meta VALUES (?, ?, ?)", [(self.agent, key, value) for key, value in given.items()])
+                return
+        if missing := sorted(given.keys() - known.keys()):
+            raise MobeeError(
+                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, or on a plant "
+                "that does not say what it is. `mobee plan` and `mobee export` read it; to learn on, use another file."
+            )
+        for key in sorted(known):
+            if known[key] != given.get(key):
+                then, now = _differing(json.loads(known[key]), json.loads(given.get(key, "null")))
+                raise MobeeError(
+                    f"{self.path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
+                    "A run goes on only with the settings it began with: use those, or another file."
+                )
+
+    def settings(self, agent: str | None = None) -> dict[str, Any]:
+        """The settings on record of this agent, or of another one in the file; empty if there are none."""
+        with explained(self.path):
+            rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self._named(agent),)).fetchall()
+        return {key: json.loads(value) for key, value in rows}
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._db.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _named(self, agent: str | None) -> str:
+        return self.agent if agent is None else agent
+
+
+def _differing(then: Any, now: Any) -> tuple[Any, Any]:
+    """What differs of two values: of two mappings that have the same keys only the entries that are not equal."""
+    if not (isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys()):
+        return then, now
+    pairs = {key: _differing(then[key], now[key]) for key in sorted(then) if then[key] != now[key]}
+    return {key: pair[0] for key, pair in pairs.items()}, {key: pair[1] for key, pair in pairs.items()}
+
 
 STORE = "transitions.sqlite"  # of a run, in its folder
 

@@ -10,16 +10,15 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
-from mobee.collision.world import World
+from mobee.check import Finding, UntestedGroup, check_file, untested_groups
+from mobee.check.finding import SEVERITIES, count
 from mobee.errors import MobeeError
-from mobee.robot.check import Finding, UntestedGroup, check_file, untested_groups
-from mobee.robot.check.finding import SEVERITIES
-from mobee.robot.check.words import count
-from mobee.robot.load import load_world
+from mobee.model.world import World
+from mobee.model.world_file import load_world
 from mobee.robot.robot import Robot
 from mobee_cli import check_srdf
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
-from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from mobee_cli.robot_options import add_urdf_options, urdf_options
 
 _NOTES = "Exit code: 0 nothing but notes, 1 at least one warning or error, 2 the file cannot be read."
 

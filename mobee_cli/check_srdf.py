@@ -7,11 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mobee.robot.check.leave_out import LeftOut, leave_out_touching
-from mobee.robot.check.touching_pairs import POSES, TouchingPair, touching_pairs
-from mobee.robot.check.words import count, length
+from mobee.check.finding import count, length
+from mobee.check.touching import POSES, LeftOut, TouchingPair, leave_out_touching, touching_pairs
 from mobee.robot.load import ROBOTS, find_file, load_robot
-from mobee_cli.urdf_options import urdf_options
+from mobee_cli.robot_options import urdf_options
 
 FEW = 0.5  # of the random poses: a pair that touches in less may collide in earnest
 _HEADS = ("link1", "link2", "reason", "at home", "random poses")

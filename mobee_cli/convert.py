@@ -6,16 +6,17 @@ import argparse
 import warnings
 from pathlib import Path
 
-from mobee.collision.world import World
+from mobee.check.file import world_file
 from mobee.errors import MobeeError
-from mobee.robot.check.file import world_file
-from mobee.robot.load import ROBOTS, find_file, load_robot, load_world
+from mobee.model.world import World
+from mobee.model.world_file import load_world
+from mobee.robot.load import ROBOTS, find_file, load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.write_urdf import write_urdf
-from mobee.robot.write_xml import write_upgraded, write_xml
-from mobee.robot.xml_node import Remark
+from mobee.robot.urdf.write import write_urdf
+from mobee.robot.xml.node import Remark
+from mobee.robot.xml.write import write_upgraded, write_xml
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
-from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from mobee_cli.robot_options import add_urdf_options, urdf_options
 
 WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 

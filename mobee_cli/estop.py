@@ -13,8 +13,7 @@ from bus_schema.rpc import Done, Empty
 from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
-from services.common.bus import Bus
-from services.common.delivery import STOP
+from services.common.bus import STOP, Bus
 from services.common.observe import Heard, listen
 
 _REPEAT, _PATIENCE = 0.1, 2.0  # s

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from mobee.errors import MobeeError, UnknownName
-from mobee.learning.exploit import target_states
-from mobee.learning.learned import Learned, load_learned
+from mobee.learning.goal import target_states
 from mobee.learning.planner import DISCOUNT, Plan, Planner
+from mobee.learning.record import Learned, load_learned
 from mobee.learning.space import Space
 from mobee.robot.robot import Robot
 from mobee.store import STORE

@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import reaching_parts
 from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
-from mobee.reachable import body_at, nearest_outside, nearest_posture
-from mobee.robot.robot import Array, Robot
+from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
+from mobee.robot.robot import Robot
 from mobee.store import STORE
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import BAD_INPUT, FAILED, UserError
-from mobee_cli.reach_hand import Choose, Hand, hand_chosen
 from mobee_cli.reach_learned import go_to_pre_reach
 from mobee_cli.reach_result import ON, Result, lines
-from mobee_cli.reach_stage import Stage, offline
+from mobee_cli.reach_stage import Choose, Hand, Stage, hand_chosen, offline
 from mobee_cli.robot_options import add_robot, add_world, require_none, robot_given, robot_of_run, world_given
 
 _NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,

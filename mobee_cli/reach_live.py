@@ -1,4 +1,4 @@
-"""The robot that runs, as `mobee reach` sees it."""
+"""`mobee reach` on the running robot."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from bus_schema import keys
 from bus_schema.chain import Commands, Tick
 from bus_schema.messages import Reach
 from bus_schema.rpc import Config, Empty, World
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
-from mobee_cli.reach_hand import Choose
-from mobee_cli.reach_stage import Stage
+from mobee_cli.reach_stage import Choose, Stage
 from services.common import rpc
 from services.common.bus_plant import BusPlant
 from services.common.config import ServiceConfig

@@ -1,4 +1,4 @@
-"""What `mobee reach` tells of a reach."""
+"""Prints the result of a reach."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.reach import ReachOutcome, ReachTarget
-from mobee.reachable import Nearest
-from mobee.robot.robot import Array
+from mobee.roadmap.reachable import Nearest
 
 ON = 0.02  # m from the target's surface: the hand is on it
 _COLUMNS = 80

@@ -1,4 +1,4 @@
-"""Where `mobee reach` reaches: a plant, and what must be known of the robot on it."""
+"""The plant on which `mobee reach` acts, its hand, and what it needs of the robot."""
 
 from __future__ import annotations
 
@@ -8,13 +8,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mobee.collision.world import World
+from mobee.arrays import Array
 from mobee.errors import UnknownName
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world import World
 from mobee.reach import Aim, ReachPlant, ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
-from mobee_cli.reach_hand import Choose, Hand
+from services.common.hands import PALMS, hand_for, hand_of, part_of
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """A marker, the part that moves it, and how they were chosen, "" where the user gave both."""
+
+    marker: str
+    part: str
+    why: str = ""
+
+
+Choose = Callable[[Robot, Array | None], Hand]
+"""The hand of a robot for a target at a place (3,) m, None where the place is not known."""
+
+
+def hand_chosen(robot: Robot, place: Array | None, part: str | None, marker: str | None) -> Hand:
+    """The hand for a target; what is not given follows from the target and the robot.
+
+    Raises UnknownName for a part or a marker that the robot does not have, InvalidValue where no motor moves a marker.
+    """
+    if part is not None:
+        robot.part(part)
+        return Hand(marker or hand_of(robot, part), part, "" if marker else f"the marker of {part}; --marker names another")
+    if marker is not None:
+        return Hand(marker, part_of(robot, marker), "the part with most motors that move it; --part names another")
+    marker = hand_for(robot, place)
+    why = "the palm nearer to the target at home" if marker in PALMS else "the end of the robot with most motors before it"
+    return Hand(marker, part_of(robot, marker), f"{why}; --marker and --part name others")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""The results of an experiment as text that fits a terminal: lines, and tables where many results have the same names."""
+"""Formats the results of an experiment for a terminal: lines, and tables of results with the same names."""
 
 from __future__ import annotations
 

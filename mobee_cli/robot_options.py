@@ -1,4 +1,4 @@
-"""The robot and the world of a command that needs no running system: options, and what they stand for."""
+"""Options for the robot and world of commands that need no running system."""
 
 from __future__ import annotations
 
@@ -6,13 +6,39 @@ import argparse
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from mobee.collision.world import World
+from mobee.model.world import World
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.hull import Corners
 from mobee_cli.errors import BAD_INPUT, UserError
-from mobee_cli.urdf_options import add_urdf_options, urdf_options
 from services.common.worlds import NO_WORLD, is_path, world_around
+
+
+def add_urdf_options(parser: argparse.ArgumentParser) -> None:
+    """The keywords of load_robot."""
+    parser.add_argument("--field", type=float, metavar="M", help="give every solid of a URDF a field that reaches so much farther [m]")
+    parser.add_argument("--meshes", choices=("hull", "bounding"), help="meshes of a URDF: convex hulls, or bounding primitives")
+    parser.add_argument(
+        "--corners", type=_corners, metavar="N", help="corners of such a hull at most (default: 64), or all: the exact hull"
+    )
+    parser.add_argument("--srdf", type=Path, metavar="FILE", help="the SRDF of a URDF, when it is not found by its name")
+    parser.add_argument("--home", metavar="NAME", help="the <group_state> of the SRDF that is home, or zero")
+
+
+def urdf_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The keywords of load_robot that were given."""
+    return {name: getattr(arguments, name) for name in ("field", "meshes", "corners", "srdf", "home")}
+
+
+def _corners(text: str) -> Corners:
+    if text == "all":
+        return "all"
+    if not (text.isascii() and text.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a whole number nor 'all'")
+    return int(text)
+
 
 DEFAULT = "icub"
 _RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`

@@ -1,4 +1,4 @@
-"""`mobee robots`: what comes with mobee."""
+"""`mobee robots`: lists the shipped robots and worlds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import textwrap
 from collections import Counter
 from typing import Any
 
-from mobee.robot.load import ROBOTS, WORLDS, load_robot, load_world, shipped_robots, shipped_worlds
+from mobee.model.world_file import WORLDS, load_world, shipped_worlds
+from mobee.robot.load import ROBOTS, load_robot, shipped_robots
 
 _README = "README.md"
 

@@ -1,4 +1,4 @@
-"""`mobee router`: the router alone, for systems whose services are started one by one, as in containers."""
+"""`mobee router`: runs the router alone, for systems whose services are started one by one, as in containers."""
 
 from __future__ import annotations
 

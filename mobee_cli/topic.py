@@ -1,4 +1,4 @@
-"""`mobee topic`: what is said on the bus."""
+"""`mobee topic`: what is published on the bus."""
 
 from __future__ import annotations
 

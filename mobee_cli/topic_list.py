@@ -1,4 +1,4 @@
-"""`mobee topic list`: all keys on which something is said, with type, rate and size."""
+"""`mobee topic list`: all keys with type, rate and size."""
 
 from __future__ import annotations
 

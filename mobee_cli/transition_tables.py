@@ -1,4 +1,4 @@
-"""Transitions as a table on disk: CSV or Parquet, whole or not there."""
+"""Writes transitions as CSV or Parquet, whole or not at all."""
 
 from __future__ import annotations
 

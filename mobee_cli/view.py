@@ -1,4 +1,4 @@
-"""`mobee view`: a robot's file as a picture that moves."""
+"""`mobee view`: shows a robot file in motion."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mobee.collision.world import World
 from mobee.errors import MobeeError
+from mobee.model.world import World
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
-from mobee_cli.urdf_options import add_urdf_options, urdf_options
+from mobee_cli.robot_options import add_urdf_options, urdf_options
 from services.common.worlds import world_around
 
 _NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import requirement
-from experiments.bench.requirement import all_passed, judged
+from experiments.bench import verdicts as requirement
+from experiments.bench.verdicts import all_passed, judged
 from experiments.kit.progress import Progress
 from mobee.errors import MobeeError
 

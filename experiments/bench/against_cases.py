@@ -149,7 +149,7 @@ def _lockstep() -> Work:
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        summary = summary_of("lockstep", ("services.robot_sim.backend=kinematic", "services.robot_sim.rate=50"), ticks=ticks)
+        summary = summary_of("lockstep", ("services.robot_sim.kinematic=kinematic", "services.robot_sim.rate=50"), ticks=ticks)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, summary["lockstep"]
 

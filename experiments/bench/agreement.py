@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.bench.coal_peer import CoalPeer
+from experiments.bench.collision_peers import CoalPeer, Volume, way_out
 from experiments.bench.mujoco_peer import MujocoPeer
-from experiments.bench.way_out import Volume, way_out
-from mobee.collision.world import World
-from mobee.model import Model
-from mobee.pose import Pose
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.arrays import Array, Ints
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.model.world import World
+from mobee.robot.robot import Robot
 
 GRAZE = 1e-6  # m
 MINIMAL = 1e-9  # m; how far a depth may be from the way along its normal, and beyond the way along a peer's

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.robot.robot import Array
 
 
 class CmaMissing(MobeeError):

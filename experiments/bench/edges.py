@@ -10,15 +10,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 import mobee
-from experiments.bench import calibration, requirement
+from experiments.bench import calibration
+from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration
 from experiments.bench.edges_workload import MARKER, palm_map
-from experiments.bench.requirement import judged
-from experiments.bench.rounds import one_core
+from experiments.bench.verdicts import judged, one_core
 from experiments.kit.progress import Progress
-from mobee.roadmap.edge_watch import EdgeWatch
-from mobee.roadmap.edges import STEP, Flags, between, checked
-from mobee.roadmap.ik.solids import solid_model
+from mobee.roadmap.edges import STEP, EdgeWatch, Flags, between, checked
+from mobee.roadmap.ik.problem import solid_model
 from mobee.roadmap.roadmap import Roadmap
 
 T = TypeVar("T")

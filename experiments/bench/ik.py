@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import calibration, ik_solvers, requirement
+from experiments.bench import calibration, ik_solvers
+from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.ik_solvers import RIVALS, Entrant, Tries
 from experiments.bench.ik_workload import MOTORS, scene, targets
 from experiments.bench.mink_peer import load_mink
-from experiments.bench.requirement import judged
-from experiments.bench.rounds import one_core
+from experiments.bench.verdicts import judged, one_core
 from experiments.kit.progress import Progress
 
 NES, HYBRID, WHOLE = "NES", "least squares, then NES", "NES, all 41 motors"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.bench.cma_peer import CmaStrategy
+from mobee.arrays import Array
 from mobee.roadmap.evolution.search import Restart, Search
 from mobee.roadmap.ik.ngik import STD
 from mobee.roadmap.ik.problem import Problem
-from mobee.robot.robot import Array
 
 COOLING = 4000  # poses of one annealing
 HOT, COLD = 1.0, 0.003  # its temperatures, in units of the cost

@@ -12,8 +12,8 @@ from experiments.bench.calibration import Calibration
 from experiments.bench.ik_rivals import annealing, cma, particles, xnes
 from experiments.bench.ik_workload import MOTORS, Target
 from experiments.bench.mink_peer import MinkPeer
+from mobee.arrays import Array
 from mobee.roadmap.ik.problem import Problem
-from mobee.robot.robot import Array
 
 MOST = 20_000  # evaluations of a rival
 IN_TURN = 20  # targets of one solver, before it is another's turn: fewer would measure cold caches

@@ -8,8 +8,8 @@ import numpy as np
 
 import mobee
 from experiments.bench import workload
+from mobee.arrays import Array
 from mobee.roadmap.ik.term import Term
-from mobee.robot.robot import Array
 
 MARKER = "right_palm"
 _ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw")

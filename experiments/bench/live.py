@@ -28,7 +28,7 @@ def measure(rates: tuple[int, ...], seconds: float, backend: str) -> dict[str, A
     with Progress() as progress:
         for done, rate in enumerate(rates):
             progress.show(done / len(rates), f"{backend} at {rate} Hz")
-            settings = (f"services.robot_sim.backend={backend}", f"services.robot_sim.rate={rate}")
+            settings = (f"services.robot_sim.kinematic={backend}", f"services.robot_sim.rate={rate}")
             bare = [bare_ages(rate, BARE_SECONDS)]
             summary = summary_of("kinematic", settings, duration=seconds)
             bare.append(bare_ages(rate, BARE_SECONDS))

@@ -44,7 +44,7 @@ def measure(seconds: float, cases: tuple[Case, ...] = CASES) -> dict[str, Any]:
 
 
 def _summary(case: Case, seconds: float) -> dict[str, Any]:
-    settings = (f"services.robot_sim.backend={case.backend}", f"services.robot_sim.rate={case.rate}")
+    settings = (f"services.robot_sim.kinematic={case.backend}", f"services.robot_sim.rate={case.rate}")
     return summary_of("lockstep", settings, duration=seconds)
 
 

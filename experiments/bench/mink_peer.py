@@ -8,10 +8,11 @@ import numpy as np
 
 from experiments.bench.ik_workload import MARKER, Target
 from experiments.bench.mujoco_peer import load_mujoco
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.roadmap.ik.least_squares import NEAR
 from mobee.roadmap.ik.problem import Problem
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 # Its best among 0 to 10, 12 to 60 and 0.1 to 0.4.
 DAMPING = 1.0  # of Levenberg-Marquardt

@@ -21,14 +21,14 @@ import numpy as np
 from experiments.bench import random_robots, workload
 from experiments.bench.agreement import MINIMAL, Agreement, Scene, agreements
 from experiments.bench.calibration import Crew
-from experiments.bench.fcl_peers import FclPairs, FclTrees
+from experiments.bench.collision_peers import FclPairs, FclTrees
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.random_robots import MAKERS, MIXED, PLAIN
-from experiments.bench.requirement import all_passed, judged
-from experiments.bench.rounds import Contestant, one_core, rates
+from experiments.bench.verdicts import Contestant, all_passed, judged, one_core, rates
 from experiments.kit.progress import Progress
-from mobee.model import Model
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model.model import Model
+from mobee.robot.robot import Robot
 
 BATCH, CALL, OBJECTS, KINEMATICS = "batch", "one call", "one call, Contact objects", "one call, kinematics only"
 MUJOCO, PAIRS, TREES = "MuJoCo", "python-fcl, pair by pair", "python-fcl, trees of boxes"

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.bench import workload
 from experiments.bench.model import BATCH, CALL, MUJOCO, TREES, contestants
-from experiments.bench.rounds import one_core, rates
+from experiments.bench.verdicts import one_core, rates
 from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
 

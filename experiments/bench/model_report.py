@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from experiments.bench import requirement
+from experiments.bench import verdicts as requirement
 from experiments.bench.agreement import GRAZE, MINIMAL
 from experiments.bench.model import BATCH, CALL, KINEMATICS, MUJOCO, PAIRS, TREES
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.nes_workload import FUNCTIONS, STD, TARGET, trial
-from experiments.bench.requirement import all_passed, judged
-from experiments.bench.requirement import lines as requirement_lines
+from experiments.bench.verdicts import all_passed, judged
+from experiments.bench.verdicts import lines as requirement_lines
 from experiments.kit.progress import Progress
 
 REQUIRED, BOUND = "evaluations over CMA-ES's, median of the rows", 1.05

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.cma_peer import CmaStrategy
+from mobee.arrays import Array
 from mobee.roadmap.evolution.nes import NES
-from mobee.robot.robot import Array
 
 TARGET, STD = 1e-8, 0.5
 MOST = 400_000  # evaluations, far beyond what any of them needs that comes to the target

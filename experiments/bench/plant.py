@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import calibration, plant_batch, requirement
+from experiments.bench import calibration, plant_batch
+from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration
-from experiments.bench.mujoco_peer import load_mujoco
-from experiments.bench.mujoco_stepper import us_per_tick
+from experiments.bench.mujoco_peer import load_mujoco, us_per_tick
 from experiments.bench.plant_workload import DT, Pace, arm_plant, one_arm, one_arm_reaching, three_agents, trajectory_hash
-from experiments.bench.requirement import judged
-from experiments.bench.rounds import one_core
+from experiments.bench.verdicts import judged, one_core
 from experiments.kit.progress import Progress
 
 # Name, which run, which number of it in the standard machine's time, at least, aim.

@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.bench import workload
 from experiments.bench.plant_workload import DT, arm_plant, one_arm
-from experiments.bench.rounds import one_core
+from experiments.bench.verdicts import one_core
 from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
 

@@ -13,9 +13,10 @@ from functools import cache
 import numpy as np
 
 import mobee
-from mobee.collision.geometry import Geometry
-from mobee.collision.world import World
-from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape, ShapeKind
+from mobee.arrays import Array
+from mobee.model.world import World
+from mobee.model.world_object import Geometry
+from mobee.robot.robot import Joint, Motor, Part, Robot, Shape, ShapeKind
 
 SEED = 2026
 OBJECTS = 100

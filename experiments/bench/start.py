@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import calibration, requirement
+from experiments.bench import calibration
+from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.requirement import judged
+from experiments.bench.verdicts import judged
 from experiments.kit.live import summary_of
 from experiments.kit.progress import Progress
 

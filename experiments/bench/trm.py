@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench import calibration, requirement
+from experiments.bench import calibration
+from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.requirement import judged
-from experiments.bench.rounds import some_cores
+from experiments.bench.verdicts import judged, some_cores
 from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.progress import Progress
 from experiments.kit.roadmap_task import Example
+from mobee.arrays import Array
 from mobee.roadmap.building.build import LONGEST
-from mobee.roadmap.neighbours import nearest, short
+from mobee.roadmap.graph import nearest, short
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 
 LEAST_SQUARES, NES, HYBRID = "least_squares", "nes", "hybrid"
 CORES = 2

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import requirement
-from experiments.bench.requirement import judged
-from experiments.bench.rounds import Contestant, one_core, rates
+from experiments.bench import verdicts as requirement
+from experiments.bench.verdicts import Contestant, judged, one_core, rates
 from experiments.bench.vi_peers import QUANTECON, Problem, load_quantecon
 from experiments.bench.vi_workload import Tables, Work, at_random, at_work, of_size
 from experiments.kit.progress import Progress
-from mobee.learning.policy_iteration import policy_iteration
-from mobee.learning.value_iteration import METHODS, value_iteration
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.learning.value_iteration import METHODS, policy_iteration, value_iteration
 
 DISCOUNT, TOLERANCE = 0.9, 1e-3  # published
 OBSERVING = "changes of the model alone"  # taken off the time of the warm plans between them

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench.rounds import one_core, rates
+from experiments.bench.verdicts import one_core, rates
 from experiments.bench.vi import ALGORITHM_7, COLD, DISCOUNT, OBSERVING, SCIPY, WARM, contestants
 from experiments.bench.vi_peers import QUANTECON
 from experiments.bench.vi_workload import at_work, of_size

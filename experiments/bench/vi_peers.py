@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.robot.robot import Array
 
 QUANTECON = {"value_iteration": "quantecon value iteration", "modified_policy_iteration": "quantecon modified policy iteration"}
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.kit.arm_learning import arm_space
 from mobee import CuriousAgent
+from mobee.arrays import Array, Ints
 from mobee.learning.tabular import TabularPlant, half_space
-from mobee.robot.robot import Array, Ints
 
 ACTIONS = 16
 REACH = 64  # how far away, in states, actions of a problem of any size lead

@@ -11,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 import mobee
-from mobee.collision.world import World
-from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
+from mobee.arrays import Array
+from mobee.model.world import World
+from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 
 SEED = 2014
 _FILE = Path(__file__).with_name("data") / "bench_model.json"

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from experiments.drawing.solid import Solid
+from mobee.arrays import Array
 from mobee.errors import UnknownName
-from mobee.robot.robot import Array
 
 # Azimuth and elevation of the camera, degrees: 0 is in front of a robot that looks along -x as the iCub does, 90 at its right.
 VIEWS = {

@@ -12,10 +12,10 @@ from experiments.drawing.filmstrip import View, pictures_of
 from experiments.drawing.scene import object_solids, robot_solids
 from experiments.drawing.sheet import Panel, write_sheet
 from experiments.drawing.solid import Color, Solid, ball
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.model import Model
-from mobee.pose import Pose
-from mobee.robot.robot import Array
+from mobee.model.model import Model
+from mobee.model.pose import Pose
 
 RADIUS = 0.0045  # m, of a point
 LOW, HIGH = np.array([0.16, 0.42, 0.92]), np.array([1.00, 0.70, 0.12])  # colours of the least and the largest value

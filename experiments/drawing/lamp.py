@@ -9,7 +9,7 @@ import numpy as np
 from experiments.drawing.camera import Camera, framing
 from experiments.drawing.raster import Floats, Raster
 from experiments.drawing.solid import Solid
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 SKY, GROUND, SUN = 0.62, 0.34, 0.50  # light from above, from below, from the lamp
 SHADE = 0.75  # share of the lamp's light that its shadow takes

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.world_object import WorldObject
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.model import Model
-from mobee.pose import Pose
-from mobee.robot.robot import Array, Ints
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.model.world_object import WorldObject
 from mobee.simulation.plant import OfflinePlant
 
 STILL = 0.02  # rad, or m: a motor that moves less is still

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.drawing.solid import Solid
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from mobee.robot.urdf.hull import facets
 
 Floats = NDArray[np.floating]

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from experiments.drawing.solid import Color, Solid, ball, tube
-from mobee.collision.world_object import WorldObject
-from mobee.pose import Pose
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.model.pose import Pose
+from mobee.model.world_object import WorldObject
 from services.monitor import palette
 
 TRAIL, TIP = 0.005, 0.009  # m, radii

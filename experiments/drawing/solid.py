@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mobee.robot.robot import Array, ShapeKind
+from mobee.arrays import Array
+from mobee.robot.robot import ShapeKind
 
 Color = tuple[float, float, float]  # red, green, blue in 0..1
 

@@ -10,7 +10,8 @@ import numpy as np
 from experiments.kit.control_runs import PERIOD, PlantRun, icub_at_table, place, run_plant
 from experiments.kit.safety_measures import clause_violations, speeds_at_stops
 from mobee import Controller, Gains
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 
 MOTORS = 7  # of an arm, without the fingers: the constraints are on the first five

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 import mobee
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World
-from mobee.robot.robot import Array, Clause, Motor, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Clause, Motor, Robot
 
 ROBOT = "icub_2014"
 DT = 0.02  # s

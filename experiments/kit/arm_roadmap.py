@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from experiments.kit.arm_learning import clear, columns, robot
 from mobee import Gains, Lattice, Model
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.roadmap.ompl_base import grown
-from mobee.robot.robot import Array, Clause, Ints
+from mobee.roadmap.ompl import grown
+from mobee.robot.robot import Clause
 
 STEP = 0.02  # of a joint's range, between two poses of a motion that are checked
 MILESTONES, NEIGHBOURS = 300, 10  # of OMPL's roadmap; the second is its default

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 _SAFE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,119}")
 

@@ -10,7 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from mobee import Model, load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 
 GAINS = ("default", "published_2014")

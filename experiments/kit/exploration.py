@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mobee import CuriousAgent, OfflinePlant, Plant, Space
+from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
-from mobee.robot.robot import Array, Ints
 from mobee.store import Transition
 
 

@@ -13,8 +13,8 @@ from experiments.kit.cells import load_cells
 from experiments.kit.live_learning import ROBOT, ROBOTS, TASKS, space
 from experiments.kit.plots import new_figure
 from mobee import Lattice, load_robot
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Ints
 from mobee.store import STORE, TransitionStore
 
 Counts = Mapping[str, Ints]  # by part: how often each outcome was seen, (S, A, S)

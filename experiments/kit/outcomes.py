@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from experiments.kit.cells import CellResult
 from experiments.kit.sweep import grouped_by
 from mobee import Lattice
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 SOMETIMES = (0.1, 0.9)  # shares of failures between which an action neither works nor fails
 

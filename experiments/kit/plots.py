@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.kit.statistics import interquartile_mean, interval
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
-from mobee.robot.robot import Array
 
 
 class MatplotlibMissing(MobeeError):

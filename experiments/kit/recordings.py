@@ -9,9 +9,10 @@ import numpy as np
 from msgspec import Struct
 
 from experiments.kit.records import read_records
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 
-POSITIONS, CONTACTS = "q.f64", "contacts.csv"  # as services.robot_sim.record writes them
+POSITIONS, CONTACTS = "q.f64", "contacts.csv"  # as services.robot_sim.watch writes them
 APART = 0.2  # s for which a pair must be apart, so that its next contact is another event
 COLUMNS = ("k", "pair", "depth")
 

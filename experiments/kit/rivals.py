@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.kit.arm_roadmap import Edge, Roadmap, edge
 from mobee import Lattice, TransitionModel
+from mobee.arrays import Array
 from mobee.learning.planner import Planner
-from mobee.robot.robot import Array
 
 ARRIVED = 0.125  # of every joint's range: half the distance of two samples of the lattice
 

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 import mobee
 from experiments.drawing.filmstrip import View
 from mobee import Geometry, Model, Robot, World
+from mobee.arrays import Array
 from mobee.roadmap.building.build import LONGEST
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.ik.term import Term
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 
 Method = Literal["nes", "least_squares", "hybrid"]
 MARGIN = float(np.deg2rad(10.0))  # the default law lets no motor rest nearer to a limit

@@ -11,9 +11,10 @@ from functools import cache
 import numpy as np
 
 from experiments.kit.control_runs import PlantRun
-from mobee.model import Model
-from mobee.robot.robot import Array, Robot
-from services.robot_sim.pairs import load_solid_pairs
+from mobee.arrays import Array
+from mobee.model.model import Model
+from mobee.robot.robot import Robot
+from services.robot_sim.bullet_scene import load_solid_pairs
 
 SECOND = 1.0  # s; a contact that oscillates does so twice a second or faster
 AT_STOP = np.deg2rad(0.01)  # a motor nearer to a limit is at its hard stop

@@ -8,8 +8,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Ints
 
 RESAMPLES = 2000
 LEVEL = 0.95
@@ -60,7 +60,7 @@ def interval(
     return float(low), float(high)
 
 
-def told(values: ArrayLike, digits: int = 2) -> str:
+def estimate(values: ArrayLike, digits: int = 2) -> str:
     """The interquartile mean and its 95 % interval, for people."""
     low, high = interval(values)
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
@@ -86,7 +86,7 @@ def ratio_interval(above: ArrayLike, below: ArrayLike) -> tuple[float, float]:
     return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second))
 
 
-def told_ratio(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
+def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
     """`ratio` and its 95 % interval, as `told` has them."""
     low, high = ratio_interval(above, below)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"

@@ -10,7 +10,7 @@ import numpy as np
 from experiments.kit.control_runs import PlantRun, icub, place, random_posture, run_plant
 from experiments.kit.safety_measures import clause_violations
 from mobee import Gains
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from mobee.simulation import OfflinePlant
 
 STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, of the range: the smaller is the step of a motor alone

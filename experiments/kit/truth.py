@@ -18,12 +18,12 @@ import numpy as np
 
 from experiments.kit.exploration import begin_nearby
 from mobee import Plant, TransitionModel, run_batch, value_iteration
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import choose
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.robot.robot import Array, Ints
 
 ANYWHERE = 0.5  # share of a walk's steps that go to a random neighbour
 DISCOUNT, TOLERANCE = 0.9, 0.01

@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike
 from experiments.kit.claims import Claim
 from experiments.kit.statistics import (
     decides,
+    estimate,
     improvement_interval,
     interquartile_mean,
     interval,
     probability_of_improvement,
     ratio,
     ratio_interval,
-    told,
 )
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 ABOUT_EQUAL = (0.9, 1.1)
 Verdicts = list[bool | None]
@@ -36,11 +36,11 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
     It holds where the interval of the probability of improvement is above one half, and does not where it is below, or where the
     ratio of the two is within a tenth of 1 with its interval: they are about equal.
     """
-    parts, verdicts = [f"{name} {told(values[name], digits)}"], Verdicts()
+    parts, verdicts = [f"{name} {estimate(values[name], digits)}"], Verdicts()
     for rival in rivals:
         first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
         chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
-        parts.append(f"{rival} {told(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
+        parts.append(f"{rival} {estimate(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
         verdicts.append(True if low > 0.5 else False if high < 0.5 or _about_equal(first, second) else None)
     return ", ".join(parts), verdicts
 
@@ -60,7 +60,7 @@ def rises(change: ArrayLike) -> bool | None:
 
 def changes(before: Array, after: Array) -> str:
     """As text: the means before and after, and the mean change of a run."""
-    return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {told(after - before)}"
+    return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"
 
 
 def published_ratio(claim: Claim, above: ArrayLike, below: ArrayLike, bounds: tuple[float, float], note: str = "") -> Claim:

@@ -24,9 +24,10 @@ from experiments.kit.progress import Progress
 from experiments.kit.records import Records, read_records
 from experiments.originals.checkouts import Original, find_originals
 from experiments.originals.table import COLUMNS, RECORDS, TABLE, write_table
+from mobee.check import check_file
 from mobee.errors import InvalidValue, MobeeError
-from mobee.robot.check import check_file
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.originals.program_2014 import Node, Program, Volume
-from mobee.kinematics.forward import link_transforms
-from mobee.model import Model
+from mobee.model.kinematics import link_transforms
+from mobee.model.model import Model
 from mobee.robot.robot import Robot
 
 Array = NDArray[np.float64]

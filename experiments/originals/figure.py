@@ -9,11 +9,12 @@ from experiments.drawing.filmstrip import pictures_of
 from experiments.drawing.scene import object_solids, robot_solids
 from experiments.drawing.sheet import Panel, write_sheet
 from experiments.drawing.solid import Solid
-from mobee.collision.world import World
 from mobee.errors import InvalidValue
-from mobee.model import Model
-from mobee.pose import Pose
-from mobee.robot.load import load_robot, load_world
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.model.world import World
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 
 ICUB, VIRTUAL_SKIN, WORLD = "2014-11-14_icub_9*.xml", "2011-07-21_icub_*.xml", "2014-11-14_world_*.xml"

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from mobee import CuriousAgent, Lattice, Model, OfflinePlant, load_robot
-from mobee.robot.check.leave_out import leave_out_touching
+from mobee.arrays import Array
+from mobee.check.touching import leave_out_touching
 from mobee.robot.motor_units import slides
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 HOME_TIME = 10.0  # s
 ACTIONS = 250

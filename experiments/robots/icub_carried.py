@@ -10,8 +10,8 @@ import numpy as np
 from experiments.robots.icub_fields import HEAD, LEFT_ARM, TRUNK, Field
 from experiments.robots.icub_solids import BOXES
 from experiments.robots.xml_writer import box_turn, element, number, vector
+from mobee.arrays import Array
 from mobee.robot.bodies import to_six
-from mobee.robot.robot import Array
 
 
 def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:

@@ -15,11 +15,12 @@ from itertools import combinations
 import msgspec
 import numpy as np
 
+from mobee.arrays import Array
+from mobee.model.world_file import load_world
 from mobee.robot.icub_urdf import MODEL
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Robot
-from services.robot_sim.bullet_scene import BulletScene
-from services.robot_sim.pairs import SOLID_PAIRS, TABLE, SolidPairs
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from services.robot_sim.bullet_scene import SOLID_PAIRS, TABLE, BulletScene, SolidPairs
 
 DISTANCE = 0.002  # m
 POSES = 2000

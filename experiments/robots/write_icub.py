@@ -18,8 +18,8 @@ from experiments.robots.icub_carried import add_fields, add_markers, add_mass, a
 from experiments.robots.icub_fields import BESIDE
 from experiments.robots.icub_motors import EYES, declare_motors, joint_interval, motor_of
 from experiments.robots.xml_writer import element, number, vector, write
-from mobee.robot.robot import Array
-from mobee.robot.xml_tree import VERSION
+from mobee.arrays import Array
+from mobee.robot.xml.node import VERSION
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
 HEADING = """

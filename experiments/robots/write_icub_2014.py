@@ -16,8 +16,8 @@ import numpy as np
 
 from experiments.robots.write_icub import add_constraints
 from experiments.robots.xml_writer import box_turn, element, number, vector, write
-from mobee.robot.robot import Array
-from mobee.robot.xml_tree import VERSION
+from mobee.arrays import Array
+from mobee.robot.xml.node import VERSION
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub_2014.xml"
 HEADING = """

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mobee.robot.robot import Array
-from mobee.robot.xml_tree import write_tree
-from mobee.robot.xml_volume import Y, angle_about, height_and_angle
+from mobee.arrays import Array
+from mobee.robot.xml.node import write_tree
+from mobee.robot.xml.volume import Y, angle_about, height_and_angle
 
 
 def number(value: float, digits: int = 7) -> str:

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from experiments.urdf_files.peer import LinkPair, PeerFailed, UrdfPeer
+from mobee.arrays import Array
+from mobee.check.subject import Subject
 from mobee.errors import MobeeError
-from mobee.kinematics.forward import link_transforms
-from mobee.model import Model
-from mobee.robot.check.subject import Subject
+from mobee.model.kinematics import link_transforms
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import CORNERS
 
 GRAZE = 1e-6  # m; of a pair that overlaps by less, two right programs may differ on whether it touches

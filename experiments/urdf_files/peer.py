@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 LinkPair = frozenset[str]
 # Of coal's iterative searches [m].  With 1e-6 or 1e-9 it misses contacts of cylinders, up to 46 mm deep (baxter), which polytopes inside

@@ -1,4 +1,4 @@
-"""Straight motions between poses: the function of core/edges.cpp."""
+"""Checks straight motions between poses; declares core/edges.cpp."""
 
 from __future__ import annotations
 

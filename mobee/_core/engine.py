@@ -1,4 +1,4 @@
-"""Robots, scenes and evaluations: the functions of core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
+"""Robots, scenes and evaluations; declares core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
 
 Handles are objects of the core; each frees its own, and keeps alive what its own refers to.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mobee._core import ADDRESS, BYTES, INTEGER, REAL, address, function
 from mobee._core.narrow import VOLUME
-from mobee.collision.contact import NUMBERS, REALS, ROW_BYTES
+from mobee._core.tables import NUMBERS, REALS, ROW_BYTES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -127,13 +127,13 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
 def robot(counts: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> Handle:
-    """A robot from its tables, which are copied; see mobee/engine/robot_tables.py."""
+    """A robot from its tables, which are copied; see mobee/model/robot_tables.py."""
     tables = _RobotTables(**counts, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 
 def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
-    """A robot among the free ones of a world's objects; `carried`: those that it carries, `side`: see mobee/engine/engine.py."""
+    """A robot among the free ones of a world's objects; `carried`: those that it carries, `side`: see mobee/model/engine.py."""
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 

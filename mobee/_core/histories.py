@@ -1,4 +1,4 @@
-"""Sums over what happened before, weighted by how near it was: the functions of core/histories.cpp."""
+"""Sums over past values weighted by distance; declares core/histories.cpp."""
 
 from __future__ import annotations
 

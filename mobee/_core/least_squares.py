@@ -1,4 +1,4 @@
-"""Least squares of aims from many starts: the function of core/least_squares.cpp."""
+"""Least squares from many starts; declares core/least_squares.cpp."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The builds of the core: one for each level of x86-64 processors, one in all elsewhere; their files, and which one runs here.
+"""The builds of the core, one for each x86-64 level and a generic one elsewhere, and which one runs on this processor.
 
 It imports nothing but Python's own modules: core/build.py loads this file where the library's dependencies are not installed.
 """

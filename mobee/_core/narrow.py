@@ -1,4 +1,4 @@
-"""Pairs of volumes, one call for many: what tests and benchmarks ask of the narrow phase."""
+"""Batches of volume pairs for tests and benchmarks of the narrow phase."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of the outcomes of actions, and what observations are worth: the functions of core/observations.cpp."""
+"""Outcome counts and information gains; declares core/observations.cpp."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How arrays are handed to the core: as their address and length, or with a column for each member of a structure."""
+"""Passes arrays to the core, as address and length, or as one column for each member of a structure."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ import ctypes
 import numpy as np
 
 from mobee._core import ADDRESS, INTEGER, address
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 Table = np.ndarray[tuple[int, ...], np.dtype[np.void]]
 """An array of structures of the core: `table["low"]` is a view of one member of all of them."""
 
 WHOLE = "i8"
+
+NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
+ROW_BYTES = 8 * (NUMBERS + REALS)
 
 
 class View(ctypes.Structure):

@@ -1,4 +1,4 @@
-"""Plans over tables of outcomes: the function of core/value_iteration.cpp."""
+"""Value iteration over tables of outcomes; declares core/value_iteration.cpp."""
 
 from __future__ import annotations
 

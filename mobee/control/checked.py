@@ -1,4 +1,4 @@
-"""What is given to the law, checked at its border: finite numbers, as many as motors, forces that do not overflow in it."""
+"""Checks inputs of the control law: finite numbers, one for each motor, no overflow."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
-from mobee.real_array import real_array
-from mobee.robot.robot import Array
 
 _FLOAT = np.dtype(np.float64)
 LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far more than any squash lets through, far less than overflows in it

@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
+from mobee.arrays import Array
 from mobee.control.checked import checked, checked_force
 from mobee.control.forces import Forces, Propagate, forces_of
 from mobee.control.gains import Gains
-from mobee.control.law import Law
-from mobee.control.modality import Command, Modality
+from mobee.control.law import Command, Law, Modality
 from mobee.control.reaches import Reaches
 from mobee.control.stability import largest_step, require_stable
 from mobee.control.terms import State, Term, valid_terms
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics.gravity import gravity_torque
+from mobee.model.masses import gravity_torque
 from mobee.robot.motor_units import motor_units
-from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
-    from mobee.model import Model, Pose
+    from mobee.model.model import Model
+    from mobee.model.pose import Pose
     from mobee.reach import ReachTarget
 
 

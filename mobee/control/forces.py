@@ -1,4 +1,4 @@
-"""The forces that constrain the dynamical system: what the model tells the controller every tick."""
+"""The constraint forces that the model computes for the controller in every tick."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import numpy as np
 
 from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
+from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.control.law import Law
 from mobee.errors import InvalidValue, UnknownName
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from mobee.model import Pose
+    from mobee.model.pose import Pose
 
 # "tree": a contact is felt down to the base, so that a hand on the table also stops the torso; "part": by the part's own motors.
 Propagate = Literal["tree", "part"]

@@ -1,4 +1,4 @@
-"""The numbers of the control law, in two named sets (DESIGN section 6)."""
+"""The gains of the control law, in two named sets: `default` and `published_2014`."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control.settle import Settle
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.motor_units import LIMIT_WIDTH, motor_units
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 Law = Literal["default", "published_2014"]
 ClientSquash = Literal["each", "direction"]

@@ -1,9 +1,11 @@
-"""The law of eq. 5.7 with its numbers for one robot; core/law.cpp has the formulas."""
+"""The control law of eq. 5.7 with its numbers for one robot; core/law.cpp has the formulas."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +13,10 @@ from numpy.typing import NDArray
 from mobee._core import address
 from mobee._core import law as core
 from mobee._core.tables import INTERVAL, Table, numbers, view
+from mobee.arrays import Array, Ints
 from mobee.control.gains import Gains
-from mobee.control.modality import Modality
 from mobee.robot.motor_units import fine_units, limit_zones, motor_units
-from mobee.robot.robot import Array, Clause, Ints, Robot
+from mobee.robot.robot import Clause, Robot
 
 INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
 LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
@@ -121,3 +123,41 @@ def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Tab
             rows.append((float(b), zone, (len(entries), len(entries) + len(moved))))
             entries += [(int(motor), float(a[motor]), float(a[motor] * units[motor] / length)) for motor in moved]
     return np.array(spans, dtype=INTERVAL), np.array(rows, dtype=core.CLAUSE_ROW), np.array(entries, dtype=core.CLAUSE_ENTRY)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClauseRows:
+    """Row i belongs to clause `clause[i]`."""
+
+    a: Array  # (rows, n)
+    b: Array  # (rows,) rad
+    normals: Array  # (rows, n), a / |a|
+    norms: Array  # (rows,)
+    clause: NDArray[np.intp]  # (rows,)
+    starts: NDArray[np.intp]  # (clauses,) the first row of each
+
+
+def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
+    """Put the clauses of a robot with n motors into one matrix."""
+    counts = [len(c.b) for c in clauses]
+    a = np.concatenate([c.a for c in clauses]) if clauses else np.zeros((0, n))
+    b = np.concatenate([c.b for c in clauses]) if clauses else np.zeros(0)
+    norms = np.linalg.norm(a, axis=1)
+    starts = np.cumsum([0, *counts[:-1]])[: len(counts)].astype(np.intp)
+    return ClauseRows(a, b, a / norms[:, None], norms, np.repeat(np.arange(len(counts)), counts), starts)
+
+
+Modality = Literal["position", "velocity", "torque"]
+
+# What a torque-commanded motor is taken to be, here and in the simulated motors: inertia * dv/dt = torque - friction * v.
+INERTIA = 0.5  # kg m^2
+FRICTION = 5.0  # N m s/rad
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Command:
+    """What the motors are told: the modality in force says which one counts; each (n,), motor order of the robot."""
+
+    position: Array  # rad
+    velocity: Array  # rad/s
+    torque: Array  # N m

@@ -1,4 +1,4 @@
-"""The reaches that are under way; core/reach.cpp and core/reach_pull.cpp have the formulas."""
+"""Reaches in progress; core/reach.cpp and core/reach_pull.cpp have the formulas."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy as np
 from mobee._core import address
 from mobee._core import law as core
 from mobee._core.tables import Table, view
+from mobee.arrays import Array, Ints
 from mobee.control.law import Law
 from mobee.errors import InvalidValue
-from mobee.kinematics.tables import tables
+from mobee.model.kinematics import tables
 from mobee.robot.motor_units import motor_units
-from mobee.robot.robot import Array, Ints, Marker, Robot
+from mobee.robot.robot import Marker, Robot
 
 if TYPE_CHECKING:
     from mobee.reach import ReachTarget

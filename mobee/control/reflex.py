@@ -1,7 +1,4 @@
-"""MoBeE 1.0: switching control, and the reflex that goes back the way it came (thesis chapter 4).
-
-Pure logic, a tick at a time: poses and what is wrong with them go in; out comes who commands the robot, and where to.
-"""
+"""MoBeE 1.0: switching control and the reflex that retraces the recent poses (thesis chapter 4)."""
 
 from __future__ import annotations
 
@@ -13,10 +10,97 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.control.reflex_settings import ReflexSettings
-from mobee.control.violation import Violation
+from mobee.arrays import Array
+from mobee.control.law import stack_clauses
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
+from mobee.model.pose import Pose
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReflexSettings:
+    """Numbers of the reflex; times in s.
+
+    `confirm`: how long a violation must last, in every tick, before it counts; `release`: how long it must be away.
+    `brake`: how long the robot brakes before it is rewound; `dead_time`: how long it rests behind the rewinding, before it is judged.
+    `pace`: recorded poses that are rewound a tick.  `must_be_clear`: a waypoint that is itself in violation is passed by, and
+    control is given back at a clear pose only.
+    """
+
+    history: float = 30.0
+    confirm: float = 0.03
+    release: float = 0.1
+    brake: float = 0.1
+    dead_time: float = 0.5
+    pace: float = 1.0
+    must_be_clear: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("confirm", "release", "brake", "dead_time"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InvalidValue(f"reflex {name} {getattr(self, name)} s: must be a finite time, not negative")
+        for name in ("history", "pace"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InvalidValue(f"reflex {name} {getattr(self, name)}: must be finite and above 0")
+
+    @classmethod
+    def naive(cls) -> ReflexSettings:
+        """As chapter 4.1 describes it: the first violation counts, and control goes back where a waypoint is reached.
+
+        4.4 tells what became of that: oscillation between the two controllers, and recoveries that fail.
+        """
+        return cls(confirm=0.0, release=0.0, brake=0.0, dead_time=0.0, must_be_clear=False)
+
+
+ContactKind = Literal["solid", "field"]
+KINDS: tuple[ContactKind, ...] = ("solid", "field")
+TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate grants the same beyond a limit
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """One thing that is wrong with a pose."""
+
+    kind: Literal["contact", "limit", "clause"]
+    what: str  # "first - second", the motor, or the part and number of the clause
+    depth: float  # m of a contact, rad (m of a slide) beyond a limit, rad along the normal of the clause's nearest row
+
+
+class Watch:
+    """Says what is wrong with a pose."""
+
+    def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
+        """`kinds`: of contacts that count; `tolerance` rad by which a limit or a clause may be exceeded: encoders are noisy.
+
+        Of a motor that slides the tolerance counts in its fine unit (`mobee.robot.motor_units`).
+        """
+        if unknown := set(kinds) - set(KINDS):
+            raise InvalidValue(f"kinds {sorted(unknown)}: contacts are of the kinds {', '.join(KINDS)}")
+        if not 0.0 <= tolerance < np.inf:
+            raise InvalidValue(f"tolerance {tolerance} rad: must be a finite angle, not negative")
+        self._kinds, self._tolerance = frozenset(kinds), tolerance
+        self._motors, self._limits, self._units = robot.motors, robot.limits, fine_units(robot)
+        self._rows = stack_clauses(robot.clauses, len(robot.motors))
+        self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
+
+    def look(self, pose: Pose) -> tuple[Violation, ...]:
+        """Everything that is wrong with one pose: contacts, the deepest first, then limits, then clauses."""
+        contacts = [Violation("contact", f"{c.first} - {c.second}", float(c.depth)) for c in pose.contacts if c.kind in self._kinds]
+        contacts.sort(key=lambda violation: -violation.depth)
+        beyond = np.maximum(self._limits[:, 0] - pose.q, pose.q - self._limits[:, 1])
+        past = np.flatnonzero(beyond > self._tolerance * self._units)
+        limits = [Violation("limit", self._motors[i], float(beyond[i])) for i in past]
+        return (*contacts, *limits, *self._broken(pose))
+
+    def _broken(self, pose: Pose) -> list[Violation]:
+        """The clauses none of whose rows is satisfied."""
+        rows = self._rows
+        if not len(rows.b):
+            return []
+        lack = np.minimum.reduceat(-(rows.a @ pose.q + rows.b) / rows.norms, rows.starts)
+        return [Violation("clause", self._clauses[i], float(lack[i])) for i in np.flatnonzero(lack > self._tolerance)]
+
 
 State = Literal["forward", "brake", "rewind", "dead", "stuck"]
 Outcome = Literal["under way", "waypoint", "end of history", "stuck"]

@@ -1,4 +1,4 @@
-"""When an action is over: the motion of a part has died down, or its time is up (thesis 6.1)."""
+"""Decides when an action ends: the part has settled, or time is up (thesis 6.1)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from mobee._core import law as core
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 Verdict = Literal["moving", "settled", "timeout"]
 VERDICTS: tuple[Verdict, ...] = ("moving", "settled", "timeout")

@@ -1,4 +1,4 @@
-"""Up to which time step the law is stable, motor by motor."""
+"""Computes the largest stable time step of the law for each motor."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from mobee.control.clauses import stack_clauses
+from mobee.arrays import Array
 from mobee.control.gains import Gains
+from mobee.control.law import stack_clauses
 from mobee.errors import InvalidValue
 from mobee.robot.motor_units import motor_units
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Forces of eq. 5.7 that are given from outside, as functions in Python."""
+"""User-defined forces of eq. 5.7, as Python functions."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mobee._core.law import term_names
+from mobee.arrays import Array
 from mobee.control.checked import checked_force
 from mobee.control.forces import Forces
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from mobee.model import Pose
+    from mobee.model.pose import Pose
 
 _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 

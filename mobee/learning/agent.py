@@ -1,16 +1,16 @@
-"""The curious agent: decides, acts through a plant, observes, forgets nothing (thesis Algorithm 8)."""
+"""The curious agent: decides, acts through a plant, observes, stores every transition (thesis Algorithm 8)."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.decider import Decider
-from mobee.learning.exploit import Goal
-from mobee.learning.explorable import Explorer
+from mobee.learning.explorers import Explorer
+from mobee.learning.goal import Goal
 from mobee.learning.space import Space
 from mobee.plant import Described, Outcome, Plant
-from mobee.robot.robot import Array
 from mobee.store import Transition, TransitionStore
 
 

@@ -1,4 +1,4 @@
-"""Random numbers that follow from a seed, a name and a count: who draws again at the same count draws the same."""
+"""Random numbers determined by a seed, a name and a count."""
 
 from __future__ import annotations
 

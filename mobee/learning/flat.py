@@ -1,13 +1,13 @@
-"""A state space as a picture in the plane."""
+"""Lays a state space out in the plane, for pictures."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.learning.lattice import Lattice
 from mobee.learning.neighbours import lattice_digits
 from mobee.learning.space import Space
-from mobee.robot.robot import Array
 
 GAP = 0.8  # between the blocks of a lattice, in steps of its first joints
 

@@ -1,4 +1,4 @@
-"""Entries of a table by name, and one's own beside them."""
+"""Finds an entry by its name in a table, or imports it as `module:name`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several agents on one plant, each starting its next action when its own part has settled (thesis 7.4)."""
+"""Runs several agents on one plant; each starts its next action when its own part has settled (thesis 7.4)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.agent import CuriousAgent
 from mobee.plant import Outcome, Plant
-from mobee.robot.robot import Array
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""State spaces that change with what is known: without what is never reached, with shortcuts where one often goes (thesis 9.4.5)."""
+"""State spaces adapted to what was learned: without unreachable states, with shortcuts (thesis 9.4.5)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from mobee.arrays import Ints
 from mobee.errors import InvalidValue
-from mobee.learning.edge_table import edges_of, joined, table_of
+from mobee.learning.neighbours import edges_of, joined, table_of
 from mobee.learning.space import Space
-from mobee.robot.robot import Ints
 from mobee.store import Transition
 
 SEEN = 5  # so often a state must have been aimed at, and never been come to, to be held for unreachable

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION, nearest_finder
-from mobee.real_array import real_array
-from mobee.robot.robot import Array, Ints, Part, Robot
+from mobee.robot.robot import Part, Robot
 
 MAX_STATES = 100_000  # beyond this the space is no learning problem on a robot any more (thesis 7.4)
 NEIGHBOURS = 16  # of the thesis' arms

@@ -1,4 +1,4 @@
-"""A world given as a table: where each action leads, with what probability.  For fast tests and for worlds whose truth is known."""
+"""A tabular plant: every action draws its outcome from given probabilities. For fast tests and known truths."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.learning.bins import read_only
 from mobee.learning.lattice import Lattice
 from mobee.learning.neighbours import NO_ACTION, lattice_strides
 from mobee.learning.space import Space
+from mobee.learning.transitions import read_only
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Ints
 
 DRAWS = 4096  # random numbers made at a time
 NEGLIGIBLE = 1e-4  # a probability

@@ -1,24 +1,127 @@
-"""What the agent knows of the outcomes of its actions, and what each new outcome was worth (thesis 6.4)."""
+"""The transition model: outcome counts of every state-action, and the information gain of an observation (thesis 6.4)."""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from math import log1p
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
-from mobee.learning.beliefs import DebiasedCounts
-from mobee.learning.bins import read_only, widened
-from mobee.learning.divergence import information_gain
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
-from mobee.learning.value_iteration import Tabled
-from mobee.robot.robot import Array, Ints
+from mobee.learning.value_iteration import OutcomeModel, Tabled
 
 if TYPE_CHECKING:
+    from mobee._core import observations
     from mobee._core.observations import OutcomeCounts
     from mobee._core.value_iteration import TransitionTable
+
+
+def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
+    """KL(P || T) in nats of two distributions over the same bins, given as counts or probabilities (thesis eq. 6.5).
+
+    `p`, `t`: shape (bins,), every component above zero (else it is undefined, thesis 6.4.2); they are normalised here.
+    """
+    new, old = np.asarray(p, dtype=np.float64), np.asarray(t, dtype=np.float64)
+    if new.ndim != 1 or new.shape != old.shape or not len(new):
+        raise InvalidValue(f"distributions of shapes {new.shape} and {old.shape}: give two vectors over the same bins.")
+    if not ((new > 0).all() and (old > 0).all() and np.isfinite(new).all() and np.isfinite(old).all()):
+        raise InvalidValue(f"KL divergence needs components above zero, given {new.tolist()} and {old.tolist()}: leave empty bins out.")
+    new, old = new / new.sum(), old / old.sum()
+    return float((new * np.log(new / old)).sum())
+
+
+def information_gain(count: float, total: float) -> float:
+    """KL(P || T) in nats when one bin of T grows by one: its count before, above 0, and that of all bins, at least `count`.
+
+    The closed form of eq. 6.5 for this case: the other bins only share the factor total / (total + 1).
+    """
+    gain = (count + 1.0) / (total + 1.0) * log1p(1.0 / count) - log1p(1.0 / total)
+    return max(0.0, gain)  # rounding
+
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def widened(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """A copy with room for one more bin, zero."""
+    return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, 1)])
+
+
+def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """A view that cannot be written to."""
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
+class DebiasedCounts(Tabled):
+    """Probabilities from real counts over a weak prior: an OutcomeModel that its transition model keeps up to date.
+
+    The counts that Algorithm 6 and 8 imagine keep the reward finite, but they make an action that never failed
+    look as if it failed 2 times in 4 + n.
+
+    Args:
+        model: whose bins they are.
+        real: how often each outcome was really observed, shape (S, A, B).
+        weight: their sums, shape (S, A).
+        goal, stay: counts imagined for the first two bins; none for the others.
+    """
+
+    def __init__(self, model: OutcomeModel, real: Array, weight: Array, goal: float, stay: float) -> None:
+        self._model = model
+        self._prior: Array = np.zeros(real.shape[-1])
+        self._prior[:2] = stay, goal
+        self._sum = stay + goal
+        probabilities = (real + self._prior) / (weight[:, :, None] + self._sum)
+        self._probabilities: Array = np.where(model.probabilities.any(axis=-1, keepdims=True), probabilities, 0.0)
+        self._believed: observations.DebiasedCounts | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_believed": None, "_table": None}  # a copy has arrays of its own
+
+    @property
+    def outcomes(self) -> Ints:
+        """The state of each bin, shape (S, A, B); meaningless where the probability is 0."""
+        return self._model.outcomes
+
+    @property
+    def probabilities(self) -> Array:
+        """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
+        return read_only(self._probabilities)
+
+    def update(self, counts: observations.OutcomeCounts, state: int, action: int) -> None:
+        """Follow the real counts of a state-action."""
+        believed = self._believed or self._believe()
+        _core().believe(counts.at, believed.at, state, action)
+
+    def widen(self) -> None:
+        """Make room for one more bin."""
+        self._prior, self._probabilities = np.append(self._prior, 0.0), widened(self._probabilities)
+        self._believed = self._table = None
+
+    def _believe(self) -> observations.DebiasedCounts:
+        """The probabilities where the core finds them."""
+        self._believed = _core().DebiasedCounts(self._probabilities, self._prior, self._sum)
+        return self._believed
+
+    def _tabled(self) -> TransitionTable:
+        from mobee._core.value_iteration import TransitionTable
+
+        return TransitionTable(self._probabilities, self._model.outcomes)
+
+
+@cache
+def _core() -> Any:
+    """Loaded when it is first needed."""
+    from mobee._core import observations
+
+    return observations
+
 
 INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # their imagined counts: Algorithm 8 and table 7.1
 NEW_BIN = 1.0  # the imagined count of bins beyond the first two, which are for staying and for the goal: Algorithm 6
@@ -181,11 +284,3 @@ class TransitionModel(Tabled):
         from mobee._core.value_iteration import TransitionTable
 
         return TransitionTable(self._probabilities, self._outcomes, self._bins)
-
-
-@cache
-def _core() -> Any:
-    """Loaded when it is first needed."""
-    from mobee._core import observations
-
-    return observations

@@ -1,4 +1,4 @@
-"""Random samples instead of a lattice: states are their Voronoi cells (thesis 6.2)."""
+"""State spaces of random samples: states are their Voronoi cells (thesis 6.2)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import nearest_goals
 from mobee.learning.space import MAX_STATES, Space, checked_joints, checked_neighbours
-from mobee.real_array import real_array
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Robot
 
 
 class Voronoi(Space):

@@ -1,4 +1,4 @@
-"""The definitions in NumPy: each function stands beside its equation, one pose or one tick at a time, written to be read.
+"""The definitions in NumPy: each function beside its equation, for one pose or one tick.
 
 What runs is the compiled form of the same; the tests compare the two.  Nothing of the library imports this package.
 

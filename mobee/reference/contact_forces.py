@@ -1,4 +1,4 @@
-"""What contacts of fields do to the motors: the sum of J^T f in eq. 5.11, before it is bounded.
+"""The projected contact forces of eq. 5.11, the sum of J^T f before saturation.
 
 Each contact pushes the two things that overlap apart, as strongly as it is deep.  How deep, `Model` and python-fcl say, each by itself.
 """
@@ -10,9 +10,10 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.collision.contact import Contact
+from mobee.arrays import Array
+from mobee.model.contact import Contact
 from mobee.reference.kinematics import joint_column, joints_to, link_frames
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 
 def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Literal["tree", "part"] = "tree") -> Array:

@@ -12,12 +12,13 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.collision.contact import Contact
+from mobee.arrays import Array
 from mobee.control.gains import Gains
+from mobee.model.contact import Contact
 from mobee.reference.contact_forces import projected
 from mobee.reference.kinematics import marker_jacobian
 from mobee.robot.motor_units import limit_zones, motor_units
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

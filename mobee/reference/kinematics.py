@@ -1,14 +1,15 @@
-"""Where links and markers are at a pose, how they move with each motor (thesis 2.3.1, eq. 5.1), and what they weigh.
+"""Forward kinematics, Jacobians and gravity (thesis 2.3.1, eq. 5.1).
 
 The robot is given in zero-position form: axes and points of all joints in the root frame, every joint at zero (Gupta 1986).
-`mobee.kinematics` computes the same for many poses at once.
+`mobee.model.kinematics` computes the same for many poses at once.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from mobee.robot.robot import Array, Joint, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Joint, Robot
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, root frame
 

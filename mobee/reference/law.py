@@ -1,4 +1,4 @@
-"""The dynamical system of eq. 5.7: the sum of its forces, a step, and what the motors are told.
+"""The dynamical system of eq. 5.7: the sum of its forces, one step, and the command.
 
 A force of your own is a function of the `State`; put it behind the others and give the list to `acceleration`, or to
 `mobee.reference.plant.Plant`:
@@ -16,12 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control.gains import Gains
-from mobee.control.modality import FRICTION, INERTIA
+from mobee.control.law import FRICTION, INERTIA
 from mobee.reference.forces import State, clause_force, config_force, contact_force, damping, limit_force, spring, work_force
 from mobee.reference.kinematics import weight_torque
 from mobee.robot.motor_units import fine_units
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 Term = Callable[[State], Array]  # a force, (n,) rad/s^2
 

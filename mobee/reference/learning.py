@@ -1,11 +1,11 @@
-"""What a curious agent learns and how it plans: Algorithms 6 and 7 and the start of Algorithm 8 (thesis 6.4, 6.5)."""
+"""The transition model and planning: Algorithms 6 and 7 and the start of Algorithm 8 (thesis 6.4, 6.5)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.divergence import kl_divergence
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
+from mobee.learning.transitions import kl_divergence
 
 Bins = dict[int, float]  # T(s, a): how often each state was the outcome, in order of first observation
 

@@ -1,4 +1,4 @@
-"""What stands between a command and a joint: delay, lag, friction, play, hard stops; and the noise of the encoders (docs/plant.md).
+"""The motors of a simulated robot: delay, lag, friction, play, hard stops, encoder noise (docs/plant.md).
 
 A motor has two sides, with play between them: the motor's own, and that of the joint, which the encoders read.
 """
@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.control.modality import FRICTION as VISCOUS
-from mobee.control.modality import INERTIA
+from mobee.arrays import Array
+from mobee.control.law import FRICTION as VISCOUS
+from mobee.control.law import INERTIA
 from mobee.robot.motor_units import fine_units
-from mobee.robot.robot import Array, Robot
-from mobee.simulation.parameters import MotorParameters
+from mobee.robot.robot import Robot
+from mobee.simulation.motors import MotorParameters
 
 SERVO = 8.0  # 1/s: velocity for a distance, in position mode and in a hold that has come to rest
 NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given

@@ -1,4 +1,4 @@
-"""Robot, motors, model and law in one process, tick by tick: what `mobee.OfflinePlant` does, with the law as a list of terms.
+"""A plant tick by tick: robot, motors, model and law in one process, with the law as a list of terms.
 
 A force of your own is tried here before it is compiled (see `law`): hundreds of times slower, the same numbers but for rounding.
 """
@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.reference import law, motors
 from mobee.reference.forces import State
-from mobee.robot.robot import Array
-from mobee.simulation.parameters import MotorParameters
+from mobee.simulation.motors import MotorParameters
 
 if TYPE_CHECKING:
-    from mobee.model import Model
+    from mobee.model.model import Model
 
 ROUNDING = 1e-9  # s: times are sums of ticks
 

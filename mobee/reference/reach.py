@@ -1,4 +1,4 @@
-"""The force that draws a marker to a target by the motors of one part, or of the whole body (thesis 5.1, 8.2).
+"""The force that draws a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
 Published law: J^T f with f as strong as the marker is far, bounded as a client's force, against the attractor's spring.
 
@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.control.gains import Gains
 from mobee.reach import ReachTarget
 from mobee.reference.forces import State, limit_force, squash, squash_together
 from mobee.reference.kinematics import joint_column, joints_to, link_frames, marker_at
 from mobee.robot.motor_units import limit_zones, motor_units
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Robot
 
 FORCE_GAIN = math.radians(5000.0)  # rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
 

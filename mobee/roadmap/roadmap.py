@@ -1,4 +1,4 @@
-"""A roadmap: poses that a task is made of, and the motions between them (thesis ch. 3)."""
+"""A roadmap: poses that satisfy a task, and the motions between them (thesis chapter 3)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, MobeeError
-from mobee.model import Model
-from mobee.real_array import real_array
-from mobee.roadmap.archive import read, write
-from mobee.roadmap.fingerprint import robot_digest, world_digest
-from mobee.roadmap.free_way import free_way
-from mobee.roadmap.graph import Graph, graph
+from mobee.model.model import Model
+from mobee.roadmap.archive import read, robot_digest, told_world, world_digest, world_told, write
+from mobee.roadmap.graph import Graph, free_way, graph
 from mobee.roadmap.ik.problem import chosen
-from mobee.roadmap.told_world import told_world, world_told
 from mobee.robot.load import load_robot, shipped_robots
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Robot
 
 NEAR = 1.5  # spacings: a goal further from all vertices is not of the map
 

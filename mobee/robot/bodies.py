@@ -1,4 +1,4 @@
-"""Masses of links: several on one link make one body."""
+"""Combines the masses of a link into one body."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mobee.robot.robot import Array, Body
+from mobee.arrays import Array
+from mobee.robot.robot import Body
 
 WATER = 1000.0  # kg/m^3
 ROUNDING = 1e-6  # of the largest moment of inertia

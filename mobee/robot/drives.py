@@ -1,4 +1,4 @@
-"""Which motor drives each joint, for formats that know one motor a joint."""
+"""Which motor drives each joint, for formats with one motor a joint."""
 
 from __future__ import annotations
 

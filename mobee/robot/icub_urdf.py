@@ -1,4 +1,4 @@
-"""Cuts the iCub's URDF of the icub-models package down to the upper body that the simulator and the viewer load."""
+"""Reduces the iCub's URDF of the icub-models package to the upper body that the simulator and the viewer load."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import defusedxml.ElementTree
 import numpy as np
 
 from mobee.errors import MobeeError
-from mobee.robot.number_text import numbers
+from mobee.robot.numbers import numbers
 
 MODEL = "iCubGazeboV2_5"
 LEGS = ("l_hip_pitch", "r_hip_pitch")

@@ -1,4 +1,4 @@
-"""Several robots in one model: one tree on one base, for instance a Katana beside the iCub (thesis figure 2.1)."""
+"""Joins several robots into one model, for instance a Katana beside the iCub (thesis figure 2.1)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.bodies import one_a_link
-from mobee.robot.joined_pairs import joined_pairs, joined_untested
-from mobee.robot.robot import Array, Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
+from mobee.robot.pairs import joined_pairs, joined_untested
+from mobee.robot.robot import Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
 
 SEPARATOR = "_"  # part names are chunks of keys on the bus: a-z, 0-9 and _ only
 

@@ -1,21 +1,18 @@
-"""Finds shipped robots and worlds by name, and reads any robot or world file by path."""
+"""Finds shipped robots by name, and reads any robot file by path."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from mobee.collision.world import World
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import CORNERS, Corners
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.urdf.shapes import Meshes
-from mobee.robot.xml_file import is_file
-from mobee.robot.xml_world import read_world
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.file import is_file
+from mobee.robot.xml.read import read_robot
 
 ROBOTS = Path(__file__).parent / "robots"
-WORLDS = Path(__file__).parent / "worlds"
 
 
 def load_robot(
@@ -49,16 +46,6 @@ def load_robot(
 def shipped_robots() -> tuple[str, ...]:
     """Names of the robots that come with this library, sorted."""
     return shipped(ROBOTS)
-
-
-def load_world(name_or_path: str | Path) -> World:
-    """A shipped world by name (see shipped_worlds), or the world of an .xml file; errors as load_robot."""
-    return read_world(find_file(name_or_path, WORLDS, "world"))
-
-
-def shipped_worlds() -> tuple[str, ...]:
-    """Names of the worlds that come with this library, sorted."""
-    return shipped(WORLDS)
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:

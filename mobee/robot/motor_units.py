@@ -1,4 +1,4 @@
-"""The unit of each motor in the control law, and the zones before its limits in which the law pushes inward.
+"""The unit of each motor in the control law, and its limit zones.
 
 The numbers of the law are angles.  A motor that slides has no angle, so its whole range counts as one, SLIDE_RANGE: an angle of 1 rad
 is then range / SLIDE_RANGE of its own unit, the metre of a URDF.  In this unit a slide of 4 cm and one of 2 m behave alike.
@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Array, Motor, Robot
+from mobee.robot.robot import Motor, Robot
 
 SLIDE_RANGE = np.deg2rad(200.0)  # rad: LIMIT_WIDTH is then 5 % of a slide's range
 LIMIT_WIDTH = np.deg2rad(10.0)  # rad: the limit zone of the shipped gains

@@ -1,4 +1,4 @@
-"""Which shapes of a robot are tested against each other.
+"""Which shapes of a robot, or of several on one base, are tested against each other.
 
 Solids and fields follow one rule; a pair is left out when
 - both shapes are on the same link, or their links are joined (below);
@@ -21,7 +21,8 @@ from itertools import combinations
 
 import numpy as np
 
-from mobee.robot.robot import Ints, Joint, LinkPair, Shape
+from mobee.arrays import Ints
+from mobee.robot.robot import Joint, LinkPair, Robot, Shape
 
 CLUSTER = 0.05  # m between the points of joints that count as one place
 NAMED = 4  # joints of a cluster that a reason lists
@@ -101,3 +102,31 @@ def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
 def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
     """All pairs, each with the reason of the first rule that leaves it out."""
     return {pair: reason for rule in reversed(rules) for pair, reason in rule.items()}
+
+
+def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
+    """Pairs of shapes of one role, shape (p, 2), sorted: each robot's own, and all of different robots unless both stand on the base.
+
+    `starts`: where the shapes of each robot begin.
+    """
+    pairs = [
+        (body.solid_pairs if role == "solid" else body.field_pairs).reshape(-1, 2) + start
+        for body, start in zip(bodies, starts, strict=False)
+    ]
+    chosen = [
+        np.array([k + start for k, shape in enumerate(body.shapes) if shape.role == role], dtype=np.intp)
+        for body, start in zip(bodies, starts, strict=False)
+    ]
+    link = np.array([shape.link for body in bodies for shape in body.shapes], dtype=np.intp)
+    for index, mine in enumerate(chosen):
+        theirs = np.concatenate([np.empty(0, dtype=np.intp), *chosen[index + 1 :]])
+        both = np.array(np.meshgrid(mine, theirs, indexing="ij"), dtype=np.intp).reshape(2, -1).T
+        pairs.append(both[link[both].any(axis=1)])
+    found = np.concatenate(pairs)
+    return found[np.lexsort(found.T[::-1])]
+
+
+def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
+    """Each robot's own reasons, but for its base, which has become everybody's, where that is tested now."""
+    tested = link_pairs(shapes, *pairs)
+    return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

@@ -1,4 +1,4 @@
-"""Which shapes are tested against each other in the program that was published in 2014, and in our recorded reading of it.
+"""Tested pairs as in the program published in 2014, and as in our recorded reading of it.
 
 Both rules work on the elements <link> and <joint> of a file, and find neighbours by descents of the tree: below every element, and
 below those beside it. Fields of neighbours are not tested against each other; their solids are not if both are of one part, or one
@@ -21,7 +21,8 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.robot.robot import Ints, LinkPair, Shape
+from mobee.arrays import Ints
+from mobee.robot.robot import LinkPair, Shape
 
 Rule = Literal["published_2014", "recorded_2014"]
 

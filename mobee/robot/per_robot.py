@@ -1,4 +1,4 @@
-"""What is computed of a robot once, and kept as long as the robot lives."""
+"""Caches what is computed once for a robot, as long as the robot lives."""
 
 from __future__ import annotations
 

@@ -8,12 +8,10 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mobee.arrays import Array, Ints
 from mobee.errors import UnknownName
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.intp]
 ShapeKind = Literal["sphere", "capsule", "cylinder", "box", "convex"]
 LinkPair = frozenset[int]
 

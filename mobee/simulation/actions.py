@@ -1,4 +1,4 @@
-"""The actions under way on an offline plant: which parts act, and how each ended, as the plant's ticks judge them."""
+"""Actions in progress on an offline plant: which motors are active, what is touched, how each action ended."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from mobee._core.plant import PART
 from mobee._core.tables import Table
+from mobee.arrays import Array, real_array
 from mobee.control.settle import VERDICTS
 from mobee.errors import InvalidValue
 from mobee.plant import Outcome
-from mobee.real_array import real_array
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 _FLOAT = np.dtype(np.float64)
 _SETTLED = VERDICTS.index("settled")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mobee.collision.world import World
+from mobee.model.world import World
 from mobee.robot.robot import Robot
 
 _UNFELT = ("where", "untested")  # of a robot: where it was read from, and why

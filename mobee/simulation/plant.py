@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mobee.collision.touch import links_moved, touched_in
+from mobee.arrays import Array
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate
-from mobee.control.modality import Modality
+from mobee.control.law import Modality
 from mobee.control.terms import Term
-from mobee.engine import engine_of
 from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.model.contact import links_moved, touched_in
+from mobee.model.model import engine_of
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
-from mobee.robot.robot import Array
 from mobee.simulation.actions import Actions
 from mobee.simulation.described import described
-from mobee.simulation.motors import Motors
-from mobee.simulation.parameters import MotorParameters
+from mobee.simulation.motors import MotorParameters, Motors
 from mobee.simulation.reaches import ReachesUnderWay
 from mobee.simulation.rigid import living, without_pairs
 from mobee.simulation.runner import Runner, Trace, Work, finished
 
 if TYPE_CHECKING:
-    from mobee.model import Model, Pose
+    from mobee.model.model import Model
+    from mobee.model.pose import Pose
 
 CHUNK = 1000  # ticks between two moments at which a run can be broken off
 

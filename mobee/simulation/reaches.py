@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mobee.collision.geometry import sphere
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
+from mobee.model.world_object import sphere
 from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachOutcome, ReachTarget
-from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.control import Controller
-    from mobee.model import Model
-    from mobee.pose import Pose
+    from mobee.model.model import Model
+    from mobee.model.pose import Pose
 
 
 @dataclass(slots=True, eq=False)

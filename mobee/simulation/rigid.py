@@ -13,10 +13,11 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics import link_transforms
+from mobee.model.kinematics import link_transforms
 from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Array, Ints, Joint, Motor, Robot
+from mobee.robot.robot import Joint, Motor, Robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:

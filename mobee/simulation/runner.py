@@ -1,4 +1,4 @@
-"""The ticks of one plant in the core, core/plant.cpp: hands it what it works on, and takes back what it leaves."""
+"""Runs the ticks of one plant in the core and records their trace."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mobee._core import address
 from mobee._core import plant as core
 from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
+from mobee.arrays import Array
 from mobee.control import Controller
-from mobee.engine import engine_of
-from mobee.engine.hands import Hand, Hands
-from mobee.engine.track import Neighbours
-from mobee.kinematics.gravity import gravity_torque
-from mobee.robot.robot import Array
+from mobee.model.hands import Hand, Hands
+from mobee.model.masses import gravity_torque
+from mobee.model.model import engine_of
+from mobee.model.track import Neighbours
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 

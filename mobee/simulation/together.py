@@ -1,4 +1,4 @@
-"""Many offline plants at once, in one call of the core or each in a process of its own; the results are those of one after the other."""
+"""Many offline plants: in one process through one call of the core, or in one process a core."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Build a map: poses that meet the costs of a task, spread over its task space, and joined to a graph."""
+"""Builds a roadmap: poses that satisfy a task's costs, spread over its task space and joined to a graph."""
 
 from __future__ import annotations
 

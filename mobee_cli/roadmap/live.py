@@ -1,4 +1,4 @@
-"""A way of a map on the robot that runs."""
+"""Moves the running robot along a path of a roadmap."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from bus_schema import keys
 from bus_schema.rpc import Config, Empty
 from bus_schema.rpc import World as WorldReply
 from mobee import Gains, Model, World
-from mobee.collision.geometry import Geometry
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
-from mobee.kinematics.quaternion import to_matrix
-from mobee.roadmap.fingerprint import robot_digest, world_digest
+from mobee.model.quaternion import to_matrix
+from mobee.model.world_object import Geometry
+from mobee.roadmap.archive import robot_digest, world_digest
 from mobee.roadmap.playback import PERIOD, Played, attractors, moving, timed, watched
 from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
 from mobee_cli.roadmap.play import require_free, tell

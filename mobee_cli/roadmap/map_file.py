@@ -1,4 +1,4 @@
-"""Maps on the command line: where they are read from, and what places of them are."""
+"""Roadmap files and places in them, on the command line."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from mobee import Model
+from mobee.arrays import Array
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
-from mobee.robot.robot import Array
 from mobee_cli.errors import BAD_INPUT, UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, world_given
 from services.common.worlds import NO_WORLD

@@ -1,4 +1,4 @@
-"""Move the robot to a place of a map, smoothly and under the control law: offline, or the one that runs."""
+"""Moves the robot to a place of a roadmap under the control law, offline or live."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way through a map to a place of its task: the poses, how long it takes, and whether anything is in the way."""
+"""Prints the path through a roadmap to a place: poses, duration, contacts."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue, MobeeError
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 from mobee_cli.errors import FAILED, UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
 from mobee_cli.roadmap.text import wrapped

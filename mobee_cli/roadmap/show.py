@@ -1,4 +1,4 @@
-"""Show a map: what is in it, and where its marker is in all of its poses, as a picture."""
+"""Prints what a roadmap contains, and draws its marker in all poses."""
 
 from __future__ import annotations
 

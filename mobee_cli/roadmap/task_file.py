@@ -1,4 +1,4 @@
-"""The task that a map is built for: one that comes with mobee, or a Python file of one's own."""
+"""Loads the task of a roadmap: a shipped one, or a Python file."""
 
 from __future__ import annotations
 

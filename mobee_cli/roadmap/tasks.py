@@ -1,4 +1,4 @@
-"""The tasks that come with mobee, by the thesis figures that show their maps."""
+"""Lists the shipped tasks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What there is to say of a map, 80 columns wide."""
+"""Formats a roadmap, 80 columns wide."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A tour of a map: a motion over its edges, from each of a few places that are far apart to the next."""
+"""A tour of a roadmap: a motion over its edges between places far apart."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from mobee.control.gains import Gains
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
-from services.monitor.sweep import RATE, Stretch
+from services.monitor.view import RATE, Stretch
 
 PLACES = 8
 

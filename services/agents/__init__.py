@@ -1,4 +1,4 @@
-"""A curious agent of one part as a process; torso, left arm and right arm are three of them.  With targets it learns to reach.
+"""The agent of one part as a process: explores by curiosity, or learns to reach if it has targets.
 
 Reads: clock, {part}/motion, {part}/reach.
 Writes: agents/{part}/{transition,learned}.

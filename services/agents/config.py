@@ -1,4 +1,4 @@
-"""What an agent is told."""
+"""Settings of an agent."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     run_dir: str = ""
     """Folder of the run, where its transitions are kept and found again; empty: they are not kept."""
     transitions: Annotated[int, Meta(ge=0)] = 0
-    """End after so many in all; 0: go on for ever."""
+    """End after so many in all; 0: go on indefinitely."""
     targets: tuple[tuple[float, float, float], ...] = ()
     """Places to learn to reach for, m, root frame; empty: it learns its space."""
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
@@ -71,7 +71,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     learned: str = ""
     """Folder of a run whose transitions it plans its ways to reaches with; empty: it believes that most actions work."""
     tries: Annotated[int, Meta(ge=0)] = 0
-    """End after so many problem-tries in all; 0: go on for ever."""
+    """End after so many problem-tries in all; 0: go on indefinitely."""
 
     def check_robot(self, robot: Robot) -> None:
         """As ServiceConfig: the part must span a state space, have a marker to reach with if there are targets, and what is named exist."""

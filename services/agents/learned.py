@@ -1,4 +1,4 @@
-"""What an agent knows and expects, for whoever watches."""
+"""Publishes what an agent has learned: rewards and values of its state-actions."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Learned, Surprise
 from mobee import TransitionModel
-from mobee.robot.robot import Array
-from services.common.bus import Bus
-from services.common.delivery import NEWEST
+from mobee.arrays import Array
+from services.common.bus import NEWEST, Bus
 
 PERIOD = 0.5  # s of the clock on the wall between two messages: in lockstep transitions come faster than anybody looks
 

@@ -1,4 +1,4 @@
-"""An agent at work: decide, act, observe, tell."""
+"""Runs a curious agent on the live plant."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
 from services.agents.learned import LearnedStream
-from services.agents.told import tell
-from services.agents.work import Work
+from services.agents.work import Work, tell
+from services.common.bus import EVENTS
 from services.common.bus_plant import BusPlant
-from services.common.delivery import EVENTS
 from services.common.service import Service
 
 

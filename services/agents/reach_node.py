@@ -1,4 +1,4 @@
-"""An agent that learns to reach, at work: choose the target least tried, go, reach, tell."""
+"""Runs an agent that learns to reach on the live plant: chooses the target least tried, plans, reaches, publishes."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from mobee import ReachTarget
-from mobee.learning.learned import load_learned
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
+from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
 from mobee.store import STORE
 from services.agents.config import Config

@@ -1,4 +1,4 @@
-"""What an agent that reaches does and knows, for whoever watches: as one that explores tells it, where that fits."""
+"""Publishes the tries of a reach agent, in the messages of a curious agent where they fit."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import ReachTarget, TransitionModel
+from mobee.arrays import Array
 from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Step
-from mobee.robot.robot import Array
 from services.agents.learned import LearnedStream
-from services.agents.told import tell
-from services.common.bus import Bus
-from services.common.delivery import EVENTS
+from services.agents.work import tell
+from services.common.bus import EVENTS, Bus
 
 
 class ReachStream:

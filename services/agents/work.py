@@ -1,13 +1,35 @@
-"""The life of an agent's process: act until it is enough, through every interruption."""
+"""The life of an agent's process: acts until done, through interruptions, and publishes transitions."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
+from bus_schema.messages import Transition as TransitionMessage
 from mobee import ActionInterrupted
+from mobee.learning.reaching.tries import Step
+from mobee.learning.space import Space
+from mobee.store import Transition
+from services.common.bus import Publisher
 from services.common.bus_plant import BusPlant
 from services.common.service import Service
+
+
+def tell(stream: Publisher[TransitionMessage], space: Space, n: int, made: Transition | Step, value: float) -> None:
+    """Put a transition, the n-th of its agent; `value`: V(s) of the plan that it was part of."""
+    stream.put(
+        agent=space.part,
+        n=n,
+        s=made.s,
+        a=made.a,
+        goal=int(space.goal(made.s, made.a)),
+        s_next=made.s_next,
+        reward=made.reward,
+        value=value,
+        settled=made.settled,
+        duration=made.duration,
+        touched=list(made.touched),
+    )
 
 
 class Work:

@@ -1,1 +1,1 @@
-"""What every service shares: session, delivery classes, Rate, life cycle, configuration, and the live Plant."""
+"""What all services share: session, delivery classes, rate, life cycle, configuration, and the live plant."""

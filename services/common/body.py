@@ -1,4 +1,4 @@
-"""The whole-body state, assembled from parts that report each in its own time (thesis 2.3.2)."""
+"""Assembles the state of the whole body from parts that report at their own times (thesis 2.3.2)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import State
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from services.common.bus import Bus
 
 

@@ -1,10 +1,11 @@
-"""Typed streams on a session: headers stamped on the way out, everything checked and counted on the way in."""
+"""Typed streams on a session: delivery classes, headers on the way out, checks and counts on the way in."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections import Counter
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import zenoh
@@ -13,7 +14,27 @@ from zenoh.handlers import Callback, RingChannel
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Event, Message
-from services.common.delivery import EVENTS, LATEST, Delivery
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """How a stream travels.  `history`: how many messages a late joiner gets; 0 = none."""
+
+    congestion: zenoh.CongestionControl
+    priority: zenoh.Priority
+    history: int = 0
+
+
+_DROP = zenoh.CongestionControl.DROP
+
+LATEST = Delivery(_DROP, zenoh.Priority.REAL_TIME)  # control: the newest value or nothing; never blocks the sender
+STEP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # control in lockstep: all, in order
+STOP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # emergency stop: rather late than never
+DATA = Delivery(_DROP, zenoh.Priority.DATA)  # perceived objects, ground truth
+BULK = Delivery(_DROP, zenoh.Priority.DATA_LOW)  # pictures: behind everything else
+EVENTS = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=100)  # what a person reads; late joiners get the last ones
+NEWEST = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=1)  # large and slow: late joiners get the last one
+
 
 _M = TypeVar("_M", bound=Message)
 NO_RUN = "-"  # before the first clock message

@@ -1,4 +1,4 @@
-"""Motions of several parts at once on the bus: their attractors are moved along together, by the robot's own clock."""
+"""Moves the attractors of several parts together along a path, by the robot's clock."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.chain import Tick
 from bus_schema.rpc import Goal
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.bus_plant import BusPlant
 from services.common.rpc import CallFailed
 from services.common.service import Service

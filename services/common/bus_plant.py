@@ -1,4 +1,4 @@
-"""The live twin of the offline plant: acts on a part through the controller on the bus."""
+"""The live plant: acts on a part through the controller on the bus."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Clock, Motion, Turn
 from bus_schema.rpc import Done, Goal, ReachFor, Request, Started, Take, Taken, WithEpoch
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.bus_reach import ReachClient
 from services.common.lockstep import Participant
 from services.common.rpc import CallFailed

@@ -1,4 +1,4 @@
-"""The reaching side of a plant on the bus: what is presented to the model, and how the controller says that reaches ended."""
+"""Reaches on the live plant: presents the target to the model, sends the reach to the controller, waits for its end."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Geometry, Motion, Reach
 from bus_schema.rpc import AddObject, Done, Empty, ObjectState, OneName, World
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
 from mobee.plant import Outcome
 from mobee.reach import TARGET, Aim, ReachOutcome, ReachTarget
-from mobee.robot.robot import Array
 from services.common.rpc import CallFailed
 from services.common.service import Service
 

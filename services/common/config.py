@@ -1,4 +1,4 @@
-"""One configuration style: a frozen struct is at once the file's schema, the flags and the help."""
+"""Configuration: a frozen struct is the schema of the file, the flags and the help."""
 
 from __future__ import annotations
 

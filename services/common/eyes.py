@@ -1,12 +1,13 @@
-"""Where the robot's eyes are and what they look at: shared by what draws their pictures and what reads them."""
+"""Camera poses of the robot's eyes, for the renderer and the locator."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.kinematics import link_transforms
-from mobee.robot.robot import Array, Robot
+from mobee.model.kinematics import link_transforms
+from mobee.robot.robot import Robot
 
 EYES = ("left_eye", "right_eye")
 SEEN_WITH = ("head", "torso")  # parts whose posture is sent with each picture

@@ -1,13 +1,14 @@
-"""Which marker a part reaches with: a palm where there are palms, else the end of its chain."""
+"""Chooses the marker with which a part reaches: its palm, else the end of its chain."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mobee.collision.touch import links_moved
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.kinematics import link_transforms
-from mobee.robot.robot import Array, Robot
+from mobee.model.contact import links_moved
+from mobee.model.kinematics import link_transforms
+from mobee.robot.robot import Robot
 
 PALMS = ("left_palm", "right_palm")
 AS_NEAR = 1e-3  # m, palms whose distances differ by less are as near

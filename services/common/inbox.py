@@ -1,4 +1,4 @@
-"""One inbox a process: Zenoh's threads only put, the main thread alone handles, or while it waits in `serve` one of them in its place."""
+"""One inbox for each process: Zenoh's threads put messages in, the main thread handles them."""
 
 from __future__ import annotations
 

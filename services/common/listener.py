@@ -1,4 +1,4 @@
-"""What reaches a service: streams and the ticks, handed to its main thread."""
+"""Subscriptions of a service, handled in its main thread."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from zenoh.handlers import Callback
 from bus_schema import keys
 from bus_schema.chain import Tick
 from bus_schema.messages import Clock, Message, Turn
-from services.common.bus import NO_RUN, Bus
-from services.common.delivery import LATEST, STEP
+from services.common.bus import LATEST, NO_RUN, STEP, Bus
 from services.common.inbox import CROWDED, Inbox, Newest
 
 _M = TypeVar("_M", bound=Message)
@@ -30,7 +29,7 @@ class Listener:
         """`locked`: in lockstep; `direct`: Zenoh's own thread puts into the inbox."""
         self.bus, self.inbox, self.locked, self._direct = bus, inbox, locked, direct
         self.keeps_step = False  # a Participant of lockstep says otherwise
-        self.dawdle: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
+        self.inject_test_delay: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
         bus.control = STEP if locked else LATEST
         self._kept: list[Any] = []  # tokens die with their handles
         self._on_run: list[Callable[[], None]] = []
@@ -107,7 +106,7 @@ class Listener:
             time = self.bus.receive(cls, sample, any_run=True)
             if time is None:
                 return
-            self.dawdle()
+            self.inject_test_delay()
             self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
             if time.run != self.bus.run:
                 known, self.bus.run = self.bus.run, time.run

@@ -1,4 +1,4 @@
-"""Lockstep: tick k + 1 begins when everybody who takes part has answered tick k (docs/bus.md).
+"""Lockstep: tick k + 1 begins when all participants have answered tick k (docs/bus.md).
 
 A participant keeps a `Participant` and says `done(k)` when all that it has to say to tick k is put; whoever owns the clock waits at a
 `Barrier`.  In free mode `done` says nothing.
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from bus_schema import keys
 from bus_schema.chain import Answer
 from bus_schema.messages import StepDone, Turn
-from services.common.delivery import STEP
+from services.common.bus import STEP
 from services.common.service import Service
 
 TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long at every tick and again before it answers
@@ -27,7 +27,7 @@ class Participant:
         self._locked = service.keeps_step = service.locked
         self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
         if self._locked:
-            service.dawdle = self.dawdle
+            service.inject_test_delay = self.inject_test_delay
             self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
 
     def done(
@@ -39,11 +39,11 @@ class Participant:
         """
         if not self._locked:
             return
-        self.dawdle()
+        self.inject_test_delay()
         if not told:
             self._done.put(re_k=k, ok=ok, busy=list(busy), last=last, including=list(including))
 
-    def dawdle(self) -> None:
+    def inject_test_delay(self) -> None:
         """Be late, in tests that ask for it: before every answer."""
         if self._delay:
             time.sleep(random.uniform(0.0, self._delay))  # not seeded: it stands for the scheduler

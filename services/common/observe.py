@@ -1,4 +1,4 @@
-"""Looking on from outside: who is there, what is said.  For tools, which take part in nothing."""
+"""Observes a running system from outside, for tools: services present, messages published."""
 
 from __future__ import annotations
 

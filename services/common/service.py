@@ -1,4 +1,4 @@
-"""The life of a service: session, calls, liveliness, and an end that is quick from every state; listener.py has its streams."""
+"""The life cycle of a service: session, calls, liveliness, and a quick end from every state."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from bus_schema import VERSION, keys
 from bus_schema.rpc import Config, Done, Empty, Reply, Request, Stat
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
-from services.common import log, rpc
-from services.common.answering import Answering
-from services.common.answering import CallRefused as CallRefused
+from services.common import entry as log
+from services.common import rpc
 from services.common.bus import Bus
 from services.common.config import ServiceConfig
 from services.common.entry import wait_until_released
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
+from services.common.rpc import Answering
+from services.common.rpc import CallRefused as CallRefused
 from services.common.session import LEASE, SHORT_WAY, open_client, spare_threads
 
 _Q = TypeVar("_Q", bound=Request)

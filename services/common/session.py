@@ -1,4 +1,4 @@
-"""One way to open a Zenoh session: client of the launcher's router, or that router."""
+"""Opens Zenoh sessions: client of the launcher's router, or that router."""
 
 from __future__ import annotations
 

@@ -1,11 +1,15 @@
-"""Which world stands around a robot when none is given: one rule for every service and command."""
+"""The default world of a robot, and the fingerprint by which processes agree on a robot."""
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
-from mobee.collision.world import World
-from mobee.robot.load import load_world
+import numpy as np
+
+from mobee.model.world import World
+from mobee.model.world_file import load_world
+from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 
 NO_WORLD = "none"  # the word for a world without objects
@@ -46,3 +50,13 @@ def world_around(given: str | None, robot: str | Path) -> World:
     """A new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
     name = effective_world(given, robot)
     return World() if name == NO_WORLD else load_world(name)
+
+
+def robot_hash(robot: Robot) -> str:
+    """Hash of names, tree and motors; the shapes do not matter to who drives it."""
+    digest = hashlib.sha256(repr((robot.name, robot.links, robot.motors)).encode())
+    for joint in robot.joints:
+        digest.update(repr((joint.name, joint.parent, joint.kind)).encode())
+        digest.update(np.concatenate([joint.axis, joint.point, joint.limits]).tobytes())
+    digest.update(np.array([(*m.limits, m.max_velocity, m.max_acceleration, m.max_torque) for m in robot.motor_table]).tobytes())
+    return digest.hexdigest()[:16]

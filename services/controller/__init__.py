@@ -1,4 +1,4 @@
-"""The MoBeE controller as a process: goals and forces in, motor commands out.
+"""The MoBeE controller as a process: reads goals and forces, publishes motor commands.
 
 Reads: tick, model/forces, model/targets, estop.
 Writes: commands, {part}/motion, {part}/reach, controller/forces.

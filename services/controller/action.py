@@ -1,4 +1,4 @@
-"""The action of one part: who owns the goal, what was asked, and where it stands."""
+"""The action of one part: owner, target, state."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from bus_schema.messages import MotionStatus
+from mobee.arrays import Array
 from mobee.control import Settle, SettleTest
-from mobee.robot.robot import Array
 
 
 @dataclass

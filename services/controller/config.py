@@ -1,4 +1,4 @@
-"""What the controller is told."""
+"""Settings of the controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ownership of the motors: every part is taken and armed by the controller, and again after each hold."""
+"""Takes and arms the drives of all parts, and again after each hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What agents may ask: own a part's goal, set it, force the part, reach with it."""
+"""Answers the calls of agents: take a part's goal, set it, apply a force, reach."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, ReachFor, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee import Controller
-from mobee.collision.touch import links_moved
+from mobee.arrays import Array
 from mobee.control.checked import LARGEST_FORCE
 from mobee.errors import InvalidValue, MobeeError
-from mobee.robot.robot import Array, Robot
+from mobee.model.contact import links_moved
+from mobee.robot.robot import Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
 from services.controller.reaches import ReachesUnderWay

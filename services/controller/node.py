@@ -1,4 +1,4 @@
-"""The controller at work: once a tick, from the parts' states and the model's forces to the commands."""
+"""Runs the controller: once a tick, from the parts' states and the model's forces to the commands."""
 
 from __future__ import annotations
 
@@ -14,25 +14,24 @@ from bus_schema.messages import EStop, Mode, Targets
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
+from mobee.arrays import Array
 from mobee.control import Command, Forces
 from mobee.control.checked import LARGEST_FORCE
 from mobee.control.forces import needs_contacts, told_terms
 from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units
-from mobee.robot.robot import Array, Robot
-from services.common.delivery import LATEST
-from services.common.fingerprint import robot_hash
+from mobee.robot.robot import Robot
+from services.common.bus import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS, Timer
 from services.common.rpc import CallFailed
 from services.common.service import Service
+from services.common.worlds import robot_hash
 from services.controller.action import Action
-from services.controller.commanding import Commanding
+from services.controller.commanding import Commanding, Counters, Telling
 from services.controller.config import Config
-from services.controller.counters import Counters
 from services.controller.drives import Drives
 from services.controller.goals import GoalDesk
 from services.controller.reaches import ReachesUnderWay
-from services.controller.telling import Telling
 from services.controller.terms import ToldContacts, load_terms
 from services.controller.warm import warm
 

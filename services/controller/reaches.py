@@ -1,4 +1,4 @@
-"""The reaches under way: a marker of a part is forced to a target, then let go (thesis 8.2)."""
+"""Reaches in progress: a marker is drawn to a target, then released (thesis 8.2)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from bus_schema.messages import Reach as ReachMessage
 from bus_schema.messages import ReachPhase, Targets
 from bus_schema.rpc import ReachFor
 from mobee import Controller
-from mobee.engine.hands import MOST
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
+from mobee.model.hands import MOST
 from mobee.reach import ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.bus import Bus
 from services.controller.action import Action
 

@@ -1,4 +1,4 @@
-"""Forces of the law from outside: imported by name, and given the contacts that the model tells."""
+"""Imports user-defined forces of the law, and gives them the contacts that the model publishes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from bus_schema.messages import ContactItem
-from mobee.collision.contact import KINDS, ContactTable
-from mobee.collision.snapshot import Snapshot
+from mobee.arrays import Array
 from mobee.control.terms import Term, valid_terms
-from mobee.engine.hands import Hands
 from mobee.errors import InvalidValue
-from mobee.pose import Pose
-from mobee.robot.robot import Array
+from mobee.model.contact import KINDS, ContactTable
+from mobee.model.hands import Hands
+from mobee.model.pose import Pose
+from mobee.model.snapshot import Snapshot
 
 
 def load_terms(names: Sequence[str]) -> tuple[Term, ...]:

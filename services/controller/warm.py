@@ -1,4 +1,4 @@
-"""What the first reach would have to wait for is done before the robot moves."""
+"""Runs every code path of a reach once at start-up, so that the first real reach is not late."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from bus_schema import VERSION, decode, encode, encoding_of
 from bus_schema.rpc import ReachFor
 from mobee import Controller
-from mobee.collision.touch import links_moved
 from mobee.control import Forces
 from mobee.errors import InvalidValue
+from mobee.model.contact import links_moved
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Robot
 

@@ -1,4 +1,4 @@
-"""Who the services are: which program, after whom it starts, what it cannot do without."""
+"""The services: their programs, start order and dependencies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must be right before anything is started: installed packages, free ports, robot and world files."""
+"""Checks before the start: installed packages, free ports, robot and world files."""
 
 from __future__ import annotations
 
@@ -116,7 +116,8 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
 
     Raises ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored.
     """
-    from mobee.robot.load import load_robot, load_world
+    from mobee.model.world_file import load_world
+    from mobee.robot.load import load_robot
 
     read_robot, read_world = cache(load_robot), cache(load_world)
     robots: dict[str, Robot] = {}

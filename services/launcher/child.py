@@ -1,4 +1,4 @@
-"""One service as a process of its own: started, watched, ended."""
+"""A service as a child process: starts it, watches it, ends it."""
 
 from __future__ import annotations
 

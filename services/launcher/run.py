@@ -1,4 +1,4 @@
-"""One run of a scenario: router, services, supervision, stop, summary."""
+"""Runs a scenario: router, services, supervision, stop, summary."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from types import FrameType
 from bus_schema import keys
 from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
-from services.common import log
+from services.common import entry as log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service

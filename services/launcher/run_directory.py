@@ -1,4 +1,4 @@
-"""The folder of a run: what was run, with what, and what came of it."""
+"""The folder of a run: scenario, settings, versions, logs, results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scenario: which services run, with which settings.  A file of TOML, read whole and checked before anything starts."""
+"""Reads a scenario from TOML: which services run with which settings; checks all of it before anything starts."""
 
 from __future__ import annotations
 

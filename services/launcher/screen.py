@@ -1,4 +1,4 @@
-"""What a person sees while the system runs: one screen in a terminal, lines of news in a pipe."""
+"""Shows the state of the system: one screen in a terminal, lines in a pipe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run amounts to: the numbers of its services since all were ready, for scripts and for people."""
+"""Summarises a run: the numbers of its services since all were ready, as JSON and as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keeps the services running: starts them in order, restarts what failed, gives up what fails again and again."""
+"""Starts services in order, restarts failed ones, and gives up those that fail repeatedly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Stat
-from services.common.delivery import STOP
+from services.common.bus import STOP
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.launcher.child import Child, Program

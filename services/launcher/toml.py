@@ -1,4 +1,4 @@
-"""Settings as TOML text: what the standard library reads but does not write."""
+"""Writes settings as TOML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The egocentric model as a process: whole-body state in, constraint forces out.
+"""The egocentric model as a process: reads the state of the whole body, publishes constraint forces.
 
 Reads: tick, world/*, {part}/reach.
 Writes: model/forces, model/targets, model/pose, model/contacts.

@@ -1,4 +1,4 @@
-"""What the model is told."""
+"""Settings of the model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The model at work: once a tick, from the newest state of every part to the forces that constrain them."""
+"""Runs the model: once a tick, from the newest state of every part to the forces that constrain them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from bus_schema.chain import Tick
 from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model
-from mobee.collision.contact import KINDS, Contact
-from mobee.collision.touch import touched
+from mobee.arrays import Array
 from mobee.control import constraint_forces
 from mobee.control.forces import needs_contacts, told_terms
-from mobee.engine.hands import MOST
 from mobee.errors import MobeeError
-from mobee.kinematics.quaternion import from_matrix
-from mobee.model import Pose as ModelPose
-from mobee.robot.robot import Array, Robot
-from services.common.delivery import LATEST
-from services.common.figures import Percentiles
+from mobee.model.contact import KINDS, Contact, touched
+from mobee.model.hands import MOST
+from mobee.model.pose import Pose as ModelPose
+from mobee.model.quaternion import from_matrix
+from mobee.robot.robot import Robot
+from services.common.bus import LATEST
 from services.common.lockstep import Participant
+from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
 from services.common.worlds import TABLE
 from services.model.config import Config

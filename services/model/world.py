@@ -1,4 +1,4 @@
-"""Edits of the model's world: by call, and by what is perceived."""
+"""Edits the model's world, by calls and by messages of the locator."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from bus_schema.messages import Geometry, WorldObject
 from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, ObjectState, OneName, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee import Model, World
-from mobee.collision import WorldObject as Thing
-from mobee.collision import geometry
-from mobee.collision.world import placed
-from mobee.collision.world_object import valid_position, valid_shape
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
-from mobee.kinematics.quaternion import from_matrix, to_matrix
+from mobee.model import WorldObject as Thing
+from mobee.model import world_object as geometry
+from mobee.model.quaternion import from_matrix, to_matrix
+from mobee.model.world import placed
+from mobee.model.world_object import valid_position, valid_shape
 from mobee.reach import TARGET
-from mobee.robot.robot import Array
 from services.common.service import CallRefused, Service
 
 DONE = Done(v=VERSION)

@@ -1,4 +1,4 @@
-"""What a person sees: a page served on loopback and a recording, made of what passes on the bus.
+"""The monitor: a page on loopback and a recording, made from what is published on the bus.
 
 Reads: clock, {part}/state, {part}/motion, model/forces, controller/forces, model/contacts, world/*, vision/image/{left,right},
 agents/*/{transition,learned}, event/*, alive/*/*; asks model/rpc/world/list.

@@ -1,4 +1,4 @@
-"""What the monitor is told."""
+"""Settings of the monitor."""
 
 from __future__ import annotations
 

@@ -1,19 +1,60 @@
-"""A robot drawn from its file, without meshes: what moves is one transform a link, all else is logged once."""
+"""Draws a robot from its file without meshes: shapes are logged once, then one transform a link."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
-from mobee.collision.contact import Contact
-from mobee.collision.world import World
-from mobee.kinematics import link_transforms
-from mobee.kinematics.quaternion import from_matrix
-from mobee.model import Model
-from mobee.robot.robot import Array, Robot, Shape
+from mobee.arrays import Array
+from mobee.model.contact import Contact
+from mobee.model.kinematics import link_transforms
+from mobee.model.model import Model
+from mobee.model.quaternion import from_matrix
+from mobee.model.world import World
+from mobee.robot.robot import Robot, Shape, ShapeKind
+from mobee.robot.urdf.hull import facets
 from services.monitor import palette
 from services.monitor.palette import Rgba
-from services.monitor.volumes import drawn, recolored
+
+
+def drawn(
+    kind: ShapeKind, size: tuple[float, ...], position: Array, rotation: Array, color: Rgba, vertices: Array | None = None
+) -> rr.AsComponents:
+    """The volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
+    w, x, y, z = from_matrix(rotation)
+    common = {"quaternions": [rr.Quaternion(xyzw=[x, y, z, w])], "colors": [color], "fill_mode": "solid"}
+    if kind == "convex":
+        return _mesh(position + (np.empty((0, 3)) if vertices is None else vertices) @ rotation.T, color)
+    if kind == "box":
+        return rr.Boxes3D(sizes=[size], centers=[position], **common)
+    if kind == "sphere":
+        return rr.Ellipsoids3D(radii=[size[0]], centers=[position], **common)
+    if kind == "capsule":  # drawn from one end
+        start = position - rotation[:, 2] * size[1] / 2.0
+        return rr.Capsules3D(radii=[size[0]], lengths=[size[1]], translations=[start], **common)
+    return rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[position], **common)
+
+
+def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
+    """What changes the colour of a volume that is drawn already."""
+    if kind == "convex":
+        return rr.Mesh3D.from_fields(albedo_factor=color)
+    archetypes = {"box": rr.Boxes3D, "sphere": rr.Ellipsoids3D, "capsule": rr.Capsules3D, "cylinder": rr.Cylinders3D}
+    return archetypes[kind].from_fields(colors=[color])
+
+
+def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
+    """The hull of points (v, 3) with flat faces: every triangle has corners of its own."""
+    corners = facets(points)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3),
+        triangle_indices=np.arange(3 * len(corners)).reshape(-1, 3),
+        vertex_normals=np.repeat(normals, 3, axis=0),
+        albedo_factor=color,
+    )
+
 
 TIMELINE = "time"
 NORMAL = 0.05  # m, the arrow of a marker
@@ -109,7 +150,7 @@ class Figure:
         return ["robot", self._robot.links[shape.link], f"{shape.role}s", shape.name]
 
     def _log(self, path: list[object], what: rr.AsComponents) -> None:
-        """Once and for ever, but for colours: those are said again, at the beginning."""
+        """Once and indefinitely, but for colours: those are said again, at the beginning."""
         self._stream.set_time(TIMELINE, duration=0.0)
         self._stream.log(path, what)
 

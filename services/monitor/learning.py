@@ -1,4 +1,4 @@
-"""What the agents know: the state space with its surprising actions, and rewards, values and tries of all state-actions."""
+"""Shows what agents learn: the state space with its uncertain actions; rewards, values and tries."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 import rerun as rr
 
 from bus_schema.messages import Learned, Transition
+from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.learning.flat import flat
-from mobee.learning.recorded import space_from
+from mobee.learning.record import space_from
 from mobee.learning.space import Space
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Robot
 from services.monitor import palette
 
 SOUND = (92, 98, 110, 110)  # an action that has always reached its goal

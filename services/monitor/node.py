@@ -1,4 +1,4 @@
-"""The monitor at work: the newest of every stream, twenty times a second, to a page and a file."""
+"""Runs the monitor: the newest message of every stream, twenty times a second, to a page and a file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Ima
 from bus_schema.rpc import World
 from mobee.robot.robot import Robot
 from services.common.body import Body
-from services.common.figures import Percentiles
-from services.common.rate import Rate
+from services.common.rate import Percentiles, Rate
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.monitor.blueprint import TIMELINE

@@ -1,4 +1,4 @@
-"""Where the pictures go: a page on loopback, a recording, or both."""
+"""Outputs of the monitor: a page on loopback, a recording, or both."""
 
 from __future__ import annotations
 

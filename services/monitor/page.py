@@ -1,4 +1,4 @@
-"""The page's server: `python -m services.monitor.page`, which becomes Rerun's own program.
+"""Serves the page, `python -m services.monitor.page`: becomes Rerun's own program.
 
 Rerun's Python calls listen on every interface; its program can be told to listen on loopback only.
 """

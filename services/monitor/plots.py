@@ -1,4 +1,4 @@
-"""The plots: state and goal of the joints the agents use, forces by kind, and what the agents learn."""
+"""The plots: joint positions and goals, forces by term, rewards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The poses in which actions ended, one over the other: where the robot likes to be is where they are densest (paper fig. 8)."""
+"""Draws the poses in which actions ended, over each other (paper fig. 8)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections import deque
 import numpy as np
 import rerun as rr
 
-from mobee.kinematics import link_transforms
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms
+from mobee.robot.robot import Robot
 from services.monitor import palette
 from services.monitor.blueprint import ROOT
 

@@ -1,4 +1,4 @@
-"""MoBeE 1.0: a process between any client and robot_sim that undoes motions which lead into contact (thesis chapter 4).
+"""MoBeE 1.0: a process between a client and robot_sim that retraces motions which lead into contact (thesis chapter 4).
 
 Two sessions.  As a client of the robot it reads: clock, {part}/state, estop; writes: {part}/cmd, event/port_filter; calls:
 {part}/rpc/drive/{take,arm,release,hold}, {part}/meta, estop/rpc/reset.  In its clients' namespace it is the robot: it

@@ -1,4 +1,4 @@
-"""The commands of one part on their way to robot_sim: the client's, passed on, or the reflex's own."""
+"""Commands of one part to robot_sim: forwarded from the client, or from the reflex."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the port filter is told."""
+"""Settings of the port filter."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from mobee.control.reflex_settings import ReflexSettings
+from mobee.control.reflex import ReflexSettings
 from services.common.worlds import WorldConfig
 
 _SETTINGS = ReflexSettings()

@@ -1,4 +1,4 @@
-"""Ownership of the drives: the filter owns them at robot_sim, and a client owns them at the filter."""
+"""Owns the drives at robot_sim, and lends them to a client of the filter."""
 
 from __future__ import annotations
 

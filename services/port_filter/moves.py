@@ -1,4 +1,4 @@
-"""When a client begins a motion: a stream of position commands has no other sign of it than that the reference leaves a rest."""
+"""Detects when a client begins a motion: its reference leaves rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The port filter's tick: states through, judgement, tick through, and the reflex's commands when the clients are cut off."""
+"""Runs the port filter: forwards states, judges the pose, forwards commands or runs the reflex."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from bus_schema import VERSION, keys
 from bus_schema.chain import Tick
 from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from services.common.lockstep import Barrier, Participant
 from services.common.service import CallRefused, Service
 from services.port_filter.config import Config

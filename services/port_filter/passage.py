@@ -1,4 +1,4 @@
-"""What passes through the filter: states to the clients, and their commands to the robot unless they are cut off."""
+"""Forwards states to the clients, and their commands to the robot unless the reflex is active."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.chain import Answer, Commands, PartStatus, Tick
 from bus_schema.messages import Command, State
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from services.common.service import Service
 from services.port_filter.commands import Stream
 from services.port_filter.moves import Moves

@@ -1,13 +1,13 @@
-"""The switch between the clients and the reflex (thesis figure 4.1): judges each tick, and says who commands."""
+"""The switch between clients and reflex (thesis figure 4.1)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mobee import Model
-from mobee.control.reflex import Reflex
-from mobee.control.violation import KINDS, Violation, Watch
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.control.reflex import KINDS, Reflex, Violation, Watch
+from mobee.robot.robot import Robot
 from services.port_filter.config import Config
 
 

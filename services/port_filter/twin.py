@@ -1,4 +1,4 @@
-"""What the filter only hands through: what parts are made of, the emergency stop, who is there."""
+"""Forwards calls that need no judgement: metadata, emergency stop, liveliness."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty, PartMeta
 from mobee.robot.robot import Robot
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.rpc import CallFailed
 from services.common.service import CallRefused, Service

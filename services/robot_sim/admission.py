@@ -1,16 +1,85 @@
-"""What an order must be to reach a part's motors, whoever gives it."""
+"""Which orders are admitted to a part's motors, their limits, and how refusals are answered."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from bus_schema import Refused
-from mobee.robot.robot import Array
-from services.robot_sim.limits import Limits
-from services.robot_sim.order import Order
+from bus_schema.chain import Commands
+from bus_schema.messages import Command, Mode
+from mobee.arrays import Array
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Robot
+from services.common.service import CallRefused
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Per motor of a part, each (n,)."""
+
+    lower: Array  # rad
+    upper: Array  # rad
+    velocity: Array  # rad/s
+    acceleration: Array  # rad/s^2
+    torque: Array  # N m
+    fine: Array  # what 1 rad of a threshold is in the unit of the motor, see mobee.robot.motor_units
+
+    @classmethod
+    def of(cls, robot: Robot, part: str) -> Limits:
+        """As the robot file says."""
+        motors = robot.motor_table[robot.part(part).slice]
+        return cls(
+            lower=np.array([m.limits[0] for m in motors]),
+            upper=np.array([m.limits[1] for m in motors]),
+            velocity=np.array([m.max_velocity for m in motors]),
+            acceleration=np.array([m.max_acceleration for m in motors]),
+            torque=np.array([m.max_torque for m in motors]),
+            fine=fine_units(robot)[robot.part(part).slice],
+        )
+
+
+class Order(Struct, frozen=True, eq=False):
+    """See `Command`; `reference` (n,) rad, rad/s or N m by mode."""
+
+    src: str
+    epoch: int
+    seq: int
+    re_k: int
+    mode: Mode
+    reference: Array
+    ttl: int  # ms
+
+    @classmethod
+    def of(cls, command: Command) -> Order:
+        """That of a command to one part."""
+        return cls(command.src, command.epoch, command.seq, command.re_k, command.mode, np.array(command.ref), command.ttl)
+
+
+def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
+    """Those of a message to several parts, by part; raises KeyError for one that the robot does not have."""
+    reference = np.array(commands.ref)
+    src, seq, re_k, ttl = commands.src, commands.seq, commands.re_k, commands.ttl
+    return {
+        part: Order(src, order.epoch, seq, re_k, order.mode, reference[robot.parts[part].slice], ttl)
+        for part, order in commands.parts.items()
+    }
+
+
+@contextmanager
+def refused_as_call() -> Iterator[None]:
+    """Let the caller know."""
+    try:
+        yield
+    except Refused as refused:
+        raise CallRefused(refused.reason, str(refused)) from None
+
 
 MAX_AGE = 0.1  # s between the tick an order answers and the tick it arrives in, in free mode
 MAX_TTL = 1000  # ms
@@ -43,7 +112,7 @@ class Admission:
         if order.re_k > k:
             raise Refused("future", f"{self._part}: answers tick {order.re_k}, it is {k}")
         self._check_age(k - order.re_k)
-        if not 0 < order.ttl <= MAX_TTL:  # 0 must not mean "for ever"
+        if not 0 < order.ttl <= MAX_TTL:  # 0 must not mean "indefinitely"
             raise Refused("ttl", f"{self._part}: ttl {order.ttl} ms, valid: 1 to {MAX_TTL}")
 
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:

@@ -1,4 +1,4 @@
-"""Physics: the motor model asks for velocities or torques, PyBullet's joints follow as far as weight and contacts let them."""
+"""The physics back-end: PyBullet's joints follow the velocities or torques of the motor model."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pybullet
 
-from mobee.collision.world import World
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model.world import World
+from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
-from services.robot_sim.backend import SolidContact
-from services.robot_sim.bullet_scene import BulletScene
+from services.robot_sim.bullet_scene import BulletScene, load_solid_pairs
 from services.robot_sim.bullet_torque import Gears, Mask, Share
-from services.robot_sim.pairs import load_solid_pairs
+from services.robot_sim.kinematic import SolidContact
 
 TOUCHING = ("forearm", "hand")  # links whose distance from the table is measured
 FAR = 2.0  # m, beyond it a gap is not searched

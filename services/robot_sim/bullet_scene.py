@@ -1,4 +1,4 @@
-"""The iCub, table and ball in PyBullet; bullet.py moves them."""
+"""The iCub, table and ball in PyBullet, and which pairs of links count as solid contact."""
 
 from __future__ import annotations
 
@@ -6,17 +6,48 @@ import tempfile
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pybullet
+from msgspec import Struct
 from pybullet_utils.bullet_client import BulletClient
 
-from mobee.collision.world import World, WorldObject
-from mobee.kinematics.gravity import gravity_torque
-from mobee.kinematics.quaternion import from_matrix
+from mobee.arrays import Array
+from mobee.model.masses import gravity_torque
+from mobee.model.quaternion import from_matrix
+from mobee.model.world import World, WorldObject
 from mobee.robot.icub_urdf import write_upper_body_urdf
-from mobee.robot.robot import Array, Robot
-from services.robot_sim.backend import require_simulated
+from mobee.robot.robot import Robot
 from services.robot_sim.bullet_torque import Motion
+from services.robot_sim.kinematic import require_simulated
+
+SOLID_PAIRS = Path(__file__).with_name("solid_pairs.json")
+TABLE = "table"  # in the list it stands for every obstacle of the world
+
+
+class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
+    """The list, and how it came about."""
+
+    model: str  # of icub-models
+    distance: float  # m, at which hulls count as apart
+    poses: int  # random legal ones, in all of which the hulls of a pair were apart
+    seed: int
+    always: list[list[str]]  # listed whatever the poses say: hands and forearms against torso, head, other arm, table
+    apart: list[list[str]]  # the others
+
+    def links(self) -> set[frozenset[str]]:
+        """Pairs of two links of the robot."""
+        return {frozenset(pair) for pair in self.always + self.apart if TABLE not in pair}
+
+    def against_table(self) -> list[str]:
+        """Links that are listed with the table, sorted."""
+        return sorted(first if second == TABLE else second for first, second in self.always + self.apart if TABLE in (first, second))
+
+
+def load_solid_pairs() -> SolidPairs:
+    """The committed list."""
+    return msgspec.json.decode(SOLID_PAIRS.read_bytes(), type=SolidPairs)
+
 
 GRAVITY = -9.81  # m/s^2
 BASE = -1  # PyBullet's index of the base link

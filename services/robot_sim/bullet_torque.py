@@ -1,4 +1,4 @@
-"""Torques that reach PyBullet's joints through gears: reflected inertia and friction, which PyBullet's joints lack."""
+"""Applies torques to PyBullet's joints through gears: reflected inertia and friction."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.control.modality import FRICTION, INERTIA
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.control.law import FRICTION, INERTIA
 
 Mask = NDArray[np.bool_]
 

@@ -1,4 +1,4 @@
-"""What robot_sim is told."""
+"""Settings of robot_sim."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from msgspec import Meta
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
 from services.common.worlds import WorldConfig
-from services.robot_sim.backend import require_simulated
+from services.robot_sim.kinematic import require_simulated
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
@@ -45,9 +45,9 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     participants: tuple[str, ...] = ()
     """Lockstep: who must be there before tick 1; the launcher names every service that computes what the robot does."""
     ticks: Annotated[int, Meta(ge=0)] = 0
-    """Lockstep: stop after so many ticks; 0: go on for ever."""
+    """Lockstep: stop after so many ticks; 0: go on indefinitely."""
     record: str = ""
-    """Folder to which every tick is written as it was, for experiments (services.robot_sim.record); empty: none."""
+    """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
         """As ServiceConfig: PyBullet moves the iCub only, and only some robots' motors were identified."""

@@ -1,18 +1,45 @@
-"""The safety gate of one part, the last thing before its motors; pure logic, time is given."""
+"""The safety gate of one part, the last check before its motors, and the shaping of references. Pure logic, time is given."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from msgspec import Struct
 
 from bus_schema import Refused
 from bus_schema.messages import GateState, Mode
-from mobee.robot.robot import Array
-from services.robot_sim.admission import Admission
-from services.robot_sim.limits import Limits
-from services.robot_sim.order import Order
-from services.robot_sim.shaper import Shaper
+from mobee.arrays import Array
+from mobee.simulation.motors import SERVO_GAIN, Braking
+from services.robot_sim.admission import Admission, Limits, Order
+
+
+class Shaper:
+    """Turns commanded references into allowed ones, tick by tick; arrays (n,)."""
+
+    def __init__(self, limits: Limits, dt: float) -> None:
+        self._limits = limits
+        self._asked = Braking(limits.lower, limits.upper, limits.velocity, limits.acceleration * dt, dt)
+
+    def start(self, q: Array, velocity: Array) -> None:
+        """Begin where the motors are, rad, as fast as they are, rad/s."""
+        self._asked.velocity[:] = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
+        self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # so far is the reference ahead of a servo at that speed
+
+    def to_velocity(self, wanted: Array, q: Array) -> Array:
+        """The velocity to ask for now; before a position limit no more than can still be braked."""
+        self._asked.to_velocity(wanted, q)
+        return self._asked.velocity.copy()
+
+    def to_position(self, wanted: Array) -> Array:
+        """The position to ask for now, on the way to `wanted` and arriving there at rest."""
+        self._asked.to_position(wanted)
+        return self._asked.position.copy()
+
+    def runs_out(self, q: Array, velocity: Array) -> bool:
+        """Whether some motor is a tick of braking too fast, rad/s, to stop before its position limit."""
+        return self._asked.runs_out(q, velocity)
+
 
 LOCKED_TTL = 3  # ticks after which a part holds in lockstep, where the clock on the wall means nothing
 

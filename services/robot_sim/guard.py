@@ -9,15 +9,14 @@ from bus_schema import VERSION, Refused, keys
 from bus_schema.chain import Answer, Commands
 from bus_schema.messages import Command, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
-from mobee.robot.robot import Array, Robot
-from services.common.delivery import LATEST
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from services.common.bus import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
-from services.robot_sim.backend import Backend
+from services.robot_sim.admission import Limits, Order, orders_of, refused_as_call
 from services.robot_sim.gate import LOCKED_TTL, Gate
-from services.robot_sim.limits import Limits
-from services.robot_sim.order import Order, orders_of
-from services.robot_sim.refuse import refused_as_call
+from services.robot_sim.kinematic import Backend
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
 ESTOP_PERIOD = 0.1  # s

@@ -1,14 +1,79 @@
-"""The motor model alone: no contacts, every Python version; weight acts on motors in torque mode only."""
+"""The back-end interface, and the kinematic back-end: motors without physics."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
 
-from mobee.collision.world import World
-from mobee.kinematics.gravity import gravity_torque
+from mobee.errors import InvalidValue
+from mobee.model.masses import gravity_torque
+from mobee.model.world import World
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
-from services.robot_sim.backend import SolidContact
+
+SIMULATED = "icub"  # the robot that PyBullet's URDF describes
+
+
+class BackendUnavailable(InvalidValue):
+    """A back-end that cannot run here, and what to do instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class SolidContact:
+    """The deepest solid contact of a listed pair; depth 0 when there is none."""
+
+    depth: float = 0.0  # m
+    pair: str = ""
+
+
+def require_simulated(robot: Robot) -> None:
+    """Raise BackendUnavailable for a robot that PyBullet cannot move."""
+    if robot.name != SIMULATED:
+        raise BackendUnavailable(
+            f'backend = "pybullet" cannot move {robot.name!r}: the physics simulates the links and motors of the {SIMULATED} only. '
+            'Set backend = "kinematic": the motor model alone, which moves every robot.'
+        )
+
+
+class Backend(Protocol):
+    """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
+
+    pairs_watched: int
+
+    @property
+    def motors(self) -> Motors:
+        """Where they are now, and how fast."""
+        ...
+
+    @property
+    def world(self) -> World:
+        """What is around the robot now."""
+        ...
+
+    def step(self, dt: float) -> None:
+        """Advance by a tick of dt [s]."""
+        ...
+
+    def reset(self, seed: int) -> None:
+        """Back home, at rest, in hold, the world as it was."""
+        ...
+
+    def place(self, name: str, position: tuple[float, float, float]) -> None:
+        """Put a world object somewhere, m; raises MobeeError."""
+        ...
+
+    def contact(self) -> SolidContact:
+        """The deepest solid contact of the last tick."""
+        ...
+
+    def contacts(self) -> Mapping[str, float]:
+        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        ...
+
+    def gap(self) -> float:
+        """Closest distance of hands and forearms to the table, m; -1 when it is not measured."""
+        ...
 
 
 class KinematicBackend:

@@ -1,4 +1,4 @@
-"""robot_sim's side of lockstep: it owns the ticks, gathers who takes part, waits for them, and says whether the run can be repeated."""
+"""Lockstep in robot_sim: owns the ticks, collects participants, waits for them, records whether the run is reproducible."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Lockstep:
         self._began = time.monotonic()
         return not self._barrier.absent()
 
-    def overture(self) -> str:
+    def startup_status(self) -> str:
         """What tick 0 waits for, in words."""
         absent = self._barrier.absent()
         return f"waits for {', '.join(absent)}" if absent else "about to begin"
@@ -55,7 +55,7 @@ class Lockstep:
         """Whether the run has made its ticks."""
         return self._service.bus.k == self._last_tick > 0
 
-    def limps(self) -> bool:
+    def is_degraded(self) -> bool:
         """Whether it goes on without somebody who should be there."""
         return bool(self._barrier.absent())
 

@@ -1,4 +1,4 @@
-"""Makes the back-end that the configuration names."""
+"""Makes the back-end named in the configuration."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from pathlib import Path
 
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.backend import Backend, BackendUnavailable
 from services.robot_sim.config import Config
-from services.robot_sim.kinematic import KinematicBackend
-from services.robot_sim.record import Recorded
+from services.robot_sim.kinematic import Backend, BackendUnavailable, KinematicBackend
+from services.robot_sim.watch import Recorded
 
 
 def make_backend(config: Config, robot: Robot) -> Backend:

@@ -1,4 +1,4 @@
-"""robot_sim's tick: gate, clock, physics, then each part's state at its own time; in lockstep the states first, the answers last."""
+"""Runs robot_sim: gate, clock, physics, then each part's state at its own time; in lockstep states first, answers last."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
-from services.robot_sim.backend import Backend
 from services.robot_sim.config import Config
 from services.robot_sim.guard import Guard
+from services.robot_sim.kinematic import Backend
 from services.robot_sim.lockstep import GATHERING, Lockstep
-from services.robot_sim.meta import part_meta
-from services.robot_sim.sensors import Sensors
-from services.robot_sim.streams import Phases
+from services.robot_sim.sensors import Phases, Sensors, part_meta
 from services.robot_sim.watch import Watch
 
 SPREAD = 0.0025  # s, a tick shorter than this has its parts read one after the other without waiting between them
@@ -85,7 +83,7 @@ class Node:
                 self._service.spin(now + IDLE)
             else:
                 self._tick_locked(lockstep)
-                if lockstep.limps():
+                if lockstep.is_degraded():
                     self._service.spin(now + self._period)
 
     def _tick_locked(self, lockstep: Lockstep) -> None:
@@ -145,7 +143,7 @@ class Node:
         if self._lockstep is None:
             return text, numbers
         speed = self._lockstep.speed(self._dt)
-        pace = f"lockstep at {speed:.1f} x real time" if self._bus.k > 0 else self._lockstep.overture()
+        pace = f"lockstep at {speed:.1f} x real time" if self._bus.k > 0 else self._lockstep.startup_status()
         return f"{text}, {pace}", {**numbers, **self._lockstep.numbers(), "speed": speed}
 
     def _words(self) -> Mapping[str, str]:

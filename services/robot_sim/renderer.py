@@ -1,4 +1,4 @@
-"""The simulator's eyes: `python -m services.robot_sim.renderer`, a process of its own because drawing takes many ticks.
+"""Renders the eye images in a process of its own, `python -m services.robot_sim.renderer`.
 
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects).
 Writes: vision/image/{left,right}, vision/camera/{left,right}; nothing while nobody listens.
@@ -15,10 +15,10 @@ from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
 from mobee.robot.robot import Robot
 from services.common.body import Body
+from services.common.bus import BULK
 from services.common.config import load_config
-from services.common.delivery import BULK
 from services.common.entry import explained, robot_of
-from services.common.figures import Percentiles
+from services.common.rate import Percentiles
 from services.common.service import Service
 from services.robot_sim.renderer_config import RendererConfig
 from services.robot_sim.renderer_scene import Scene

@@ -1,4 +1,4 @@
-"""Boxes and spheres of the world, painted by casting a ray through every pixel.
+"""Ray-casts boxes and spheres of the world.
 
 A table fills the picture, and a rasteriser pays by the pixel; a ball of triangles is no circle.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 Picture = NDArray[np.uint8]
 Floats = NDArray[np.float32]

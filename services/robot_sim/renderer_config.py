@@ -1,4 +1,4 @@
-"""What the renderer is told."""
+"""Settings of the renderer."""
 
 from __future__ import annotations
 

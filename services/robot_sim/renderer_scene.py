@@ -1,4 +1,4 @@
-"""What the eyes see: the robot's solid shapes in neutral colours drawn by PyBullet on the CPU, then the world around it."""
+"""The scene of the eyes: the robot's solids drawn by PyBullet on the CPU, and the world around it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from mobee.collision.world import World, WorldObject
-from mobee.kinematics import link_transforms
-from mobee.kinematics.quaternion import from_matrix, to_matrix
-from mobee.robot.robot import Array, Robot, Shape
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms
+from mobee.model.quaternion import from_matrix, to_matrix
+from mobee.model.world import World, WorldObject
+from mobee.robot.robot import Robot, Shape
 from mobee.robot.urdf.hull import facets
 from services.common.eyes import eye_frame
 from services.robot_sim.renderer_cast import CastBox, CastSphere, Floats, Picture, paint_box, paint_sphere, pixel_rays

@@ -1,23 +1,64 @@
-"""What the parts report: encoders between the start and the end of a tick, each part at its own time; in lockstep at its start.
-
-The control chain gets the newest of all parts with every tick, in one message; a part's own stream is for whoever else listens.
-"""
+"""Encoders: when each part is sampled, what it reports, and its metadata."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
-from bus_schema import keys
+from bus_schema import VERSION, keys
 from bus_schema.chain import PartStatus, Tick
 from bus_schema.messages import State
-from mobee.robot.robot import Array, Robot
+from bus_schema.rpc import PartMeta
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
 from services.common.bus import Bus
+from services.common.worlds import robot_hash
+from services.robot_sim.admission import Limits
 from services.robot_sim.gate import Gate
+
+PHASES = 0.8  # share of the tick in which the phases lie
+AHEAD = 256  # ticks whose jitter is drawn at once
+
+
+class Phases:
+    """Seeded sampling times of the parts."""
+
+    def __init__(self, parts: Sequence[str], jitter: float, seed: int) -> None:
+        """`jitter`: standard deviation, share of a tick."""
+        self._parts, self._jitter = tuple(parts), jitter
+        self._rng = np.random.default_rng([seed, 0x706861])
+        self._phases = self._rng.uniform(0.0, PHASES, len(parts))
+        self._drawn: Iterator[list[float]] = iter(())
+
+    def next(self) -> list[tuple[float, str]]:
+        """(share of the tick, part) for one tick, in order of time; every share lies in 0..1."""
+        times = next(self._drawn, None)
+        if times is None:
+            jitter = self._jitter * self._rng.standard_normal((AHEAD, len(self._parts)))
+            self._drawn = iter(np.clip(self._phases + jitter, 0.0, 0.95).tolist())
+            times = next(self._drawn)
+        return sorted(zip(times, self._parts, strict=True))
+
+
+def part_meta(robot: Robot, part: str) -> PartMeta:
+    """The part's motors and their limits."""
+    limits = Limits.of(robot, part)
+    return PartMeta(
+        v=VERSION,
+        part=part,
+        motors=list(robot.part(part).motors),
+        lower=limits.lower.tolist(),
+        upper=limits.upper.tolist(),
+        max_velocity=limits.velocity.tolist(),
+        max_acceleration=limits.acceleration.tolist(),
+        max_torque=limits.torque.tolist(),
+        robot=robot.name,
+        robot_hash=robot_hash(robot),
+    )
 
 
 class Sensors:

@@ -1,4 +1,4 @@
-"""A red ball in one picture: colour, then the cone of rays that touch a sphere."""
+"""Finds a red ball in an image: colour, then the cone of rays tangent to a sphere."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from services.vision.regions import border, boxes, label, without_holes
 
 Picture = NDArray[np.uint8]

@@ -1,4 +1,4 @@
-"""What the target locator is told."""
+"""Settings of the locator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The target locator at work: a pair of pictures in, the ball's place out."""
+"""Runs the locator: reads pairs of images, publishes the ball's position."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from bus_schema import keys
 from bus_schema.messages import Camera, Geometry, Image, WorldObject
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-from services.common.delivery import DATA
+from services.common.bus import DATA
 from services.common.eyes import frame_at_capture
-from services.common.figures import Percentiles
+from services.common.rate import Percentiles
 from services.common.service import Service
 from services.vision.ball import Sighting, find_balls
 from services.vision.config import Config

@@ -1,4 +1,4 @@
-"""Connected regions of a picture's mask."""
+"""Connected regions of an image mask."""
 
 from __future__ import annotations
 

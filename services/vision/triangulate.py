@@ -1,4 +1,4 @@
-"""Two sightings to one place: where the rays of the two eyes come closest."""
+"""Triangulates two sightings: the point closest to both rays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from services.vision.ball import Sighting
 
 Frame = tuple[Array, Array]  # optical centre (3,) m; rotation (3, 3), columns right, down, forward; root frame

@@ -117,7 +117,7 @@ def test_a_missing_an_unknown_and_a_wrong_field_are_refused() -> None:
         {**right, "extra": 1},
         {**right, "ref": "none"},
         {**right, "mode": "fly"},
-        {**right, "ttl": 0},  # must not mean "for ever"
+        {**right, "ttl": 0},  # must not mean "indefinitely"
         {**right, "ttl": 1001},
         {**right, "seq": -1},
         {**right, "run": ""},

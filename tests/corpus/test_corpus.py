@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.zero_position import read_robot
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
+from mobee.robot.xml.read import read_robot
 from tests.corpus.generated import ACCEPTED, REFUSED
 from tests.corpus.phrases import PHRASES
 

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from mobee.collision.world import World
+from mobee.arrays import Array
 from mobee.errors import MobeeError, RobotFileError
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.model.world_file import read_world
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
-from mobee.robot.xml_world import read_world
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.read import read_robot
 
 FUZZ = Path(__file__).parent
 SEEDS = FUZZ / "seeds"

@@ -24,14 +24,14 @@ def test_importing_the_library_brings_no_bus_viewer_or_simulator():
 
 
 def test_importing_the_library_loads_no_compiled_code():
-    script = "import sys, mobee; print([name for name in ('mobee._core', 'mobee.engine.engine', 'scipy') if name in sys.modules])"
+    script = "import sys, mobee; print([name for name in ('mobee._core', 'mobee.model.engine', 'scipy') if name in sys.modules])"
     seen = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
     assert seen.stdout.strip() == "[]"
 
 
 def test_public_names_are_imported_when_they_are_first_used():
     script = "import sys, mobee; print('numpy' in sys.modules); mobee.load_robot; "
-    script += "print('mobee.robot.load' in sys.modules, 'mobee.model' in sys.modules)"
+    script += "print('mobee.robot.load' in sys.modules, 'mobee.model.model' in sys.modules)"
     seen = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
     assert seen.stdout.split() == ["False", "True", "False"]
 

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mobee.robot.load import shipped_robots, shipped_worlds
+from mobee.model.world_file import shipped_worlds
+from mobee.robot.load import shipped_robots
 from mobee_cli.__main__ import main
-from tests.mobee.robot.check.arm import ARM
-from tests.mobee.robot.check.test_urdf import URDF
+from tests.mobee.check.arm import ARM
+from tests.mobee.check.test_urdf import URDF
 from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.urdf_files import arm_with, foreign, srdf_file
 

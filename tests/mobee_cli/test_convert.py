@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from mobee.errors import OlderVersion
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee_cli.__main__ import main
 from mobee_cli.errors import BAD_INPUT, FAILED
 from tests.mobee.robot.same_robot import assert_same_robot

@@ -12,8 +12,7 @@ from bus_schema import VERSION, encode, encoding_of, keys
 from bus_schema.messages import State
 from bus_schema.rpc import Done
 from mobee_cli.__main__ import main
-from services.common.bus import Bus
-from services.common.delivery import LATEST
+from services.common.bus import LATEST, Bus
 from services.common.observe import listen
 from services.common.session import open_router
 

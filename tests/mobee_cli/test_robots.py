@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mobee.robot.load import load_robot, shipped_robots, shipped_worlds
+from mobee.model.world_file import shipped_worlds
+from mobee.robot.load import load_robot, shipped_robots
 from mobee_cli.__main__ import main
 
 

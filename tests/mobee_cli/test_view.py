@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mobee_cli.__main__ import main
-from tests.mobee.robot.check.arm import ARM
+from tests.mobee.check.arm import ARM
 from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.urdf_files import arm_with
 
@@ -45,7 +45,7 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
         try:
             assert shown.wait(timeout=20) == 0
         finally:
-            shown.kill()  # or the end of `with` waits for ever
+            shown.kill()  # or the end of `with` waits indefinitely
         assert "Traceback" not in shown.stderr.read()
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.explorable import Explorable
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.learning.explorers import Explorable
 
 
 def last_action(agent: Explorable, state: int, rng: np.random.Generator) -> Array:

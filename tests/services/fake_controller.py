@@ -11,7 +11,7 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, Motion
 from bus_schema.rpc import Goal, Started, Take, Taken
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from tests.services.harness import Refusal, Rig
 
 

@@ -8,7 +8,7 @@ import zenoh
 from bus_schema import Refused, decode, keys
 from bus_schema.chain import Tick
 from bus_schema.messages import ContactItem, Forces
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from tests.services.fake_sim import FakeSim
 from tests.services.harness import Rig
 

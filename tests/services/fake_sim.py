@@ -16,8 +16,8 @@ from bus_schema import VERSION, decode, keys
 from bus_schema.chain import Answer, Commands, PartStatus, Tick
 from bus_schema.messages import Clock, Command
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
-from mobee.robot.robot import Array
-from services.common.delivery import LATEST
+from mobee.arrays import Array
+from services.common.bus import LATEST
 from tests.services.harness import Refusal, Rig, wait_for
 
 

@@ -17,11 +17,11 @@ import zenoh
 from bus_schema import keys
 from bus_schema.messages import Clock, Message, ObjectTruth, State, Truth
 from bus_schema.rpc import Empty, Stat
+from mobee.arrays import Array
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common import rpc
-from services.common.bus import Bus, Latest, Publisher
-from services.common.delivery import DATA, LATEST
+from services.common.bus import DATA, LATEST, Bus, Latest, Publisher
 from services.common.session import open_router
 
 TICK = 10_000_000  # ns

@@ -17,7 +17,7 @@ from bus_schema.rpc import AddObject, Done, OneName, ReachFor, Started
 from mobee import load_robot
 from mobee.reach import TARGET
 from mobee.store import STORE
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from tests.services.fake_controller import FakeController
 from tests.services.harness import Program, Refusal, Rig, rig, wait_for
 

@@ -20,8 +20,8 @@ import pytest
 from bus_schema import VERSION, keys
 from bus_schema.messages import ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, Transition, WorldObject
 from bus_schema.rpc import ObjectState
-from mobee.kinematics import link_transforms
-from mobee.kinematics.quaternion import to_matrix
+from mobee.model.kinematics import link_transforms
+from mobee.model.quaternion import to_matrix
 from mobee.robot.load import load_robot
 from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture

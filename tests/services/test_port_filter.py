@@ -13,11 +13,10 @@ from zenoh.handlers import FifoChannel, RingChannel
 from bus_schema import keys
 from bus_schema.messages import Clock, Command, EStop, Event, State
 from bus_schema.rpc import Done, Driven, Empty, PartMeta, Request, Take, Taken, WithEpoch
+from mobee.arrays import Array
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array
 from services.common import rpc
-from services.common.bus import Bus
-from services.common.delivery import LATEST, STOP
+from services.common.bus import LATEST, STOP, Bus
 from services.common.rpc import CallFailed
 from services.common.session import open_client
 from tests.services.harness import Rig, rig, wait_for

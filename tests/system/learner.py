@@ -31,7 +31,7 @@ def digest(agent: CuriousAgent) -> str:
 
 
 def learn(file: Path, reports: Path) -> None:
-    """Learn for ever; one line a transition is written when it is observed, the first for what was on disk."""
+    """Learn indefinitely; one line a transition is written when it is observed, the first for what was on disk."""
     with TransitionStore(file, "left_arm") as store, reports.open("a") as lines:
         agent = curious_agent(store)
         lines.write("\n")  # the one before may have been killed in a line

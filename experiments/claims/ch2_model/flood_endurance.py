@@ -21,11 +21,11 @@ from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
 from experiments.kit.records import Records
 from mobee import InvalidValue, Model, World, load_robot
-from mobee.collision import Geometry, WorldObject, box
-from mobee.collision.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
-from mobee.collision.world_object import Role
-from mobee.engine.volumes import CODES, VOLUME, Volumes
-from mobee.model import Pose
+from mobee.model import Geometry, WorldObject, box
+from mobee.model.pose import Pose
+from mobee.model.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
+from mobee.model.volumes import CODES, VOLUME, Volumes
+from mobee.model.world_object import Role
 from mobee.robot.robot import Robot
 
 ROBOT = "icub"

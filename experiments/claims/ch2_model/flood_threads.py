@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee import Model
-from mobee.collision import Geometry, box
-from mobee.kinematics.quaternion import to_matrix
-from mobee.model import Pose
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model import Geometry, box
+from mobee.model.pose import Pose
+from mobee.model.quaternion import to_matrix
+from mobee.robot.robot import Robot
 
 CONTROL_PERIOD = 0.01  # s (thesis 2.4)
 FREQUENCIES = (0.1, 0.5)  # Hz, one a motor, so that the whole pose never comes again

@@ -24,9 +24,9 @@ from experiments.bench.nes_workload import trial as search
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import draw_curve, new_figure
-from experiments.kit.statistics import decides, interval, ratio, ratio_interval, told
+from experiments.kit.statistics import decides, estimate, interval, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 DIMENSIONS = (10, 20, 41)
 QUICK_MOST = 20_000  # evaluations
@@ -88,7 +88,7 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = evaluations(found)
     return {
         "evaluations": {
-            f"{function}, {d}": {NAMES[s]: told(runs[s, (function, d)], 0) for s in STRATEGIES if (s, (function, d)) in runs}
+            f"{function}, {d}": {NAMES[s]: estimate(runs[s, (function, d)], 0) for s in STRATEGIES if (s, (function, d)) in runs}
             for function, d in tasks(runs)
         },
         "found": {NAMES[name]: _share(found, name) for name in STRATEGIES},
@@ -107,7 +107,7 @@ def judged(runs: Runs) -> list[Claim]:
     if any(key not in runs for key in everything) or len({len(runs[key]) for key in everything}) > 1:
         return list(CLAIMS)
     medians = {name: _medians(runs, name) for name in BETTER}
-    told_medians = {name: f"{told(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
+    told_medians = {name: f"{estimate(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
     return [
         *(_better(runs, name, claim) for name, claim in BETTER.items()),
         *(c.measured(told_medians[name], decides(interval(medians[name]), most=COMPARABLE)) for name, c in AS_GOOD.items()),

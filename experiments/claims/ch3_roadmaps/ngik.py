@@ -27,10 +27,10 @@ from experiments.bench.ik_workload import MOTORS, scene, targets
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, ratio, ratio_interval, told
+from experiments.kit.statistics import decides, estimate, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 TARGETS, QUICK_TARGETS = 20, 2  # a seed
 FEW, WHOLE = 10, 41  # motors
@@ -90,7 +90,7 @@ class Solver:
     ms: Array
 
     def __str__(self) -> str:
-        return f"{told(self.reached)} reached, {told(self.evaluations, 0)} evaluations, {told(self.ms, 0)} ms"
+        return f"{estimate(self.reached)} reached, {estimate(self.evaluations, 0)} evaluations, {estimate(self.ms, 0)} ms"
 
 
 def solvers(found: Cells) -> dict[tuple[str, int], Solver]:

@@ -50,8 +50,8 @@ from experiments.kit.performer.launch import launch
 from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
 from experiments.kit.recordings import CONTACTS, POSITIONS, read_positions, read_touches
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 SOONEST, LATEST = 0.1, 1.2  # s after the start of a crossing
 PIECE = 5  # crossings of a launch

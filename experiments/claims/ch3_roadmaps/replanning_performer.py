@@ -16,8 +16,9 @@ from bus_schema.rpc import Done, Place, Request, SetRole
 from experiments.claims.ch3_roadmaps.replanning_scene import BALL, LEFT, PART, RATE, RIGHT, Acted, Crossing, Job, ball, new_map, robot
 from experiments.kit.live import append_done, read_job
 from mobee import ActionInterrupted, MobeeError, Walker
+from mobee.arrays import Array
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.bus_plant import BusPlant
 from services.common.lockstep import Participant
 from services.common.rpc import CallFailed

@@ -9,7 +9,8 @@ import numpy as np
 from msgspec import Struct
 
 from mobee import AdaptiveRoadmap, Model, Space, load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 
 ROBOT, PART, MARKER = "icub", "right_arm", "right_palm"
 BALL, RADIUS = "ball", 0.03

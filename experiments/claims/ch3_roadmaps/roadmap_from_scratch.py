@@ -47,13 +47,13 @@ from experiments.kit.performer.launch import launch
 from experiments.kit.plots import new_figure
 from experiments.kit.recordings import CONTACTS, POSITIONS, read_touches
 from experiments.kit.run_folder import read, write
-from experiments.kit.statistics import told
+from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.ompl import require_ompl
-from mobee.robot.robot import Array
 
 QUICK = 30  # edges
 STORE, LONGEST = "map.sqlite", 8 * 3600.0  # of the live run; s of robot time
@@ -158,8 +158,8 @@ def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[
     agree = [float(np.mean(values["agree"])) for values in done]
     with_gaps = sum(unreached(values) > 0 for values in done)
     deepest = max(1e3 * float(values["deepest"]) for values in maps)
-    share = told([float(values["feasible"].sum() / (values["tried"] > 0).sum()) for values in done])
-    explored = f"{told(minutes, 0)} minutes; {share} of the edges tried are feasible"
+    share = estimate([float(values["feasible"].sum() / (values["tried"] > 0).sum()) for values in done])
+    explored = f"{estimate(minutes, 0)} minutes; {share} of the edges tried are feasible"
     lived, holds = "not run live", None
     if live is not None:
         lived = f"live {1e3 * live['deepest']:.1f} mm in {live['hours']:.1f} h and {live['touches']} touches"
@@ -169,7 +169,7 @@ def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[
     return [
         CLAIMS[0].measured(explored, len(done) == len(maps)),
         CLAIMS[1].measured(f"{with_gaps} of {len(done)} maps of seven joints", 2 * with_gaps > len(done)),
-        CLAIMS[2].measured(f"{told(agree, 3)} of the edges", agrees),
+        CLAIMS[2].measured(f"{estimate(agree, 3)} of the edges", agrees),
         CLAIMS[3].measured(f"{lived}; offline, by the model, {deepest:.1f} mm", holds),
     ]
 

@@ -23,10 +23,11 @@ from mobee import (
     load_robot,
     load_world,
 )
-from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.arrays import Array
+from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import NEAR
 from mobee.roadmap.ompl import query
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 ROBOT, PART, MARKER = "icub", "right_arm", "right_palm"
 JOINTS, SAMPLES, NEIGHBOURS = 7, 20, 10  # thesis 4.3.1: 20 and 10, of the whole upper body

@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import DONE, JOB, PART, explorer, robot
 from experiments.kit.run_folder import read, write
 from mobee import ActionInterrupted
-from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.record import MapStore
 from services.common.bus_plant import BusPlant
 from services.common.service import Service
 

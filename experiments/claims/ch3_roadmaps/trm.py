@@ -28,13 +28,13 @@ from experiments.kit.cells import Cell, CellResult, load_cells
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.roadmap_task import Example, Method, build
-from experiments.kit.statistics import told
+from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, run_cells, sweep_arguments
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.roadmap.edges import check_edges
-from mobee.roadmap.neighbours import nearest_before
+from mobee.roadmap.graph import nearest_before
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 
 METHODS: tuple[Method, ...] = ("nes", "least_squares")
 COSTS = {"nes": 15.0, "least_squares": 2.0}  # beside each other
@@ -91,7 +91,7 @@ def work(cell: Cell) -> dict[str, Any]:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Build the maps that the folder does not hold yet."""
-    importlib.import_module("mobee.collision.fcl_engine")  # raises NotInstalled before anything is begun
+    importlib.import_module("mobee.model.fcl_engine")  # raises NotInstalled before anything is begun
     run_cells(work, cells(arguments), folder, arguments)
     return findings(load_cells(folder))
 
@@ -131,7 +131,7 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = maps(found)
     table: dict[str, dict[str, dict[str, str]]] = {}
     for (task, method), columns in runs.items():
-        table.setdefault(task, {})[NAMES[method]] = {name: told(values, _digits(name)) for name, values in columns.items()}
+        table.setdefault(task, {})[NAMES[method]] = {name: estimate(values, _digits(name)) for name, values in columns.items()}
     return {"maps": table, "claims": [claim.record() for claim in judged(runs)]}
 
 

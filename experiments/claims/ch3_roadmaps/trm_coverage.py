@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import mobee
+from mobee.arrays import Array
 from mobee.roadmap.building.flood import Patience, flooded
 from mobee.roadmap.building.goals import Goals
 from mobee.roadmap.building.task import Task
-from mobee.roadmap.ik.problem import Cost, Problem
-from mobee.roadmap.ik.solids import solid_robot
-from mobee.robot.robot import Array
+from mobee.roadmap.ik.problem import Cost, Problem, solid_robot
 
 FINER = 2  # points of the flood along a spacing
 GENEROUS = Patience(starts=16, tries=24, hopeless=8, scouts=2048)

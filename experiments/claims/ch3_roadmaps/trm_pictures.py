@@ -22,9 +22,9 @@ from experiments.drawing.motion import Motion, motion_through
 from experiments.drawing.sheet import Panel, write_sheet
 from experiments.kit.roadmap_task import LEFT_ARM, Example, Method, build
 from mobee import MobeeError
+from mobee.arrays import Array
 from mobee.roadmap.building.task import Coordinate
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 
 STEP = 0.05  # rad of the motor that moves most, between two poses of a film
 SPEED = 0.35  # rad/s, of that motor: 20 degrees a second

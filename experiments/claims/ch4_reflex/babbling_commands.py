@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 
 ROBOT = "icub"
 HANDS = ("hand", "thumb", "index", "middle", "pinky")  # in the names of the motors that are left alone

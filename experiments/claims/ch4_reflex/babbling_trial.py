@@ -17,8 +17,9 @@ from msgspec import Struct
 from experiments.claims.ch4_reflex.babbling_commands import COMMANDS, Commanded, Ending, moved_motors, read_commands
 from experiments.kit.live import TABLE, free_endpoint, stop
 from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
+from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.session import NAMESPACE
 
 MODES = ("off", "one", "two")

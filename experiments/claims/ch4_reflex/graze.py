@@ -28,10 +28,9 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.options import positive_number, positive_whole
 from experiments.kit.plots import new_figure
 from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee.arrays import Array
 from mobee.control import Controller, Gains, SettleTest
-from mobee.control.reflex import Recovery, Reflex
-from mobee.control.reflex_settings import ReflexSettings
-from mobee.robot.robot import Array
+from mobee.control.reflex import Recovery, Reflex, ReflexSettings
 from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 
 ANGLES = (90.0, 60.0, 30.0, 20.0, 10.0, 7.0, 5.0, 3.0, 2.0, 1.0)  # degrees

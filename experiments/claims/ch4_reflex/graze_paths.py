@@ -8,11 +8,13 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from mobee.control.violation import Violation, Watch
-from mobee.kinematics.quaternion import from_matrix
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.control.reflex import Violation, Watch
+from mobee.model.model import Model
+from mobee.model.quaternion import from_matrix
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 
 SPEED = 0.2  # of the motors' top speed, as in the thesis
 MARKER = "left_palm"

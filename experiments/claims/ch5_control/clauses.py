@@ -29,7 +29,7 @@ from experiments.kit.plots import new_figure
 from experiments.kit.safety_measures import clause_label, clause_violations
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 ALLOWED = 2.0  # degrees along the normal, default gains, without forces of a client
 KINDS = ("attractors", "forced")

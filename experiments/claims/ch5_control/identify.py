@@ -43,11 +43,12 @@ from experiments.kit.plots import new_figure
 from experiments.kit.progress import Progress
 from experiments.kit.run_folder import write
 from mobee import Controller, Gains, Model, MotorParameters, OfflinePlant, World, load_robot
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.simulation.identified import FITTED
 from mobee.simulation.motors import NOISE_PERIOD
-from services.robot_sim.backend import Backend
+from services.robot_sim.kinematic import Backend
 
 RESPONSES, TABLE, DATA, METHOD = "responses", "motors.csv", "identified.toml", "method.json"
 

@@ -17,7 +17,8 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 
 from experiments.claims.ch5_control.identify_recording import DT, PRELOAD, Responses, fitted_signal, held_out_signal
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from mobee.simulation.identified import FITTED
 from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee import MotorParameters, World
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.model import Model
-from mobee.robot.robot import Array, Robot
-from services.robot_sim.backend import Backend, BackendUnavailable
+from mobee.model.model import Model
+from mobee.robot.robot import Robot
+from services.robot_sim.kinematic import Backend, BackendUnavailable
 
 DT = 0.01  # s, a tick
 ROOM = np.deg2rad(14.0)  # rad, no signal goes farther from its start

@@ -28,8 +28,8 @@ from experiments.kit.records import Row
 from experiments.kit.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
+from mobee.arrays import Array
 from mobee.errors import UnknownName
-from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 PERIODS = (1.0, 2.0, 5.0, 10.0, 20.0)  # ms

@@ -26,8 +26,8 @@ from experiments.kit.records import Row
 from experiments.kit.safety_measures import AT_STOP, clause_violations, deepest, limit_violations, speeds_at_stops
 from experiments.kit.sweep import Cells, Condition, Sweep, grid
 from mobee import Gains
-from mobee.control.modality import FRICTION, INERTIA
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.control.law import FRICTION, INERTIA
 from mobee.simulation import OfflinePlant
 
 MARKER = "left_palm"

@@ -15,7 +15,7 @@ from experiments.kit.records import Row
 from experiments.kit.safety_measures import deepest, oscillation
 from experiments.kit.step_responses import motor_step, postures, run_step, step_response
 from mobee import Gains
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from mobee.simulation import MotorParameters, OfflinePlant
 
 STEPPED = ("torso_yaw", "torso_pitch", "l_shoulder_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup", "neck_yaw")

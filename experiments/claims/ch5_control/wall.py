@@ -27,8 +27,8 @@ from experiments.kit.records import Row
 from experiments.kit.safety_measures import clause_violations, deepest, limit_violations, oscillation
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
+from mobee.arrays import Array
 from mobee.control import Reacher
-from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 
 SOLID, CLAUSE = 2.0, 2.0  # mm, degrees: allowed with the default gains

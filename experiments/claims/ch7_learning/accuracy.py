@@ -27,14 +27,14 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import begin_nearby, explore
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, interquartile_mean, interval, ratio_interval, told, told_ratio
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from experiments.kit.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
 from mobee import CuriousAgent, Lattice, Plant, TransitionModel
+from mobee.arrays import Array, Ints
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.tabular import TabularPlant, half_space
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.robot.robot import Array, Ints
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def measured(last: Mapping[tuple[str, str], Array], floors: Mapping[str, float |
     claims = []
     for world, claim in OVERALL.items():
         mine = column(world, "curious", DEBIASED)
-        claims.append(claim if mine is None else claim.measured(told(mine, 4), decides(interval(mine), most=MOST)))
+        claims.append(claim if mine is None else claim.measured(estimate(mine, 4), decides(interval(mine), most=MOST)))
     for (world, explorer), claim in STOCHASTIC.items():
         least = BETTER if explorer == "curious" else AIM
         rival, mine = (column(world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
@@ -204,7 +204,7 @@ def _ratio(claim: Claim, above: Array | None, below: Array | None, least: float,
     """Whether what is above is that many times what is below; open if one is not known, or the interval holds the number."""
     if above is None or below is None:
         return claim
-    factor = told_ratio(above, below).replace(" ", " x ", 1)
+    factor = ratio_estimate(above, below).replace(" ", " x ", 1)
     text = f"{factor} ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
     return claim.measured(text + note, decides(ratio_interval(above, below), least))
 

@@ -11,7 +11,7 @@ friction no action ever seems settled, for the controller goes on asking the mot
 measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed; the remaining error, and
 how long half of it takes, are relative to the error at the change itself, before the first transition after it.  Forgetting bounds an
 action's counts, to 1 / (1 - forgetting), and so its reward from below: with 0.8 whatever has most outcomes stays the most interesting
-for ever, and a curious agent tries little else.
+indefinitely, and a curious agent tries little else.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import explore
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interval, mean_over, told
+from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from experiments.kit.truth import Truth, l1, truth_of, walk
 from mobee import CuriousAgent, Gains, Model, MotorParameters, OfflinePlant, World, sphere
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Ints
 
 CHANGES = {"object": "a ball enters", "friction": "the elbow's friction doubles"}
 AGENTS = (("curious", 1.0), ("curious", 0.95), ("curious", 0.8), ("least_tried", 1.0), ("least_tried", 0.8))  # explorer, forgetting
@@ -251,7 +251,7 @@ def measured(runs: Runs) -> list[Claim]:
     """The claims with our numbers, of the runs of all conditions."""
     curious, least = ({change: runs[change, explorer, 1.0] for change in CHANGES} for explorer in ("curious", "least_tried"))
     left = {change: [run.error_left for run in mine] for change, mine in curious.items()}
-    text = ", ".join(f"{change} {told(mine)}" for change, mine in left.items())
+    text = ", ".join(f"{change} {estimate(mine)}" for change, mine in left.items())
     return [
         _above(VALUE, curious, curious, lambda run: run.value_jump, lambda run: run.value_jump_before, "{} {}, as long before {}"),
         _above(TRIED, curious, least, lambda run: run.eagerness, lambda run: run.eagerness, "{}: {}, least tried {}"),
@@ -270,7 +270,7 @@ def _above(claim: Claim, ours: ByChange, theirs: ByChange, number: Number, contr
     parts, holds = [], True
     for change in CHANGES:
         here, there = [number(run) for run in ours[change]], [control(run) for run in theirs[change]]
-        parts.append(text.format(change, told(here), told(there)))
+        parts.append(text.format(change, estimate(here), estimate(there)))
         holds = holds and interval(here)[0] > max(1.0, interval(there)[1])
     return claim.measured("; ".join(parts), holds)
 
@@ -281,7 +281,7 @@ def _sooner(claim: Claim, runs: Runs, explorer: str, forgetting: float) -> Claim
         forgot, kept = runs[change, explorer, forgetting], runs[change, explorer, 1.0]
         values = [[run.relearned_within for run in mine] for mine in (forgot, kept)]
         never = [sum(np.isinf(run.relearned) for run in mine) for mine in (forgot, kept)]
-        forgetful, lasting = (f"{told(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True))
+        forgetful, lasting = (f"{estimate(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True))
         parts.append(f"{change}: {forgetful}, without forgetting {lasting}")
         holds = holds and interval(values[0])[1] < interval(values[1])[0]
     return claim.measured("; ".join(parts), holds)

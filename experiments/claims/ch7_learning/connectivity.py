@@ -23,7 +23,7 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.plots import draw_points, new_figure
-from experiments.kit.statistics import decides, interquartile_mean, interval, mean_over, ratio_interval, told
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, mean_over, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent, OfflinePlant, Space, TransitionModel, value_iteration
 from mobee.errors import InvalidValue
@@ -179,7 +179,7 @@ def measured(grouped: Groups) -> list[Claim]:
     return [
         _sooner({graph: learning_times(runs) for graph, runs in fewer.items()}, len(grouped[PUBLISHED])),
         _denser(fewer),
-        LENGTH.measured(", ".join(f"{graph}: {told([length(run) for run in runs])}" for graph, runs in fewer.items()), None),
+        LENGTH.measured(", ".join(f"{graph}: {estimate([length(run) for run in runs])}" for graph, runs in fewer.items()), None),
     ]
 
 
@@ -204,7 +204,7 @@ def _denser(fewer: Mapping[int, list[dict[str, Any]]]) -> Claim:
         for graph in fewer
         if graph < PUBLISHED
     )
-    return DENSER.measured(", ".join(f"{graph}: {told(shares[graph])}, direct {told(straight[graph])}" for graph in fewer), enough)
+    return DENSER.measured(", ".join(f"{graph}: {estimate(shares[graph])}, direct {estimate(straight[graph])}" for graph in fewer), enough)
 
 
 def plot(found: Cells) -> Any:

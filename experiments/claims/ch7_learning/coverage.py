@@ -29,13 +29,22 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.outcomes import first_places, first_tries, goals_of
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, interval, mean_over, probability_of_improvement, ratio, ratio_interval, told, told_ratio
+from experiments.kit.statistics import (
+    decides,
+    estimate,
+    interval,
+    mean_over,
+    probability_of_improvement,
+    ratio,
+    ratio_estimate,
+    ratio_interval,
+)
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.neighbours import NO_ACTION
-from mobee.robot.robot import Array, Ints
 
 LABELS = {
     "curious": "curious (AC)",
@@ -200,7 +209,7 @@ def measured(published: Published) -> list[Claim]:
 def _half(claim: Claim, curious: Array, least: Array) -> Claim:
     span = ratio_interval(curious, least)
     better = ", better than published" if span[1] < ABOUT_HALF[0] else ""
-    return claim.measured(told_ratio(curious, least) + better, decides(span, *ABOUT_HALF))
+    return claim.measured(ratio_estimate(curious, least) + better, decides(span, *ABOUT_HALF))
 
 
 def _best(times: Mapping[tuple[str, str], Array], unfinished_random: int) -> Claim:
@@ -215,19 +224,19 @@ def _best(times: Mapping[tuple[str, str], Array], unfinished_random: int) -> Cla
 def _novel(published: Published) -> Claim:
     repeats = {name: [first_repeat(run) for run in published["constrained", name]] for name in ("curious", "least_tried", "random")}
     holds = all(interval(repeats[name])[0] >= EARLY for name in ("curious", "least_tried")) and interval(repeats["random"])[1] < EARLY
-    text = ", ".join(f"{label} {told(mine, 0)}" for label, mine in zip(("AC", "LT", "RAND"), repeats.values(), strict=True))
+    text = ", ".join(f"{label} {estimate(mine, 0)}" for label, mine in zip(("AC", "LT", "RAND"), repeats.values(), strict=True))
     return NOVEL.measured(f"first repeat at {text} transitions", holds)
 
 
 def _aggressive(published: Published) -> Claim:
     curious, least = ([states_seen(run, EARLY) for run in published["constrained", name]] for name in ("curious", "least_tried"))
-    text = f"states of 81 seen at {EARLY}: AC {told(curious, 1)}, LT {told(least, 1)}"
+    text = f"states of 81 seen at {EARLY}: AC {estimate(curious, 1)}, LT {estimate(least, 1)}"
     return AGGRESSIVE.measured(text, interval(curious)[0] > interval(least)[1])
 
 
 def _near_floor(claim: Claim, runs: Runs, most: float) -> Claim:
     shares = [run["transitions"] / run["floor"] for run in runs]
-    return claim.measured(told(shares, 3), decides(interval(shares), most=most))
+    return claim.measured(estimate(shares, 3), decides(interval(shares), most=most))
 
 
 def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
@@ -237,7 +246,7 @@ def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
     for world, (ours, theirs) in zip(FLOORS, pairs, strict=True):
         if ours is None or theirs is None:
             return DEPLETES
-        parts.append(f"{told_ratio(ours, theirs, 3)} {world}")
+        parts.append(f"{ratio_estimate(ours, theirs, 3)} {world}")
         each.append(decides(ratio_interval(ours, theirs), most=1.0 + SLACK))
     return DEPLETES.measured(", ".join(parts), False if False in each else None if None in each else True)
 

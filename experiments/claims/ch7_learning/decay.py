@@ -21,7 +21,7 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interquartile_mean, interval, ratio_interval, told, told_ratio
+from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent
 
@@ -80,7 +80,7 @@ def measured(groups: Groups) -> list[Claim]:
     largest = {explorer: [float(rewards.max()) for rewards in last[explorer]] for explorer in EXPLORERS}
     mean = {explorer: [float(rewards.mean()) for rewards in last[explorer]] for explorer in EXPLORERS}
     others = [ratio_interval(mean["curious"], mean[explorer]) for explorer in EXPLORERS[1:]]
-    against = ", ".join(f"{told_ratio(mean['curious'], mean[explorer])} of {explorer}'s" for explorer in EXPLORERS[1:])
+    against = ", ".join(f"{ratio_estimate(mean['curious'], mean[explorer])} of {explorer}'s" for explorer in EXPLORERS[1:])
     return [
         UNIFORM.measured(_each(peak, 1), _is_least(peak)),
         GETS_IT.measured(_each(largest, 4), _is_least(largest)),
@@ -89,7 +89,7 @@ def measured(groups: Groups) -> list[Claim]:
 
 
 def _each(values: Mapping[str, list[float]], digits: int) -> str:
-    return ", ".join(f"{explorer} {told(values[explorer], digits)}" for explorer in EXPLORERS)
+    return ", ".join(f"{explorer} {estimate(values[explorer], digits)}" for explorer in EXPLORERS)
 
 
 def _is_least(values: Mapping[str, list[float]]) -> bool:

@@ -8,7 +8,7 @@ Run time: 10 seconds on 2 cores.
 The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, 50-50 initialisation.
 Tries and values are recorded after 50 transitions and at the end.  Uniformity of early tries: their variance over that of a
 uniformly random choice among 64 actions, 1 for a random choice and 0 for equal tries (spread_early, spread_end).  uneven_value:
-standard deviation over mean of the values; value_of_limit: their mean over what earning the mean reward for ever is worth.
+standard deviation over mean of the values; value_of_limit: their mean over what earning the mean reward indefinitely is worth.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.outcomes import first_tries, goals_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
-from experiments.kit.statistics import interquartile_mean, interval, mean_over, relative_spread, told
+from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, relative_spread
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent, value_iteration
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 DISCOUNTS = (0.5, 0.9, 0.99)
 EARLY, LEAST = 50, 5  # transitions, tries
@@ -116,7 +116,7 @@ def _mean_value(run: Mapping[str, Any]) -> float:
 
 
 def _share_of_limit(discount: float, run: Mapping[str, Any]) -> float:
-    """1 where the value is that of earning the mean reward for ever."""
+    """1 where the value is that of earning the mean reward indefinitely."""
     return float(run["values"].mean() * (1.0 - discount) / run["rewards"].mean())
 
 
@@ -133,14 +133,14 @@ def _succeed(every: list[dict[str, Any]]) -> Claim:
 
 def _actions(groups: Groups) -> Claim:
     actions = {discount: [run["transitions"] for run in runs] for discount, runs in groups.items()}
-    text = "; ".join(f"{told(mine, 0)} at discount {discount:g}" for discount, mine in actions.items())
+    text = "; ".join(f"{estimate(mine, 0)} at discount {discount:g}" for discount, mine in actions.items())
     return ACTIONS.measured(text, all(interval(mine)[1] <= 1.05 * PUBLISHED for mine in actions.values()))
 
 
 def _uniform(every: list[dict[str, Any]]) -> Claim:
     early, end = ([dispersion(run[name]) for run in every] for name in ("early_tries", "tries"))
     (low, high), (_, end_high) = interval(early), interval(end)
-    text = f"variance of tries over a uniform choice's: {told(early)} after {EARLY}, {told(end)} at the end"
+    text = f"variance of tries over a uniform choice's: {estimate(early)} after {EARLY}, {estimate(end)} at the end"
     return UNIFORM.measured(text, ALIKE[0] <= low and high <= ALIKE[1] and end_high < low)
 
 

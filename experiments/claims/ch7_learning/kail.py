@@ -26,10 +26,10 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interval, mean_over, told
+from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Gains, Lattice, Model, OfflinePlant, TransitionModel
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 DIVERGENCES = {"kail": "'Kail'", "kl": "plain KL, uniform prior"}
 PARTS = {"left_arm": "arm, 81 states", "torso": "torso, 27 states"}
@@ -173,8 +173,8 @@ def measured(grouped: Groups) -> list[Claim]:
         _apart(FIRST, "failing"),
         _apart(SECOND, "uncertain"),
         _spikes({divergence: relative_tries_of(grouped["left_arm", divergence], _of_arm(grouped)) for divergence in DIVERGENCES}),
-        SIZE.measured(told(ratios["kl"]), kl_ratio[0] > 1.5),
-        COMPARABLE.measured(told(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
+        SIZE.measured(estimate(ratios["kl"]), kl_ratio[0] > 1.5),
+        COMPARABLE.measured(estimate(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
     ]
 
 
@@ -186,7 +186,7 @@ def _spikes(dearer: Mapping[str, list[float]]) -> Claim:
     """Of mean tries of failing actions over those of the others, of each run of the arm."""
     if not all(dearer.values()):
         return SPIKES.measured("no action fails in more than half of its tries", None)
-    text = f"tries over those of the others: {told(dearer['kail'])}, plain KL {told(dearer['kl'])}"
+    text = f"tries over those of the others: {estimate(dearer['kail'])}, plain KL {estimate(dearer['kl'])}"
     return SPIKES.measured(text, interval(dearer["kail"])[0] > max(interval(dearer["kl"])[1], 1.0))
 
 

@@ -29,10 +29,19 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.outcomes import exists_in, failures_of, uncertain_in, visits_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
-from experiments.kit.statistics import decides, interquartile_mean, interval, mean_over, ratio_interval, relative_spread, told, told_ratio
+from experiments.kit.statistics import (
+    decides,
+    estimate,
+    interquartile_mean,
+    interval,
+    mean_over,
+    ratio_estimate,
+    ratio_interval,
+    relative_spread,
+)
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent, Lattice
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 DISCOUNTS = (0.5, 0.9, 0.99)
 INITIAL = ("50-50", "60-40")
@@ -208,7 +217,7 @@ def _actions(grouped: Groups, initial: str) -> list[float]:
 
 
 def _by_discounts(values: Mapping[float, list[float]], digits: int = 2) -> list[str]:
-    return [f"{told(mine, digits)} at discount {discount:g}" for discount, mine in values.items()]
+    return [f"{estimate(mine, digits)} at discount {discount:g}" for discount, mine in values.items()]
 
 
 def _number(grouped: Groups, initial: str) -> Claim:
@@ -220,7 +229,7 @@ def _number(grouped: Groups, initial: str) -> Claim:
 
 
 def _sooner(optimistic: list[float], even: list[float]) -> tuple[str, bool]:
-    return told_ratio(optimistic, even), ratio_interval(optimistic, even)[1] < 1.0
+    return ratio_estimate(optimistic, even), ratio_interval(optimistic, even)[1] < 1.0
 
 
 def _least_visited(every: list[Run]) -> Claim:
@@ -228,7 +237,7 @@ def _least_visited(every: list[Run]) -> Claim:
     together = np.argsort(sum(run.visits for run in every), kind="stable")[:3].tolist()
     text = (
         f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a run; "
-        f"visits over the mean of all states {told([run.hard_visits for run in every])}"
+        f"visits over the mean of all states {estimate([run.hard_visits for run in every])}"
     )
     return LEAST_VISITED.measured(text, set(together) == set(HARD))
 
@@ -236,7 +245,7 @@ def _least_visited(every: list[Run]) -> Claim:
 def _share(claim: Claim, every: list[Run], actions: Sequence[Action], holds: Callable[[float, float], bool]) -> Claim:
     """Whether the share of failures of each action holds, by its interval."""
     shares = {action: [run.share_failed([action]) for run in every] for action in actions}
-    text = ", ".join(f"{source}->{goal} {told(mine)}" for (source, goal), mine in shares.items())
+    text = ", ".join(f"{source}->{goal} {estimate(mine)}" for (source, goal), mine in shares.items())
     return claim.measured(f"fail {text}", all(holds(*interval(mine)) for mine in shares.values()))
 
 
@@ -253,7 +262,7 @@ def _by_discount(claim: Claim, grouped: Groups, number: Callable[[Run], float], 
 def _peaks(grouped: Groups) -> Claim:
     values = {discount: [run.relative_tries(FAILING) for run in grouped["60-40", discount]] for discount in DISCOUNTS}
     even = [run.relative_tries(FAILING) for discount in DISCOUNTS for run in grouped["50-50", discount]]
-    text = "tries over the mean of all: " + ", ".join(_by_discounts(values)) + f"; 50-50: {told(even)}"
+    text = "tries over the mean of all: " + ", ".join(_by_discounts(values)) + f"; 50-50: {estimate(even)}"
     return PEAKS.measured(text, all(interval(mine)[0] > 1.0 for mine in values.values()))
 
 
@@ -261,18 +270,18 @@ def _degree(every: list[Run]) -> Claim:
     goals = every[0].space.goals
     degree = np.bincount(goals[goals >= 0], minlength=len(goals))
     correlations = [float(spearmanr(degree, run.visits).statistic) for run in every]
-    return DEGREE.measured(f"rank correlation {told(correlations)}", interval(correlations)[0] > 0.5)
+    return DEGREE.measured(f"rank correlation {estimate(correlations)}", interval(correlations)[0] > 0.5)
 
 
 def _uniform(every: list[Run]) -> Claim:
     tries, visits = [relative_spread(run.tries[run.exists]) for run in every], [relative_spread(run.visits) for run in every]
-    text = f"standard deviation over mean: tries {told(tries)}, visits {told(visits)}"
+    text = f"standard deviation over mean: tries {estimate(tries)}, visits {estimate(visits)}"
     return UNIFORM.measured(text, decides(ratio_interval(tries, visits), most=1.0))
 
 
 def _stochastic(every: list[Run]) -> Claim:
     counts = [float(uncertain_in(run.space, run.seen)) for run in every]
-    text = f"{told(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
+    text = f"{estimate(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
     return STOCHASTIC.measured(text, interval(counts)[0] >= 1.0)
 
 

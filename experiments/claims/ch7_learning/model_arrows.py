@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from mobee import Lattice
+from mobee.arrays import Array, Ints
 from mobee.learning.neighbours import NO_ACTION
-from mobee.robot.robot import Array, Ints
 
 GAP = 4.6  # between blocks of states, in units of the distance inside
 COLOURED, SHOWN = 0.3, 0.08  # a state-action is coloured when an unforeseen state is that likely; its arrows begin there

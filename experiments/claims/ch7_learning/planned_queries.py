@@ -14,10 +14,11 @@ from experiments.kit.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_g
 from experiments.kit.control_runs import place
 from experiments.kit.rivals import PlannedOnce, Repaired, Rival
 from mobee import Lattice, Outcome, World, box
+from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.learning.planner import Plan, Planner
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 Paths = Sequence[tuple[int, ...]]  # the states of each query, from start to end
 

@@ -28,11 +28,11 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import explore
 from experiments.kit.plots import draw_curve, draw_points, new_figure
-from experiments.kit.statistics import interval, told
+from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent, TransitionModel
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 LEARNED, BEFORE = 4000, 2000  # transitions, in all and before the table enters
 AFTER = (0, 250, 500, 1000, 2000, 4000)  # transitions with the table that has entered
@@ -151,7 +151,7 @@ def tables(runs: Runs) -> dict[str, Any]:
         {
             "who": name,
             "table": test,
-            **{m: told(tested(runs, condition, test, m, mode)) for m in (OF_ALL if condition == "roadmap" else MEASURES)},
+            **{m: estimate(tested(runs, condition, test, m, mode)) for m in (OF_ALL if condition == "roadmap" else MEASURES)},
         }
         for (condition, mode), name in PLANNERS.items()
         for test in TESTS
@@ -160,7 +160,8 @@ def tables(runs: Runs) -> dict[str, Any]:
     for forgetting in ENTERS:
         after, rows = entering(runs, forgetting)
         entered += [
-            {"forgetting": forgetting, "transitions since": n, **{m: told(rows[m][:, i]) for m in MEASURES}} for i, n in enumerate(after)
+            {"forgetting": forgetting, "transitions since": n, **{m: estimate(rows[m][:, i]) for m in MEASURES}}
+            for i, n in enumerate(after)
         ]
     return {"carried out": tried, "since the table entered": entered}
 
@@ -180,7 +181,8 @@ def _fates(runs: Runs) -> Claim:
     counts = [run["fates"] for run in runs["still", None]]
     share = np.array([c["goal"] / c["tried"] for c in counts])
     elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
-    text = f"{told(share)} of those tried {TRIES} times reach their goal, {told(elsewhere)} lead elsewhere, {told(sometimes)} sometimes"
+    text = f"{estimate(share)} of those tried {TRIES} times reach their goal, "
+    text += f"{estimate(elsewhere)} lead elsewhere, {estimate(sometimes)} sometimes"
     return FATES.measured(text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0)
 
 
@@ -188,8 +190,8 @@ def _adapts(runs: Runs) -> Claim:
     after, rows = entering(runs, ENTERS[0])
     success, actions = rows["success"], rows["actions"]
     text = (
-        f"success {told(success[:, 0])} when it enters, {told(success[:, -1])} {after[-1]} transitions later;"
-        f" actions a query {told(actions[:, 0])} and {told(actions[:, -1])}"
+        f"success {estimate(success[:, 0])} when it enters, {estimate(success[:, -1])} {after[-1]} transitions later;"
+        f" actions a query {estimate(actions[:, 0])} and {estimate(actions[:, -1])}"
     )
     return ADAPTS.measured(text, interval(success[:, -1] - success[:, 0])[0] > 0.0 and interval(actions[:, 0] - actions[:, -1])[0] > 0.0)
 
@@ -197,8 +199,8 @@ def _adapts(runs: Runs) -> Claim:
 def _inoperable(runs: Runs) -> Claim:
     once, repairs = (tested(runs, "roadmap", "moving", "success", mode) for mode in ("planned once", "repairs"))
     text = (
-        f"success with the moving table: planned once {told(once)}, repaired when a motion fails {told(repairs)};"
-        f" the MDP trained while it moved {told(tested(runs, 'moving', 'moving', 'success'))}"
+        f"success with the moving table: planned once {estimate(once)}, repaired when a motion fails {estimate(repairs)};"
+        f" the MDP trained while it moved {estimate(tested(runs, 'moving', 'moving', 'success'))}"
     )
     low, high = interval(repairs)
     return INOPERABLE.measured(text, False if low > OPERABLE else True if high < OPERABLE else None)
@@ -208,7 +210,7 @@ def _less(claim: Claim, runs: Runs, measure: str, what: str) -> Claim:
     """Whether an arm that learned with the moving table has less of something there than one that learned without."""
     moving, still = (tested(runs, condition, "moving", measure) for condition in ("moving", "still"))
     low, high = interval(still - moving)
-    text = f"{what} with the moving table: {told(moving)}, trained without it {told(still)}; less by {told(still - moving)}"
+    text = f"{what} with the moving table: {estimate(moving)}, trained without it {estimate(still)}; less by {estimate(still - moving)}"
     return claim.measured(text, True if low > 0.0 else False if high < 0.0 else None)
 
 

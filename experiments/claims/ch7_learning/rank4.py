@@ -29,10 +29,10 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interval, mean_over, told
+from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent, Lattice
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 LEVELS = {"small": RANK4, "stretched": STRETCHED}
 ACTIONS = {"small": 14_597, "stretched": 26_963}
@@ -209,7 +209,7 @@ def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
 def measured(small: list[Run], stretched: list[Run]) -> list[Claim]:
     """The claims with our numbers, of the runs on both lattices."""
     uncertain, wide = [run.uncertain for run in small], [run.uncertain for run in stretched]
-    text = f"{told(uncertain, 0)} actions (stretched {told(wide, 0)}) fail in 10 to 90 % of their tries"
+    text = f"{estimate(uncertain, 0)} actions (stretched {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
     return [
         _never(small),
         _rare(small),
@@ -230,7 +230,7 @@ def _never(small: list[Run]) -> Claim:
 def _rare(small: list[Run]) -> Claim:
     visits = np.array([run.visits[list(HARDLY)] for run in small])
     others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in small)
-    text = f"{told(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
+    text = f"{estimate(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
     return RARE.measured(text, bool(visits.max() <= MOST_VISITS))
 
 
@@ -240,7 +240,7 @@ def _turned(small: list[Run]) -> Claim:
         ends = [ends_of(run.space, run.seen, source, goal) for run in small]
         aside = [found.get(end, 0) for found in ends]
         others = [sum(found.values()) - found.get(end, 0) for found in ends]
-        parts.append(f"{source}->{goal}: {told(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
+        parts.append(f"{source}->{goal}: {estimate(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
         holds = holds and min(aside) >= LEAST_ASIDE and max(others) <= HANDFUL
     return TURNED.measured("; ".join(parts), holds)
 
@@ -248,16 +248,18 @@ def _turned(small: list[Run]) -> Claim:
 def _stretch(small: list[Run], stretched: list[Run]) -> Claim:
     few, many = [len(run.unreached) for run in small], [len(run.unreached) for run in stretched]
     always = sorted(set.intersection(*(set(run.unreached) for run in stretched)))
-    text = f"{told(many, 0)} against {told(few, 0)}; in every run {' '.join(map(str, always))}"
+    text = f"{estimate(many, 0)} against {estimate(few, 0)}; in every run {' '.join(map(str, always))}"
     return STRETCH.measured(text, interval(many)[0] > 2.0 * interval(few)[1])
 
 
 def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
     shares = {name: [float(run.touched.mean()) for run in runs] for name, runs in (("20-80 %", small), ("stretched", stretched))}
-    text = ", ".join(f"{name}: {told([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
+    text = ", ".join(f"{name}: {estimate([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
     few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
     reached = [float(run.succeeded[run.touched].mean()) for run in stretched if run.touched.any()]
-    despite = f"stretched: {told([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+    despite = (
+        f"stretched: {estimate([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+    )
     return [
         CONTACTS.measured(text, min(few[0], many[0]) > MANY),
         MORE.measured(text, many[0] > 2.0 * few[1]),

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee import OfflinePlant, Outcome
+from mobee.arrays import Array
 from mobee.control.settle import SettleTest
-from mobee.robot.robot import Array
 
 
 @dataclass(frozen=True, slots=True)

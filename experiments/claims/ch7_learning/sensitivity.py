@@ -31,7 +31,8 @@ from experiments.kit.outcomes import ends_of, outcome_counts, visits_of
 from experiments.kit.plots import new_figure
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant
-from mobee.robot.robot import Ints, Robot
+from mobee.arrays import Ints
+from mobee.robot.robot import Robot
 
 LEVELS = {"rank4": RANK4, "rank3": RANK3}
 ACTIONS = {"rank4": 5_000, "rank3": 3_000}

@@ -58,10 +58,10 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import explore_together
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interquartile_mean, interval, mean_over, told
+from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 TRANSITIONS, QUICK = 18_000, 2_000  # a learner
 HANDFUL = 5  # states
@@ -210,7 +210,7 @@ def measured(runs: Runs) -> list[Claim]:
         FEW.measured(_most(curious), max(int(run.outcome_numbers.max()) for run in curious) <= HANDFUL),
         _detects(runs),
         TIME.measured(
-            f"{told([run.hours / 24.0 for run in curious])} days; computed in {told([run.result.seconds for run in curious], 0)} s",
+            f"{estimate([run.hours / 24.0 for run in curious])} days; computed in {estimate([run.result.seconds for run in curious], 0)} s",
             DAYS[0] <= mean_over(curious, lambda run: run.hours / 24.0) <= DAYS[1],
         ),
     ]
@@ -219,7 +219,7 @@ def measured(runs: Runs) -> list[Claim]:
 def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: float = -np.inf) -> Claim:
     """The curious agents at the table stand out from all the controls, and are above `least`."""
     values = {key[1:]: [number(run) for run in mine] for key, mine in runs.items() if key[0] == "tree"}
-    text = ", ".join(f"{explorer} at the {world} {told(mine, digits)}" for (explorer, world), mine in values.items())
+    text = ", ".join(f"{explorer} at the {world} {estimate(mine, digits)}" for (explorer, world), mine in values.items())
     ours = interval(values["curious", "table"])[0]
     controls = (interval(mine)[1] for key, mine in values.items() if key != ("curious", "table"))
     return claim.measured(text, ours > max(least, *controls))
@@ -227,7 +227,7 @@ def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: f
 
 def _similar(runs: Runs) -> Claim:
     found = {e: [agreement(by_goal(of_arms(*pair))) for pair in with_ghosts(runs, "tree", e)] for e in EXPLORERS}
-    text = ", ".join(f"{explorer} {told(values)}" for explorer, values in found.items())
+    text = ", ".join(f"{explorer} {estimate(values)}" for explorer, values in found.items())
     ours = interval(found["curious"])[0]
     return SIMILAR_ARMS.measured(text, ours > SIMILAR and all(ours > interval(found[e])[1] for e in EXPLORERS[1:]))
 
@@ -239,8 +239,9 @@ def _cyclic(runs: Runs) -> Claim:
     ours, theirs = (correlations([pair[which] for pair in pairs]) for which in (0, 1))
     here, there = at_second_peak(ours, theirs)
     text = (
-        f"around a lag of {WINDOW * second_peak(ours)} transitions {told(here)}, at the ghost {told(there)}; touching comes in bouts: "
-        f"{told(ours[:, 1])} at {WINDOW}, at the ghost {told(theirs[:, 1])}"
+        f"around a lag of {WINDOW * second_peak(ours)} transitions {estimate(here)}, at the ghost {estimate(there)}; "
+        "touching comes in bouts: "
+        f"{estimate(ours[:, 1])} at {WINDOW}, at the ghost {estimate(theirs[:, 1])}"
     )
     return CYCLES.measured(text, is_cyclic(ours, theirs))
 
@@ -260,7 +261,9 @@ def _detects(runs: Runs) -> Claim:
             return DETECTOR.measured("needs two seeds" if alone else f"{learner}: no action depends on other parts", None)
         values = {explorer: [one.at_all for one in mine] for explorer, mine in hits.items()}
         chance = interquartile_mean([one.chance for one in hits["curious"]])
-        parts.append(f"{learner}: " + ", ".join(f"{explorer} {told(mine)}" for explorer, mine in values.items()) + f", chance {chance:.2f}")
+        parts.append(
+            f"{learner}: " + ", ".join(f"{explorer} {estimate(mine)}" for explorer, mine in values.items()) + f", chance {chance:.2f}"
+        )
         least = interval(values["curious"])[0]
         holds = holds and least > 2.0 * chance and all(least > interval(values[explorer])[1] for explorer in EXPLORERS[1:])
     return DETECTOR.measured("; ".join(parts), holds)

@@ -20,7 +20,7 @@ from scipy.stats import spearmanr
 
 from experiments.claims.ch7_learning.table_runs import ARMS, EXPLORERS, Run, Runs, spaces, with_ghosts
 from experiments.kit.statistics import interval
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 TOP = 0.05  # of the actions
 BOUT = 2  # lags that slow change and bouts explain

@@ -18,8 +18,8 @@ from experiments.kit.cells import CellResult
 from experiments.kit.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
 from experiments.kit.sweep import Cells, grouped_by
 from mobee import Lattice, Model, World, box
-from mobee.collision.touch import links_moved
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
+from mobee.model.contact import links_moved
 
 PROPAGATIONS = ("tree", "part")  # contact forces reach the whole tree, or end at the root of a part
 EXPLORERS, WORLDS = ("curious", "least_tried", "random"), ("table", "ghost")

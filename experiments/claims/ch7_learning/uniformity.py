@@ -25,7 +25,17 @@ from experiments.kit.experiment import Experiment
 from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, gini, interquartile_mean, interval, mean_over, ratio, ratio_interval, relative_spread, told
+from experiments.kit.statistics import (
+    decides,
+    estimate,
+    gini,
+    interquartile_mean,
+    interval,
+    mean_over,
+    ratio,
+    ratio_interval,
+    relative_spread,
+)
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice
 
@@ -129,9 +139,9 @@ def _spike_claims(spikes: Mapping[str, list[float]]) -> list[Claim]:
     """Open where no action fails, so that there is nothing to compare."""
     if not all(spikes.values()):
         return [claim.measured("no action fails in more than half of its tries", None) for claim in (SPIKES, NONE)]
-    others = "; ".join(f"{e} {told(spikes[e])}" for e in EXPLORERS[1:])
+    others = "; ".join(f"{e} {estimate(spikes[e])}" for e in EXPLORERS[1:])
     return [
-        SPIKES.measured(told(spikes["curious"]), interval(spikes["curious"])[0] > SPIKE),
+        SPIKES.measured(estimate(spikes["curious"]), interval(spikes["curious"])[0] > SPIKE),
         NONE.measured(others, all(interval(spikes[e])[1] < SPIKE for e in EXPLORERS[1:])),
     ]
 
@@ -142,7 +152,7 @@ def _is_least(values: Mapping[str, list[float]]) -> bool:
 
 
 def _each(values: Mapping[str, list[float]]) -> str:
-    return ", ".join(f"{explorer} {told(values[explorer])}" for explorer in EXPLORERS)
+    return ", ".join(f"{explorer} {estimate(values[explorer])}" for explorer in EXPLORERS)
 
 
 TITLES = {"curious": "curious (AC)", "least_tried": "least tried (LT)", "random": "random (RAND)"}

@@ -12,8 +12,8 @@ from experiments.kit.arm_roadmap import Belief
 from experiments.kit.control_runs import place
 from experiments.kit.rivals import Rival
 from mobee import Lattice, Model, OfflinePlant, World, sphere
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Ints
 
 BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
 BALLS, RADIUS = 4, 0.03  # m

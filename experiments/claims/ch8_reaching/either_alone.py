@@ -33,10 +33,10 @@ from experiments.kit.plots import draw_bars, new_figure
 from experiments.kit.reaching.arm import LEARNED
 from experiments.kit.reaching.cases import METHODS, SCENES, attempt, make_cases, trained
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import interval, told
+from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 TRIES, CASES = 800, 40
 LAWS = ("published", "default")
@@ -100,9 +100,9 @@ def findings(found: Cells) -> dict[str, Any]:
     groups = grouped(found, "law", LAWS)
     rows = []
     for law, scene, method in product(groups, SCENES, METHODS):
-        row = {measure: told(means(groups, law, scene, method, measure)) for measure in ("success", "reward")}
-        missing = told([100.0 * float(np.median(values[f"{scene}|{method}|missing"])) for values in groups[law]], 1)
-        seconds = told(means(groups, law, scene, method, "seconds"), 1)
+        row = {measure: estimate(means(groups, law, scene, method, measure)) for measure in ("success", "reward")}
+        missing = estimate([100.0 * float(np.median(values[f"{scene}|{method}|missing"])) for values in groups[law]], 1)
+        seconds = estimate(means(groups, law, scene, method, "seconds"), 1)
         rows.append({"law": law, "scene": scene, "who": method, **row, "median missing [cm]": missing, "seconds": seconds})
     return {"claims": [claim.record() for claim in measured(groups)], "cases": rows}
 
@@ -122,7 +122,7 @@ def measured(groups: Groups) -> list[Claim]:
             claims.append(claim.measured("not measured", None))
             continue
         each = {method: means(groups, law, scene, method, MEASURE[law]) for method in METHODS}
-        numbers = ", ".join(f"{'both' if method == 'both' else method + ' alone'} {told(values)}" for method, values in each.items())
+        numbers = ", ".join(f"{'both' if method == 'both' else method + ' alone'} {estimate(values)}" for method, values in each.items())
         claims.append(
             claim.measured(f"{MEASURE[law]} {numbers}", does_more(each["both"], {method: each[method] for method in METHODS[:2]}))
         )

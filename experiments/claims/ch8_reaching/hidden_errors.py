@@ -13,9 +13,9 @@ from experiments.kit.reaching.arm import Errors, JudgedPlant, arm_belief, arm_pl
 from experiments.kit.reaching.belief import PeerBelief
 from experiments.kit.reaching.targets import grid, touchable, touchable_targets
 from mobee import World, sphere
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
-from mobee.robot.robot import Array
 
 WRONG = ("nothing", "planners", "everyone")
 """Whose knowledge is wrong: nobody's; the planners' alone; also MoBeE's, which sees the same wrong encoders and targets."""

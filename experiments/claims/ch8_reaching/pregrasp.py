@@ -28,13 +28,13 @@ from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.roadmap_task import RIGHT, build
-from experiments.kit.statistics import interquartile_mean, interval, told
+from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from experiments.kit.verdicts import rises
 from mobee import MobeeError, Model, Roadmap, World, cylinder
+from mobee.arrays import Array, Ints
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.playback import play
-from mobee.robot.robot import Array, Ints
 
 SPACINGS = (0.04, 0.025, 0.016, 0.011, 0.008)  # m
 QUERIES = 10
@@ -203,8 +203,8 @@ def findings(found: Cells) -> dict[str, Any]:
     groups = grouped(found, "spacing", SPACINGS)
     rows = [
         {"vertices": runs[0]["vertices"], "spacing_mm": 1e3 * spacing, "taken out": mode, "seeds": len(runs)}
-        | {"invalid edges": told([float(np.mean(values["invalid"])) for values in runs], 0)}
-        | {name: told(numbers(runs, mode, name)) for name in ("arrived", "bumps", "edges", "seconds")}
+        | {"invalid edges": estimate([float(np.mean(values["invalid"])) for values in runs], 0)}
+        | {name: estimate(numbers(runs, mode, name)) for name in ("arrived", "bumps", "edges", "seconds")}
         for spacing, runs in groups.items()
         for mode in MODES
     ]
@@ -226,7 +226,7 @@ def _of_played(groups: Groups) -> dict[str, Any]:
         "ways": len(every),
         "without a solid contact": int((solid == 0.0).sum()),
         "deepest_mm": 1e3 * float(solid.max()),
-        "palm_off_cm": told(100.0 * off, 1),
+        "palm_off_cm": estimate(100.0 * off, 1),
     }
 
 
@@ -237,12 +237,15 @@ def measured(groups: Groups) -> list[Claim]:
     first, *_, last = groups.values()
     seeds = range(min(map(len, groups.values())))
     everything = [float(np.mean([numbers(runs, "edge", "arrived")[seed] for runs in groups.values()])) for seed in seeds]
-    bumps = ", ".join(f"{runs[0]['vertices']}: {told(numbers(runs, 'edge', 'bumps'), 1)}" for runs in groups.values())
+    bumps = ", ".join(f"{runs[0]['vertices']}: {estimate(numbers(runs, 'edge', 'bumps'), 1)}" for runs in groups.values())
     few, many, around = (numbers(runs, mode, "bumps") for runs, mode in ((first, "edge"), (last, "edge"), (last, "around")))
     return [
-        COMES_PAST.measured(f"{told(everything)} of all queries arrive", float(np.mean(everything)) >= WELL),
+        COMES_PAST.measured(f"{estimate(everything)} of all queries arrive", float(np.mean(everything)) >= WELL),
         GROWS.measured(f"bumps a query by vertices {bumps}", _above(interval(many), interval(few))),
-        FEWER.measured(f"{told(around, 1)} instead of {told(many, 1)} bumps with {last[0]['vertices']} vertices", rises(many - around)),
+        FEWER.measured(
+            f"{estimate(around, 1)} instead of {estimate(many, 1)} bumps with {last[0]['vertices']} vertices",
+            rises(many - around),
+        ),
     ]
 
 

@@ -31,9 +31,9 @@ from experiments.kit.rivals import Learned, PlannedOnce, Repaired, Rival, Straig
 from experiments.kit.statistics import interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.roadmap.ompl_base import require_ompl
-from mobee.robot.robot import Array
+from mobee.roadmap.ompl import require_ompl
 
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60

@@ -34,13 +34,13 @@ from experiments.kit.plots import new_figure
 from experiments.kit.reaching.arm import MARKER, PART, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import learn
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.statistics import decides, interquartile_mean, interval, told
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from experiments.kit.verdicts import all_hold, better, changes, published_ratio, rises
 from mobee import Model
+from mobee.arrays import Array
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.robot.robot import Array
 
 REPETITIONS = 5  # of an evaluation
 COST = {"random": 2.0}
@@ -172,14 +172,14 @@ def _row(mine: Runs) -> dict[str, Any]:
     last = mine.checkpoints[-1]
     return {
         "seeds": len(mine),
-        "scores": {str(checkpoint): told(mine.scores(checkpoint)) for checkpoint in mine.checkpoints},
-        "agreement": {str(checkpoint): told(mine.agreement(checkpoint)) for checkpoint in mine.checkpoints},
-        "states_of_half_the_reaches": {str(checkpoint): told(mine.favourites(checkpoint), 1) for checkpoint in mine.checkpoints},
-        "pairs_tried": {str(checkpoint): told(mine.tried(checkpoint)) for checkpoint in mine.checkpoints},
+        "scores": {str(checkpoint): estimate(mine.scores(checkpoint)) for checkpoint in mine.checkpoints},
+        "agreement": {str(checkpoint): estimate(mine.agreement(checkpoint)) for checkpoint in mine.checkpoints},
+        "states_of_half_the_reaches": {str(checkpoint): estimate(mine.favourites(checkpoint), 1) for checkpoint in mine.checkpoints},
+        "pairs_tried": {str(checkpoint): estimate(mine.tried(checkpoint)) for checkpoint in mine.checkpoints},
         "favourites": np.argsort(-mine.chosen(last).mean(axis=0))[:5].tolist(),
-        "negative_rewards": told(mine.failures(), 0),
-        "actions_a_try": told(mine.actions()),
-        "robot_hours_of_5_runs": told(5.0 * mine.hours(), 1),
+        "negative_rewards": estimate(mine.failures(), 0),
+        "actions_a_try": estimate(mine.actions()),
+        "robot_hours_of_5_runs": estimate(5.0 * mine.hours(), 1),
         "seconds": interquartile_mean(mine.seconds),
     }
 
@@ -224,7 +224,7 @@ def _choices(runs: Mapping[str, Runs]) -> list[Claim]:
     text = f"they are in {named.sum():.0f} of {len(named)} runs; over all runs {favourite[0]} and {favourite[1]}"
     those = THOSE.measured(text, decides(interval(named, _means), least=0.5))
     height = runs["random"].height(6400)
-    return [agree, few, those, HIGH.measured(f"{told(100.0 * height, 1)} cm above the mean of all states", rises(height))]
+    return [agree, few, those, HIGH.measured(f"{estimate(100.0 * height, 1)} cm above the mean of all states", rises(height))]
 
 
 def _means(values: Array) -> Array:
@@ -236,10 +236,10 @@ def _exploration(runs: Mapping[str, Runs]) -> list[Claim]:
     tried, greedy = runs["intrinsic"].tried(3200), runs["greedy"].concentration(1600, 6400)
     text, verdicts = better({name: runs[name].tried(1600) for name in ("intrinsic", "greedy")}, "intrinsic", ("greedy",))
     return [
-        COMBINATIONS.measured(f"{told(tried)} of them", decides(interval(tried), least=NEARLY_ALL)),
+        COMBINATIONS.measured(f"{estimate(tried)} of them", decides(interval(tried), least=NEARLY_ALL)),
         REGIONS.measured(f"share tried: {text}", all_hold(verdicts)),
         LINES.measured(
-            f"{told(greedy)} of its reaches, intrinsic {told(runs['intrinsic'].concentration(1600, 6400))}",
+            f"{estimate(greedy)} of its reaches, intrinsic {estimate(runs['intrinsic'].concentration(1600, 6400))}",
             decides(interval(greedy), least=NEARLY_ALL),
         ),
     ]
@@ -250,7 +250,7 @@ def _costs(runs: Mapping[str, Runs]) -> list[Claim]:
     negative = NEGATIVE.measured(text, all_hold(verdicts))
     hours = {name: mine.hours() for name, mine in runs.items()}
     minutes = RUNS * sum(float(np.mean(mine.seconds)) for mine in runs.values()) / CORES / 60.0
-    said = ", ".join(f"{name} {told(RUNS * hours[name], 1)} h" for name in HOURS)
+    said = ", ".join(f"{name} {estimate(RUNS * hours[name], 1)} h" for name in HOURS)
     return [
         negative,
         published_ratio(TIME, hours["random"], hours["intrinsic"], TWICE, f"; 5 runs: {said}"),

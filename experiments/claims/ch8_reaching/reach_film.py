@@ -27,11 +27,11 @@ from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.kit.reaching.arm import LEARNED, MARKER, PART
 from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
+from mobee.arrays import Array
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget
-from mobee.robot.robot import Array
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60

@@ -30,12 +30,12 @@ from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_pl
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations
 from experiments.kit.reaching.targets import between, grid, targets_at
 from experiments.kit.reaching.truth import TRIES, Truth, measure, oracle, truth_of
-from experiments.kit.statistics import decides, interquartile_mean, interval, ratio, ratio_interval, told
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, ratio, ratio_interval
 from experiments.kit.sweep import grouped, run_cells, sweep_arguments
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.robot.robot import Array
 
 ORACLE, TRUTH = "oracle", "truth"
 RECOMMENDED = "gp-ucb-alike"  # by docs/reaching.md
@@ -176,10 +176,10 @@ def findings(found: Found) -> dict[str, Any]:
     """A row a learner and set, and the claims."""
     curves, at = fractions(found), evaluated_after(found)
     rows = {
-        f"{learner}, {_SETS[name]}": {str(checkpoint): told(column) for checkpoint, column in zip(at, curve.T, strict=True)}
+        f"{learner}, {_SETS[name]}": {str(checkpoint): estimate(column) for checkpoint, column in zip(at, curve.T, strict=True)}
         for (learner, name), curve in curves.items()
     }
-    best = {_SETS[name]: told(oracle_scores(found, name)) for name in (GRID, BETWEEN) if len(oracle_scores(found, name))}
+    best = {_SETS[name]: estimate(oracle_scores(found, name)) for name in (GRID, BETWEEN) if len(oracle_scores(found, name))}
     seconds = {
         learner: interquartile_mean([one.seconds for one in found.values() if one.cell.settings["what"] == learner])
         for learner in {one.cell.settings["what"] for one in found.values()}
@@ -200,13 +200,13 @@ def measured(curves: Fractions, at: list[int]) -> list[Claim]:
         if ours is None:
             claims.append(claim)
             continue
-        beside = "" if published is None else f"; the published predictor {told(published)}"
-        claims.append(claim.measured(f"{RECOMMENDED} {told(ours)}{beside}", decides(interval(ours), least=AIMS[name, checkpoint])))
+        beside = "" if published is None else f"; the published predictor {estimate(published)}"
+        claims.append(claim.measured(f"{RECOMMENDED} {estimate(ours)}{beside}", decides(interval(ours), least=AIMS[name, checkpoint])))
     ours, published = (_column(curves, at, learner, GRID, 400) for learner in (RECOMMENDED, PUBLISHED))
     if ours is None or published is None:
         return [*claims, ABOVE]
     low, high = ratio_interval(ours, published)
-    text = f"{ratio(ours, published):.2f} x [{low:.2f}, {high:.2f}] ({RECOMMENDED} {told(ours)}, published {told(published)})"
+    text = f"{ratio(ours, published):.2f} x [{low:.2f}, {high:.2f}] ({RECOMMENDED} {estimate(ours)}, published {estimate(published)})"
     return [*claims, ABOVE.measured(text, decides((low, high), least=TIMES))]
 
 

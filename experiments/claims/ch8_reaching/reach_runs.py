@@ -11,9 +11,9 @@ import numpy as np
 from experiments.kit.cells import CellResult
 from experiments.kit.reaching.arm import MARKER, reach_space
 from experiments.kit.reaching.targets import grid
+from mobee.arrays import Array, Ints
 from mobee.learning.reaching.evaluation import NOWHERE
 from mobee.learning.reaching.where import hands_of
-from mobee.robot.robot import Array, Ints
 
 STRATEGIES = ("intrinsic", "greedy", "random")
 CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated

@@ -34,13 +34,13 @@ from experiments.kit.reaching.arm import LEARNED, PART, JudgedPlant, arm_belief
 from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained
 from experiments.kit.reaching.planner_peer import PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import decides, interquartile_mean, interval, told
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import MotorParameters
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.reach import reward_of
-from mobee.roadmap.ompl_base import require_ompl
-from mobee.robot.robot import Array
+from mobee.roadmap.ompl import require_ompl
 
 TRIES, CASES, QUERIES = 800, 40, 20
 NOISE = np.deg2rad(0.5)  # rad
@@ -130,9 +130,9 @@ def findings(found: Cells) -> dict[str, Any]:
         {
             "scene": scene,
             "who": contestant,
-            "success": told(of_cases(cases, scene, contestant, "success")),
-            "seconds": told(of_cases(cases, scene, contestant, "seconds"), 1),
-            "planning [ms]": told(1000.0 * of_cases(cases, scene, contestant, "thinking"), 1),
+            "success": estimate(of_cases(cases, scene, contestant, "success")),
+            "seconds": estimate(of_cases(cases, scene, contestant, "seconds"), 1),
+            "planning [ms]": estimate(1000.0 * of_cases(cases, scene, contestant, "thinking"), 1),
         }
         for scene in SCENES
         for contestant in CONTESTANTS
@@ -141,7 +141,7 @@ def findings(found: Cells) -> dict[str, Any]:
     return {
         "claims": [claim.record() for claim in measured(cases, arms)],
         "cases": rows,
-        "both arms": {name: told(values, 3) if len(values) else None for name, values in numbers.items()},
+        "both arms": {name: estimate(values, 3) if len(values) else None for name, values in numbers.items()},
         "within [m]": GOOD,
     }
 
@@ -167,7 +167,7 @@ def measured(cases: Runs, arms: Runs) -> list[Claim]:
     for scene, claim in NO_WORSE.items():
         learner, peer = (of_cases(cases, scene, contestant, "success") for contestant in CONTESTANTS)
         times = [f"{1000.0 * interquartile_mean(of_cases(cases, scene, contestant, 'thinking')):.1f} ms" for contestant in CONTESTANTS]
-        text = f"success {told(learner)}, peer {told(peer)}; planning a try {times[0]}, peer {times[1]}"
+        text = f"success {estimate(learner)}, peer {estimate(peer)}; planning a try {times[0]}, peer {times[1]}"
         claims.append(claim.measured(text, decides(interval(learner - peer), least=-EVEN)))
     share = np.array([values["found"].mean() for values in arms])
     for claim, measure, published in ((TOO_SLOW, "seconds", FEASIBLE), (SLOW_SMOOTHING, "smoothing", SMOOTHED)):
@@ -175,7 +175,7 @@ def measured(cases: Runs, arms: Runs) -> list[Claim]:
         if not len(took):
             claims.append(claim.measured("no way was found", None))
             continue
-        text = f"{told(took, 3)} s of processor time with a compiled test of poses; a way is found in {told(share)} of the queries"
+        text = f"{estimate(took, 3)} s of processor time with a compiled test of poses; a way is found in {estimate(share)} of the queries"
         claims.append(claim.measured(text, decides(interval(took), least=SLOW * published)))
     return claims
 

@@ -30,17 +30,17 @@ from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.statistics import decides, interval, told
+from experiments.kit.statistics import decides, estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from experiments.kit.truth import Truth, l1, truth_of, walk
 from experiments.kit.verdicts import all_hold, rises
 from mobee import TransitionModel
+from mobee.arrays import Array, Ints
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachOutcome, ReachPlant, ReachTarget
-from mobee.robot.robot import Array, Ints
 
 CHECKPOINTS = (500, 1000, 1500, 2000, 3000, 3500, 4000)  # actions after which everybody is evaluated
 QUICK = (500, 1000, 2000)
@@ -235,24 +235,24 @@ def measured(runs: Mapping[str, Runs]) -> list[Claim]:
         ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[variant]))
         text = f"{_actions_text(ours)} against {_actions_text(theirs)} actions to a score of {least:.1f}"
         found.append(claim.measured(text, no_more(ours, theirs)))
-    text = "score " + ", ".join(f"{variant} {told(ends[variant])}" for variant in (CONTACT, *FIRST))
+    text = "score " + ", ".join(f"{variant} {estimate(ends[variant])}" for variant in (CONTACT, *FIRST))
     found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[variant] for variant in FIRST])))
     errors = {variant: runs[variant].errors[:, -1] for variant in (CONTACT, "model", "target")}
-    text = "L1 " + ", ".join(f"{variant} {told(values, 3)}{_of_observed(runs[variant])}" for variant, values in errors.items())
+    text = "L1 " + ", ".join(f"{variant} {estimate(values, 3)}{_of_observed(runs[variant])}" for variant, values in errors.items())
     found.append(CLEAN.measured(text, rises(errors["model"] - errors[CONTACT])))
-    text = "score " + ", ".join(f"{variant} {told(ends[variant])}" for variant in (CONTACT, "target", "model"))
+    text = "score " + ", ".join(f"{variant} {estimate(ends[variant])}" for variant in (CONTACT, "target", "model"))
     found.append(HEARD.measured(text, rises(ends[CONTACT] - ends["target"])))
     return found
 
 
 def _actions_text(needed: Array) -> str:
     never = int(np.isinf(needed).sum())
-    return f"never in {never} of {len(needed)} runs" if never else told(needed, 0)
+    return f"never in {never} of {len(needed)} runs" if never else estimate(needed, 0)
 
 
 def _of_observed(mine: Runs) -> str:
     last = mine.observed[:, -1]
-    return f" ({told(last, 3)} of transitions observed)" if np.isfinite(last).all() else ""
+    return f" ({estimate(last, 3)} of transitions observed)" if np.isfinite(last).all() else ""
 
 
 def actions_to(least: float, actions: Ints, scores: Array) -> Array:
@@ -306,13 +306,17 @@ def _observed(believed: _Beliefs) -> Array:
 
 
 def _row(variant: str, mine: Runs) -> dict[str, Any]:
-    row: dict[str, Any] = {"way": variant, "problem-tries": told(mine.tries, 0), "failed transitions": told(mine.failed, 0)}
+    row: dict[str, Any] = {
+        "way": variant,
+        "problem-tries": estimate(mine.tries, 0),
+        "failed transitions": estimate(mine.failed, 0),
+    }
     for n, checkpoint in enumerate(mine.actions.tolist()):
         if np.isfinite(mine.scores[:, n]).all():
-            row[f"score at {checkpoint}"] = told(mine.scores[:, n])
+            row[f"score at {checkpoint}"] = estimate(mine.scores[:, n])
     for n, checkpoint in enumerate(mine.actions.tolist()):
         if np.isfinite(mine.errors[:, n]).all():
-            row[f"L1 at {checkpoint}"] = told(mine.errors[:, n], 3) + (_of_observed(mine) if n == len(mine.actions) - 1 else "")
+            row[f"L1 at {checkpoint}"] = estimate(mine.errors[:, n], 3) + (_of_observed(mine) if n == len(mine.actions) - 1 else "")
     return row
 
 

@@ -14,8 +14,8 @@ from experiments.kit.control_runs import place
 from experiments.kit.reaching.arm import body
 from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, shortened
 from mobee import Gains, Model, OfflinePlant, World, box, cylinder
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 JOINTS = 6  # of each arm: all but the last of the wrist
 SIDES = {"right_arm": 1.0, "left_arm": -1.0}

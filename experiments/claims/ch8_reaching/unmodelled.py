@@ -35,13 +35,13 @@ from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import PART, learned_transitions, reach_agent, space
 from experiments.kit.reaching.planner_peer import ENDS, MEMORIES, Memory, PeerTry, PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import decides, interquartile_mean, interval, told
+from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from experiments.kit.verdicts import all_hold
-from mobee.learning.reaching.problems import Problems
+from mobee.arrays import Array
+from mobee.learning.reaching.tries import Problems
 from mobee.reach import ReachTarget
-from mobee.roadmap.ompl_base import require_ompl
-from mobee.robot.robot import Array
+from mobee.roadmap.ompl import require_ompl
 
 TRIES = (5, 25, 50, 100, 200, 400, 800)  # after which they are evaluated
 REPETITIONS = 2  # of all targets, an evaluation
@@ -238,11 +238,11 @@ def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
     found = _of(done, contestant, wrong)
     last = [one.values["rows"][-1] for one in found]
     points, values = success(done, contestant, wrong)
-    row = {"hidden from": wrong, "who": contestant} | {f"success at {n}": told(values[:, i]) for i, n in enumerate(points)}
-    row |= {fate: told([one["fates"][i] for one in last]) for i, fate in enumerate(FATES) if i}
-    row |= {name: told([one[name] for one in last], 1) for name in ("seconds", "actions", "hours")}
+    row = {"hidden from": wrong, "who": contestant} | {f"success at {n}": estimate(values[:, i]) for i, n in enumerate(points)}
+    row |= {fate: estimate([one["fates"][i] for one in last]) for i, fate in enumerate(FATES) if i}
+    row |= {name: estimate([one[name] for one in last], 1) for name in ("seconds", "actions", "hours")}
     if contestant != "learner":
-        row["planning a try [ms]"] = told([1000.0 * float(np.median(one.values["planning"])) for one in found], 1)
+        row["planning a try [ms]"] = estimate([1000.0 * float(np.median(one.values["planning"])) for one in found], 1)
     return row
 
 
@@ -282,8 +282,8 @@ def _against(done: Cells, claim: Claim, wrong: str, by: int, least: float) -> Cl
     at = tries.index(by)
     theirs = {memory: success(done, memory, wrong)[1][:, at] for memory in MEMORIES}
     leads = {memory: learner[:, at] - values for memory, values in theirs.items()}
-    text = f"learner {told(learner[:, at])}; peer that remembers " + "; ".join(
-        f"{memory} {told(theirs[memory])}, lead {told(leads[memory])}" for memory in MEMORIES
+    text = f"learner {estimate(learner[:, at])}; peer that remembers " + "; ".join(
+        f"{memory} {estimate(theirs[memory])}, lead {estimate(leads[memory])}" for memory in MEMORIES
     )
     return claim.measured(text, verdict({memory: leads[memory] for memory in ("none", "blocked")}, least))
 
@@ -293,7 +293,7 @@ def _perfect(done: Cells) -> Claim:
     values = success(done, "none", WRONG[0])[1]
     if not len(learner) or not len(values):
         return CLAIMS[4].measured("not measured", None)
-    text = f"peer {told(values[:, -1])}, learner after {tries[-1]} tries {told(learner[:, -1])}"
+    text = f"peer {estimate(values[:, -1])}, learner after {tries[-1]} tries {estimate(learner[:, -1])}"
     return CLAIMS[4].measured(text, decides(interval(values[:, -1]), least=PERFECT))
 
 

@@ -21,12 +21,13 @@ from experiments.kit.arm_learning import robot as published_robot
 from experiments.kit.exploration import begin_anywhere, explore
 from experiments.kit.reaching.belief import PeerBelief
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachPlant, ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 PART, MARKER = "right_arm", "right_palm"
 LEARNED = 3000  # curious transitions, after which the lattice was known (thesis 7.2.2: 2987)

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee import Gains, Model, sphere
-from mobee.pose import Pose
+from mobee.arrays import Array, Ints
+from mobee.model.pose import Pose
 from mobee.reach import TARGET, ReachTarget
-from mobee.roadmap.ompl_base import EXTENSIONS, connected
-from mobee.robot.robot import Array, Clause, Ints
+from mobee.roadmap.ompl import EXTENSIONS, connected
+from mobee.robot.robot import Clause
 
 STEP = 0.02  # of a motor's range, between two poses of a motion that are checked
 NEAR = 0.08  # of the motors' ranges: a pose that near to one where a motion was blocked counts as blocked

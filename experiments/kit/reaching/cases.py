@@ -13,10 +13,10 @@ from experiments.kit.reaching.belief import PeerBelief, approach
 from experiments.kit.reaching.learning import Course
 from experiments.kit.reaching.targets import GOOD, touchable, touchable_targets
 from mobee import MotorParameters, OfflinePlant, World, sphere
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import RADIUS, ReachTarget, reward_of
-from mobee.robot.robot import Array
 
 SCENES = ("free", "around", "against", "between", "moving")
 """From anywhere; the hand behind the target; the hand at it, and not with the palm; a ball between hand and target; a target that moves."""

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.acting import move
-from mobee.learning.reaching.evaluation import NOWHERE, Evaluation
+from mobee.learning.reaching.evaluation import NOWHERE, Evaluation, move
 from mobee.learning.reaching.failures import has_failed
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Try
 from mobee.plant import Plant
 from mobee.reach import ReachTarget
-from mobee.robot.robot import Array, Ints
 
 LIMIT = 10  # actions of a try, its reach included
 

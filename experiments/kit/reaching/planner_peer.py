@@ -16,9 +16,10 @@ import numpy as np
 
 from experiments.kit.reaching.belief import NEAR, Care, PeerBelief, goals, rrt_connect, shortened
 from experiments.kit.reaching.targets import GOOD
+from mobee.arrays import Array
 from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 

@@ -24,8 +24,9 @@ from experiments.kit.arm_learning import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART, arm_belief, laws
 from experiments.kit.reaching.belief import PeerBelief, goals
 from mobee import Model
+from mobee.arrays import Array
 from mobee.reach import RADIUS, Aim, ReachTarget
-from mobee.robot.robot import Array, Clause
+from mobee.robot.robot import Clause
 
 GOOD = 0.02  # m from the surface, within which a target counts as reached, as in `mobee reach`
 COUNT = 27
@@ -65,7 +66,7 @@ def nearest_pose(
     """The nearest pose by least squares (SLSQP) from random poses; it stops at the first within `good` m of the place.
 
     Kinematics alone: no planner, no law.  The named motors move within their limits, the others are at home; unlike with
-    `mobee.reachable`, the clauses of their part hold.  Place (3,) m, root frame.
+    `mobee.roadmap.reachable`, the clauses of their part hold.  Place (3,) m, root frame.
     """
     robot = model.robot
     columns = np.array([robot.motor_index(name) for name in joints])

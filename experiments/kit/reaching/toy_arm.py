@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from experiments.kit.arm_learning import RIGHT, arm_space
 from mobee import Lattice
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.draws import Draws
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.table import ReachTable
 from mobee.learning.tabular import ideal
 from mobee.reach import ReachOutcome, ReachTarget, reward_of
-from mobee.robot.robot import Array
 
 UPPER, FORE = 0.152, 0.20  # m: shoulder to elbow, elbow to palm
 TETHER = 0.5  # rad: how far a reach leaves its pose, a joint

@@ -19,13 +19,13 @@ import numpy as np
 
 from experiments.kit.reaching.arm import MARKER, laws, reach_plant, reach_space
 from mobee import OfflinePlant, Space
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION
-from mobee.learning.reaching.acting import move, reach
+from mobee.learning.reaching.evaluation import move, reach
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachTarget
-from mobee.robot.robot import Array, Ints
 
 TRIES = 5  # of everything
 SEED = 9001  # no learner has it

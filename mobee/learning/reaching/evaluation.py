@@ -1,4 +1,4 @@
-"""How well a learner reaches by now, without leaving a trace in it (thesis 8.3.3)."""
+"""Evaluates a reach learner without changing it (thesis 8.3.3)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.acting import move, reach
 from mobee.learning.reaching.failures import has_failed
-from mobee.reach import ReachTarget, reward_of
-from mobee.robot.robot import Array, Ints
+from mobee.learning.space import Space
+from mobee.plant import Outcome, Plant
+from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, reward_of
 
 if TYPE_CHECKING:
     from mobee.learning.reaching.reach_agent import ReachAgent
+
+
+def move(plant: Plant, space: Space, state: int, action: int) -> tuple[Outcome, int]:
+    """Make a transition: how it ended, and in which state."""
+    outcome = plant.act(space.part, space.target(space.goal(state, action)))
+    return outcome, space.state_of(outcome.q[space.columns])
+
+
+def reach(plant: ReachPlant, space: Space, marker: str) -> tuple[ReachOutcome, int]:
+    """Reach for what is presented: how it ended, and the state in which the part came to rest afterwards."""
+    outcome = plant.reach(space.part, marker)
+    return outcome, space.state_of(outcome.after.q[space.columns])
+
 
 NOWHERE = -1  # instead of a state
 

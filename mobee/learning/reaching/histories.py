@@ -1,15 +1,28 @@
-"""What each action brought on which target, and averages of that, weighted by how near the targets were (thesis eqs. 8.1, 8.5, 8.7)."""
+"""Histories of values by state and target, and their averages weighted by distance (thesis eqs. 8.1, 8.5, 8.7)."""
 
 from __future__ import annotations
 
 from functools import cache
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.room import room_for
-from mobee.robot.robot import Array
+from mobee.learning.transitions import Scalar
+
+
+def room_for(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
+    """The array, or a copy twice as long where it has no such index."""
+    return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
+
+
+def forget(found: dict[bytes, Any], most: int) -> None:
+    """Delete the entries that were put in first, so that there are fewer than `most`; who puts back what is used keeps the newest."""
+    while len(found) >= most:
+        del found[next(iter(found))]
 
 
 class Histories:

@@ -1,21 +1,20 @@
-"""A learner of reaches, made again from its record."""
+"""Rebuilds a reach learner from its record."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+from mobee.arrays import Array
 from mobee.errors import MobeeError, UnknownName
-from mobee.learning.learned import load_learned
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore, reaching_parts
 from mobee.learning.reaching.where import reaches_of
-from mobee.learning.recorded import space_from
+from mobee.learning.record import load_learned, space_from
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.reach import ReachPlant
-from mobee.robot.robot import Array
 from mobee.store import TransitionStore
 
 

@@ -1,12 +1,12 @@
-"""Plans that end in a reach: every state has one more action, which pays and after which nothing follows (thesis 8.2, 8.3.1)."""
+"""Plans that end in a reach: a further action of every state, after which the episode ends (thesis 8.2, 8.3.1)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
-from mobee.robot.robot import Array, Ints
 
 REACH = -1  # the reach action of a state, on record and among its action values
 TOLERANCE = 1e-6  # of values; the largest are about 1

@@ -1,14 +1,13 @@
-"""The agent that learns from which poses to reach for what, and how to get there (thesis chapter 8)."""
+"""The agent that learns from which pose each target is best reached, and a path there (thesis chapter 8)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue
-from mobee.learning.reaching.acting import move, reach
-from mobee.learning.reaching.evaluation import Evaluation, evaluate
-from mobee.learning.reaching.learner import ReachLearner
-from mobee.learning.reaching.plan import ReachPlan, way_to_reach
+from mobee.learning.reaching.evaluation import Evaluation, evaluate, move, reach
+from mobee.learning.reaching.learner import ReachLearner, ReachPlan, way_to_reach
 from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.predictors import Reaches, RewardPredictor
 from mobee.learning.reaching.predictors.predictor import SCALE
@@ -21,7 +20,6 @@ from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, reward_of
-from mobee.robot.robot import Array
 
 
 class ReachAgent(ReachLearner):

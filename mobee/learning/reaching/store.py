@@ -1,4 +1,4 @@
-"""Learned reaches on disk, in the file of a run: every action is committed before the next one (DESIGN section 8)."""
+"""Stores the steps of a reach learner in the file of a run; each is on disk before the next action."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from mobee.agent_file import AgentFile
 from mobee.database import explained, opened, transaction
 from mobee.errors import MobeeError
 from mobee.learning.reaching.tries import Step
 from mobee.reach import ReachTarget
+from mobee.store import AgentFile
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS reach_problems (

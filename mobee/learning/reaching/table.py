@@ -1,4 +1,4 @@
-"""A world given as tables in which one can also reach, at once: for tests, and for worlds whose truth is known."""
+"""A tabular plant with reaches, for tests and for worlds whose truth is known."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.draws import Draws
 from mobee.learning.space import Space
 from mobee.learning.tabular import TabularPlant
 from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachOutcome, ReachTarget
-from mobee.robot.robot import Array
 
 World = Callable[[Array], tuple[Array, Array]]
 

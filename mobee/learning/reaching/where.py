@@ -1,14 +1,14 @@
-"""Where a marker is in each state of a space, and how the joints move it there."""
+"""Computes the marker's position and Jacobian in each state of a space."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors.predictor import SCALE, Reaches
 from mobee.learning.space import Space
-from mobee.model import Model
-from mobee.robot.robot import Array
+from mobee.model.model import Model
 
 
 def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:

@@ -1,1 +1,1 @@
-"""Maps that adapt to what the robot meets (thesis 4.2, 4.3, 9.4.5)."""
+"""Adaptive roadmaps (thesis 4.2, 4.3, 9.4.5)."""

@@ -1,4 +1,4 @@
-"""Adaptive roadmaps: maps that hold every motion for possible until it failed (thesis 4.2)."""
+"""Adaptive roadmaps: every edge counts as free until a motion along it has failed (thesis 4.2)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, MobeeError
-from mobee.learning.edge_table import Edges, edges_of, joined, table_of
-from mobee.learning.exploit import target_states
-from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.goal import target_states
+from mobee.learning.neighbours import NO_ACTION, Edges, edges_of, joined, table_of
 from mobee.learning.space import Space
 from mobee.roadmap.adaptive.edge_beliefs import EdgeBeliefs, Mode
-from mobee.robot.robot import Array, Ints
 
 NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)
 

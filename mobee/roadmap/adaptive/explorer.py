@@ -1,4 +1,4 @@
-"""Who finds out which edges of an optimistic map work (thesis 4.3.1)."""
+"""Explores which edges of an optimistic roadmap are free (thesis 4.3.1)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.learning.draws import Draws
 from mobee.plant import Plant
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
-from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import NEAR, Walker
-from mobee.robot.robot import Array
 
 QUERIES = 3  # ways to one vertex that are asked for, before it is given up
 

@@ -1,4 +1,4 @@
-"""Who walks on an adaptive map: acts through a plant, sees which edges work, and plans anew at once (thesis 4.2, 4.3.2)."""
+"""Moves a robot along an adaptive roadmap, observes which edges are free and replans (thesis 4.2, 4.3.2)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
-from mobee.learning.exploit import target_states
+from mobee.learning.goal import target_states
 from mobee.plant import Outcome, Plant
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
-from mobee.roadmap.adaptive.map_record import MapRecord
-from mobee.roadmap.adaptive.map_store import MapStore
-from mobee.robot.robot import Array
+from mobee.roadmap.adaptive.record import MapRecord, MapStore
 
 NEAR = 0.15  # rad: within so much of a vertex in every joint the part is there
 DOORS = 5  # nearest vertices that are tried when it is beside the map

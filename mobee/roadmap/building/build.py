@@ -1,4 +1,4 @@
-"""Task-relevant roadmaps: poses that meet some costs, spread over a task space, and the motions between them (thesis 3.3)."""
+"""Builds task-relevant roadmaps: poses that satisfy some costs, spread over a task space, and motions between them (thesis 3.3)."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
-from mobee.roadmap.building.draft import Draft, Progress
+from mobee.model.model import Model
+from mobee.roadmap.building.draft import Draft, Progress, request
 from mobee.roadmap.building.flood import Flood
 from mobee.roadmap.building.front import Front
 from mobee.roadmap.building.growth import Growth
 from mobee.roadmap.building.judge import Judge
-from mobee.roadmap.building.request import request
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.ik.costs import collision
 from mobee.roadmap.ik.ngik import METHODS
 from mobee.roadmap.ik.problem import Cost, Problem
 from mobee.roadmap.ik.term import Term
 from mobee.roadmap.roadmap import Roadmap
-from mobee.robot.robot import Array
 
 LONGEST = 0.4  # rad
 WORKERS = 4  # threads at most

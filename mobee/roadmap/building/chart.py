@@ -1,13 +1,107 @@
-"""What a growing map knows of its task space, in units of the spacing: vertices, expansion weights, what is free around them."""
+"""The explored part of a task space: vertices, expansion weights, covered region."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from typing import Any
 
-from mobee.roadmap.building.directions import directions
-from mobee.roadmap.building.region import Flags, Region, inside
-from mobee.roadmap.building.rows import Rows
-from mobee.robot.robot import Array, Ints
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from mobee.arrays import Array, Ints
+
+
+class Rows:
+    """Rows of one shape; `all` is a view of those there are."""
+
+    def __init__(self, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> None:
+        self._room: NDArray[Any] = np.empty((64, *shape), dtype=dtype)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def all(self) -> NDArray[Any]:
+        """The rows (N, ...), to be read and written; not to be kept over an `append`."""
+        return self._room[: self._count]
+
+    def append(self, row: object) -> None:
+        """Add a row at the end."""
+        if self._count == len(self._room):
+            self._room = np.concatenate([self._room, np.empty_like(self._room)])
+        self._room[self._count] = row
+        self._count += 1
+
+
+COUNT = {1: 2, 2: 24, 3: 64}  # of a task space of so many dimensions; more dimensions: 128
+_MOST = 128
+
+
+def directions(dimensions: int) -> Array:
+    """Unit vectors (D, dimensions): both in 1-D, a circle in 2-D, a spiral over the sphere in 3-D, drawn and opposite ones beyond."""
+    count = COUNT.get(dimensions, _MOST)
+    if dimensions == 1:
+        return np.array([[1.0], [-1.0]])
+    if dimensions == 2:
+        angle = 2.0 * math.pi * np.arange(count) / count
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if dimensions == 3:
+        height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+        turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
+        radius = np.sqrt(1.0 - height**2)
+        return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+    drawn = np.random.default_rng(0).standard_normal((count // 2, dimensions))
+    half: Array = drawn / np.sqrt((drawn**2).sum(axis=1, keepdims=True))
+    return np.concatenate([half, -half])
+
+
+Flags = NDArray[np.bool_]
+
+FLAT = 0.05  # |det| of the edges, in spacings: flatter simplices cover nothing
+REACH = 2.0  # spacings from a simplex's origin within which all of it lies
+_EDGE = 1e-9  # barycentric: what lies on the border is inside
+
+
+class Region:
+    """Simplices in units of the spacing, each an origin and the inverse of its edges."""
+
+    def __init__(self, dimensions: int) -> None:
+        self._origins = Rows((dimensions,))
+        self._inverses = Rows((dimensions, dimensions))
+
+    def __len__(self) -> int:
+        return len(self._origins)
+
+    def add(self, corners: Array) -> Array | None:
+        """Cover the simplex of corners (m + 1, m), the first its origin; its inverse (m, m), None where it is flat and nothing is added."""
+        edges = (corners[1:] - corners[0]).T
+        if abs(np.linalg.det(edges)) < FLAT:
+            return None
+        inverse: Array = np.linalg.inv(edges)
+        self._origins.append(corners[0])
+        self._inverses.append(inverse)
+        return inverse
+
+    def covers(self, places: Array) -> Flags:
+        """Which of the places (N, m), near to each other, are inside some simplex, (N,) bool."""
+        covered: Flags = np.zeros(len(places), dtype=bool)
+        if not len(self._origins) or not len(places):
+            return covered
+        low, high = places.min(axis=0) - REACH, places.max(axis=0) + REACH
+        origins = self._origins.all
+        near = np.flatnonzero(((origins >= low) & (origins <= high)).all(axis=1))
+        if len(near):
+            covered |= inside(places[:, None], origins[near], self._inverses.all[near]).any(axis=1)
+        return covered
+
+
+def inside(places: Array, origins: Array, inverses: Array) -> Flags:
+    """Whether places (..., m) lie in simplices of origins (..., m) and inverse edges (..., m, m), by their barycentric coordinates."""
+    weights = np.einsum("...ij,...j->...i", inverses, places - origins)
+    found: Flags = (weights >= -_EDGE).all(axis=-1) & (weights.sum(axis=-1) <= 1.0 + _EDGE)
+    return found
+
 
 NEAREST = 0.8  # spacings: no two vertices are nearer
 FIRST, OTHERS = 1.25, 1.5  # no new vertex is further from its nearest, and from its n nearest

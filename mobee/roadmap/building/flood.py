@@ -1,21 +1,90 @@
-"""Maps by least squares: a lattice of task points is filled outward from the first pose, each point from the posture of a neighbour."""
+"""Roadmaps by least squares: fills a lattice of task points outward from the first pose."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.roadmap.building.alike import made_alike
-from mobee.roadmap.building.flood_points import FloodPoints, Missed
-from mobee.roadmap.building.goals import Goals
+from mobee.arrays import Array, Ints
+from mobee.roadmap.building.goals import Goals, made_alike
 from mobee.roadmap.building.lattice_points import LatticePoints, Point
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.ik.problem import Problem
-from mobee.robot.robot import Array
+
+
+@dataclass(slots=True, eq=False)
+class Missed:
+    """A point that was not reached so far: the least bad posture (n,), what is wrong with it, how often it is still to be tried."""
+
+    q: Array
+    wrong: float
+    left: int
+
+
+class FloodPoints:
+    """Points by what is known of them.
+
+    `vertex`: the number of a point's vertex.  `q`, `y`: of the vertices.  `untried`: points beside vertices, and of which of these the
+    posture is still to be tried.  `missed`: those that were not reached so far.  `between`: points off the lattice that were or are to be
+    tried.
+    """
+
+    def __init__(self, motors: int, coordinates: int) -> None:
+        self._motors, self._coordinates = motors, coordinates
+        self.vertex: dict[Point, int] = {}
+        self.q: list[Array] = []
+        self.y: list[Array] = []
+        self.untried: dict[Point, list[int]] = {}
+        self.missed: dict[Point, Missed] = {}
+        self.between: set[Point] = set()
+
+    def vertices(self) -> tuple[Ints, Array, Array]:
+        """The points (V, m) of the vertices, their poses (V, n) rad and task points (V, m)."""
+        q = np.array(self.q, dtype=np.float64).reshape(-1, self._motors)
+        y = np.array(self.y, dtype=np.float64).reshape(-1, self._coordinates)
+        return self._points(self.vertex), q, y
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All of it as arrays."""
+        points, q, y = self.vertices()
+        missed = self.missed.values()
+        return {
+            "points": points,
+            "q": q,
+            "y": y,
+            "untried": self._points(self.untried),
+            "sources": np.array([source for sources in self.untried.values() for source in sources], dtype=np.intp),
+            "counts": np.array([len(sources) for sources in self.untried.values()], dtype=np.intp),
+            "missed": self._points(self.missed),
+            "missed_q": np.array([one.q for one in missed]).reshape(-1, self._motors),
+            "missed_wrong": np.array([one.wrong for one in missed], dtype=np.float64),
+            "missed_left": np.array([one.left for one in missed], dtype=np.intp),
+            "between": self._points(sorted(self.between)),
+        }
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Become what `state` said."""
+        self.q, self.y = list(state["q"]), list(state["y"])
+        self.vertex = {point: number for number, point in enumerate(_tuples(state["points"]))}
+        sources = iter(state["sources"].tolist())
+        self.untried = {
+            point: [next(sources) for _ in range(count)] for point, count in zip(_tuples(state["untried"]), state["counts"], strict=True)
+        }
+        rest = zip(state["missed_q"], state["missed_wrong"].tolist(), state["missed_left"].tolist(), strict=True)
+        self.missed = {point: Missed(*one) for point, one in zip(_tuples(state["missed"]), rest, strict=True)}
+        self.between = set(_tuples(state["between"]))
+
+    def _points(self, points: Iterable[Point]) -> Ints:
+        return np.array(list(points), dtype=np.intp).reshape(-1, self._coordinates)
+
+
+def _tuples(points: Ints) -> list[Point]:
+    return [tuple(one) for one in points.tolist()]
+
 
 OFF = 0.02  # spacings that a vertex may be off its point in any coordinate
 NOISES = np.array([0.02, 0.05, 0.1, 0.2])  # of the motors' ranges: standard deviations of starts about a posture

@@ -1,4 +1,4 @@
-"""How an advancing front is driven."""
+"""Settings of an advancing front."""
 
 from __future__ import annotations
 

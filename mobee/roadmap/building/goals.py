@@ -1,16 +1,16 @@
-"""Poses whose task coordinates have given values, by least squares."""
+"""Poses with given task coordinates, by least squares, with postures similar to their neighbours'."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.pose import Pose
+from mobee.model.pose import Pose
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.ik.least_squares import Descent, aim_reals
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.term import Aim
-from mobee.robot.robot import Array
 
 
 class Goals:
@@ -84,3 +84,40 @@ class Goals:
     def _aims(self, number: int, value: float) -> list[tuple[Aim, float]]:
         aims = self._task.coordinates[number].aims
         return [] if aims is None else [(aim, float(self._off[number])) for aim in aims(self._problem.model.robot, value)]
+
+
+STEP = 0.25  # rad: where a motor moves further along an edge, the postures about it are drawn together
+SWEEPS = 32
+
+
+def made_alike(goals: Goals, wanted: Array, q: Array, y: Array, pairs: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Poses q (V, n) and task points y (V, m), of which some have been solved anew from between their neighbours' postures.
+
+    `wanted`: (V, m) task points that are to be met; `pairs`: (E, 2) neighbours.  A new pose is taken if it is valid and nearer to its
+    neighbours in joint space: it has a smaller sum of squares.
+    """
+    q, y = q.copy(), y.copy()
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    for _ in range(SWEEPS):
+        far = np.abs(q[pairs[:, 0]] - q[pairs[:, 1]]).max(axis=1) > STEP
+        rough = np.zeros(len(q), dtype=bool)
+        rough[pairs[far]] = True
+        rough[both[rough[both[:, 0]], 1]] = True
+        rough &= rng.random(len(q)) < 0.5  # two that change places with each other would never meet
+        chosen = np.flatnonzero(rough)
+        if not len(chosen):
+            continue
+        number = np.full(len(q), -1)
+        number[chosen] = np.arange(len(chosen))
+        own, other = (both[rough[both[:, 0]]]).T
+        slot = number[own]
+        middle = np.zeros((len(chosen), q.shape[1]))
+        np.add.at(middle, slot, q[other])
+        middle /= np.bincount(slot, minlength=len(chosen))[:, None]
+        share = rng.choice([0.5, 1.0], (len(chosen), 1))
+        there, task, wrong, _ = goals.solve(wanted[chosen], q[chosen] + share * (middle - q[chosen]))
+        before = np.bincount(slot, ((q[other] - q[own]) ** 2).sum(axis=1), len(chosen))
+        after = np.bincount(slot, ((q[other] - there[slot]) ** 2).sum(axis=1), len(chosen))
+        better = (wrong == 0.0) & (after < before)
+        q[chosen[better]], y[chosen[better]] = there[better], task[better]
+    return q, y

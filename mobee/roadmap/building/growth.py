@@ -1,4 +1,4 @@
-"""The advancing front of thesis Algorithms 3 and 4: searches begin at the vertices of a map and end beside them."""
+"""The advancing front of thesis Algorithms 3 and 4: searches start at vertices and end beside them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
-from mobee.roadmap.building.chart import FIRST, NEAREST, OTHERS, Chart
+from mobee.roadmap.building.chart import FIRST, NEAREST, OTHERS, Chart, Flags, Rows
 from mobee.roadmap.building.front import Front
 from mobee.roadmap.building.judge import Judge
-from mobee.roadmap.building.outset import IDLE, Outset
-from mobee.roadmap.building.region import Flags
-from mobee.roadmap.building.rows import Rows
-from mobee.roadmap.evolution.rates import default_population
-from mobee.robot.robot import Array, Ints
+from mobee.roadmap.building.search_schedule import IDLE, Outset
+from mobee.roadmap.evolution.nes import default_population
 
 REPELLED = 0.25  # spacings: what eq. 3.6 counts beside a term at its tolerance
 AIMED = 0.5  # spacings: what a free place counts

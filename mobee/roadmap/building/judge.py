@@ -1,4 +1,4 @@
-"""What Algorithm 3 says of poses for the sake of the task alone: cost, whether all terms are met, and where in the task space they are."""
+"""Evaluates poses for a task: cost, whether all terms are satisfied, task coordinates (thesis Algorithm 3)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.arrays import Array
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.term import Term
-from mobee.robot.robot import Array
 
 if TYPE_CHECKING:
     from mobee.roadmap.building.task import Task

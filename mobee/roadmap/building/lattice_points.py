@@ -1,4 +1,4 @@
-"""Regular points of a task space, each as far from its neighbours as the map's vertices are to be."""
+"""Regular points of a task space at a given spacing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from mobee.robot.robot import Array, Ints
+from mobee.arrays import Array, Ints
 
 Point = tuple[int, ...]  # numbers of half edges from the origin: where all are even, a point of the lattice, else one between
 APART = 0.8  # spacings: nearer to each other are no two points

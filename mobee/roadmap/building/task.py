@@ -1,4 +1,4 @@
-"""Task spaces: the coordinates along which a map is to grow (thesis eqs. 3.4, 3.5)."""
+"""Task spaces: the coordinates over which a roadmap is spread (thesis eqs. 3.4, 3.5)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.pose import Pose
+from mobee.model.pose import Pose
 from mobee.roadmap.ik.term import Aim
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Task spaces of thesis table 3.2 and of its examples; any plain function of the pose is a coordinate, too.
+"""Task spaces of thesis table 3.2 and of its examples; any function of a pose is a coordinate too.
 
 Places are in m in the root frame, angles in rad.  `+` puts task spaces together: `place(...) + motors(...)` is the last row of the table.
 """
@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.pose import Pose
+from mobee.model.pose import Pose
 from mobee.roadmap.building.task import Coordinate, Task
 from mobee.roadmap.ik.aims import directed, level, motor_at
-from mobee.roadmap.ik.function import Function
-from mobee.roadmap.ik.term import Aim
-from mobee.roadmap.ik.vectors import unit_vector, vector
-from mobee.robot.robot import Array, Robot
+from mobee.roadmap.ik.costs import unit_vector, vector
+from mobee.roadmap.ik.term import Aim, Function
+from mobee.robot.robot import Robot
 
 AXES = "xyz"
 Range = tuple[float, float]

@@ -1,17 +1,107 @@
-"""Natural evolution strategies: a normal distribution that climbs down a cost by ranks alone (Glasmachers et al. 2010, thesis 3.2)."""
+"""Natural evolution strategies: sampling, rank weights, natural-gradient updates (Glasmachers et al. 2010, thesis 3.2)."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.roadmap.evolution.rates import default_population, path_rates, published_utilities
-from mobee.roadmap.evolution.shapes import stretched, turned
-from mobee.robot.robot import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathRates:
+    """Weights and rates of an evolution strategy with a path: those of CMA-ES (Hansen 2016, arXiv:1604.00772).
+
+    `weights` (population,), best sample first: the better half's are positive and sum up to 1, the others' are negative.
+    """
+
+    weights: Array
+    effective: float  # how many samples the better half is worth
+    path: float  # what a path forgets in a generation
+    damping: float
+    rank_one: float  # how fast the shape follows the path
+    rank_all: float  # and the samples
+    length: float  # of a standard normal vector, on average
+
+
+def path_rates(dimensions: int, population: int, separable: bool = False) -> PathRates:
+    """The default rates; a diagonal shape has fewer numbers to learn and learns them faster (Ros and Hansen 2008)."""
+    d = dimensions
+    weights = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))
+    better, worse = weights[weights > 0.0], weights[weights <= 0.0]
+    effective = float(better.sum() ** 2 / (better**2).sum())
+    path = (effective + 2.0) / (d + effective + 5.0)
+    damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (d + 1.0)) - 1.0) + path
+    rank_one = 2.0 / ((d + 1.3) ** 2 + effective)
+    rank_all = 2.0 * (0.25 + effective + 1.0 / effective - 2.0) / ((d + 2.0) ** 2 + effective)
+    faster = (d + 2.0) / 3.0 if separable else 1.0
+    rank_one = min(0.5, rank_one * faster)
+    rank_all = min(1.0 - rank_one, rank_all * faster)
+    weights[weights > 0.0] /= better.sum()
+    if worse.any():
+        of_worse = float(worse.sum() ** 2 / (worse**2).sum())
+        most = min(1.0 + rank_one / rank_all, 1.0 + 2.0 * of_worse / (effective + 2.0), (1.0 - rank_one - rank_all) / (d * rank_all))
+        weights[weights < 0.0] *= most / -worse.sum()
+    length = math.sqrt(d) * (1.0 - 1.0 / (4.0 * d) + 1.0 / (21.0 * d * d))
+    return PathRates(weights, effective, path, damping, rank_one, rank_all, length)
+
+
+def published_utilities(population: int) -> Array:
+    """What each sample counts in the published forms, (population,), best first; they sum up to 0 (Glasmachers et al. 2010)."""
+    better = np.maximum(0.0, math.log(population / 2 + 1) - np.log(np.arange(1, population + 1)))
+    utilities: Array = better / better.sum() - 1.0 / population
+    return utilities
+
+
+def default_population(dimensions: int) -> int:
+    """4 + 3 ln(dimensions), of all these strategies."""
+    return 4 + int(3.0 * math.log(dimensions))
+
+
+_NEGLIGIBLE = 1e-17
+
+
+def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
+    """B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)), exact to rounding; z (k, d), weights (k,).
+
+    The sum has no more than k directions of its own, so where k < d the series is one of matrices (k, k).
+    """
+    if shape.ndim == 1:
+        diagonal: Array = shape * np.exp(0.5 * (weights @ z**2 - shrink))
+        return diagonal
+    weighted = z * (0.5 * weights)[:, None]
+    if len(z) < len(shape):
+        change = (shape @ z.T) @ (_series(weighted @ z.T) @ weighted)
+    else:
+        exponent = weighted.T @ z
+        change = shape @ (exponent @ _series(exponent))
+    whole: Array = math.exp(-0.5 * shrink) * (shape + change)
+    return whole
+
+
+def _series(a: Array) -> Array:
+    """(exp(a) - 1) / a by Taylor's series; the exponents of a generation are small."""
+    norm, size, power = math.sqrt(float((a * a).sum())), 1.0, 1
+    total = term = np.eye(len(a))
+    while size > _NEGLIGIBLE:
+        power += 1
+        size *= norm / power
+        term = term @ a
+        term *= 1.0 / power
+        total = total + term
+    return total
+
+
+def stretched(shape: Array, z: Array) -> Array:
+    """B z of samples (k, d) or of one (d,), of the same form."""
+    moved: Array = z * shape if shape.ndim == 1 else z @ shape.T
+    return moved
+
 
 Method = Literal["full", "separable", "xnes", "snes"]
 METHODS: tuple[str, ...] = get_args(Method)

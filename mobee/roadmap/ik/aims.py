@@ -1,12 +1,19 @@
-"""What least squares is to meet, of markers and motors."""
+"""Residuals for least squares: their kinds, numbered as in core/aims.hpp."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mobee.roadmap.ik.aim_kinds import ALONG, AT_MOST, COORDINATE, MOTOR
+from mobee.arrays import Array
 from mobee.roadmap.ik.term import UPRIGHT, Aim, direction_frame
-from mobee.robot.robot import Array, Marker
+from mobee.robot.robot import Marker
+
+# PLACE: the two points are one.  TURNED: the two frames are parallel.  ALONG: the two directions are one.  HOLD: the points are a length
+# apart.  FACING: the first direction points to the second point.  COORDINATE: the first point is a length further than the second in a
+# direction of the root frame, the first three numbers of the second frame, of any length itself.  AT_MOST: no further than
+# that.  MOTOR: a motor is at a value, the length.
+KINDS = PLACE, TURNED, ALONG, HOLD, FACING, COORDINATE, AT_MOST, MOTOR = tuple(range(8))
+
 
 NOWHERE = np.zeros(3)
 

@@ -1,7 +1,4 @@
-"""Costs of poses: those of thesis table 3.1, and more; any plain function of pose and contacts is one too.
-
-A term weighs about 1 at ten times its tolerance.  Angles are in rad, places in m in the root frame.
-"""
+"""Cost terms of poses: those of thesis table 3.1, others, and user functions."""
 
 from __future__ import annotations
 
@@ -10,36 +7,64 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.contact import ContactTable
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
-from mobee.kinematics.masses import centre_of_mass, centre_of_mass_at_home
-from mobee.pose import Pose
-from mobee.roadmap.ik.aim_kinds import ALONG, FACING, HOLD, PLACE, TURNED
-from mobee.roadmap.ik.costs_between import across, aligned, at_most, plane, relative_orientation, relative_position
-from mobee.roadmap.ik.function import Function
-from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Term, checked_term, direction_frame
-from mobee.roadmap.ik.vectors import angle_between, lengths, rotation, turn_between, unit_vector, units, vector
-from mobee.robot.robot import Array, Robot
+from mobee.model.contact import ContactTable
+from mobee.model.masses import centre_of_mass, centre_of_mass_at_home
+from mobee.model.pose import Pose
+from mobee.roadmap.ik.aims import ALONG, FACING, HOLD, PLACE, TURNED, below, level
+from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Function, Term, checked_term, direction_frame
+from mobee.robot.robot import Robot
 
-__all__ = [
-    "across",
-    "aligned",
-    "at_most",
-    "balance",
-    "collision",
-    "comfort",
-    "constraints",
-    "gaze",
-    "hold",
-    "home",
-    "orientation",
-    "palm_to_palm",
-    "plane",
-    "position",
-    "relative_orientation",
-    "relative_position",
-    "term",
-]
+
+def vector(name: str, given: ArrayLike) -> Array:
+    """A copy of what was given, (3,); raises InvalidValue if it is not three finite numbers."""
+    found = real_array(name, given)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
+    return found
+
+
+def unit_vector(name: str, given: ArrayLike) -> Array:
+    """The direction (3,) of what was given; raises InvalidValue if it has none."""
+    found = vector(name, given)
+    if not np.linalg.norm(found) > 0.0:
+        raise InvalidValue(f"{name} is {given!r}; it must be a direction (3,), or a rotation (3, 3).")
+    return units(found)
+
+
+def lengths(vectors: Array) -> Array:
+    """Of vectors (..., d), (...,)."""
+    found: Array = np.sqrt((vectors**2).sum(axis=-1))
+    return found
+
+
+def units(vectors: Array) -> Array:
+    """Vectors (..., d) at length 1; those of no length stay so."""
+    found: Array = vectors / np.maximum(lengths(vectors)[..., None], 1e-12)
+    return found
+
+
+def angle_between(one: Array, other: Array) -> Array:
+    """The angle between unit vectors (..., 3), (...,) rad; exact near 0 and near pi too."""
+    angle: Array = 2.0 * np.arctan2(lengths(one - other), lengths(one + other))
+    return angle
+
+
+def rotation(name: str, given: ArrayLike) -> Array:
+    """A copy of what was given, (3, 3); raises InvalidValue if it is no rotation."""
+    found = real_array(name, given)
+    if found.shape != (3, 3) or not np.allclose(found @ found.T, np.eye(3), atol=1e-6) or np.linalg.det(found) < 0.0:
+        raise InvalidValue(f"{name} is no rotation: its rows must be a right-handed set of three unit vectors.")
+    return found
+
+
+def turn_between(one: Array, other: Array) -> Array:
+    """The angle of the turn from rotations (..., 3, 3) to others, (...,) rad."""
+    apart = np.sqrt(((one - other) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
+    angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
+    return angle
+
 
 PER_DEPTH = 20.0
 _NONE = np.zeros(3)
@@ -224,3 +249,92 @@ def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Te
         return (Aim(TURNED, m.link, m.position, m.rotation, 0, _NONE, wanted),)
 
     return checked_term(f"orientation {marker}", residual, weight, tolerance, aims)
+
+
+def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Put a marker on a place (3,) m in the frame of another marker, as what both hold would."""
+    goal = vector("place", place)
+
+    def residual(pose: Pose) -> Array:
+        return lengths(pose.position(marker) - pose.position(to) - pose.rotation(to) @ goal)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m, other = robot.marker(marker), robot.marker(to)
+        return (Aim(PLACE, m.link, m.position, UPRIGHT, other.link, other.position + other.rotation @ goal, UPRIGHT),)
+
+    return checked_term(f"relative_position {marker} {to}", residual, weight, tolerance, aims)
+
+
+def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Turn a marker to a rotation (3, 3) in the frame of another marker; the identity: both are turned alike."""
+    wanted = rotation("goal", goal)
+
+    def residual(pose: Pose) -> Array:
+        return turn_between(pose.rotation(marker), pose.rotation(to) @ wanted)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        m, other = robot.marker(marker), robot.marker(to)
+        return (Aim(TURNED, m.link, m.position, m.rotation, other.link, other.position, other.rotation @ wanted),)
+
+    return checked_term(f"relative_orientation {marker} {to}", residual, weight, tolerance, aims)
+
+
+def aligned(
+    first: str, second: str, direction: ArrayLike, other: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD
+) -> Term:
+    """Let a direction (3,) in the frame of a marker be parallel to one in that of another, None: the same numbers in that frame."""
+    one = unit_vector("direction", direction)
+    two = one if other is None else unit_vector("other", other)
+
+    def residual(pose: Pose) -> Array:
+        return angle_between(pose.rotation(first) @ one, pose.rotation(second) @ two)
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        a, b = robot.marker(first), robot.marker(second)
+        here, there = direction_frame(a.rotation @ one), direction_frame(b.rotation @ two)
+        return (Aim(ALONG, a.link, a.position, here, b.link, b.position, there),)
+
+    return checked_term(f"aligned {first} {second}", residual, weight, tolerance, aims)
+
+
+def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
+    """Keep a marker's normal, or a direction (3,) in its frame, across an axis (3,): the residual is the angle to the plane across it.
+
+    It has no derivative of its own; beside an angle about the same axis as task coordinate least squares needs none.
+    """
+    along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
+
+    def residual(pose: Pose) -> Array:
+        way = pose.normal(marker) if own is None else pose.rotation(marker) @ own
+        found: Array = np.arcsin(np.minimum(np.abs(way @ along), 1.0))
+        return found
+
+    return checked_term(f"across {marker}", residual, weight, tolerance)
+
+
+def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Keep a marker in the plane of all x with normal . x = offset [m]; with (0, 0, 1) it is a height."""
+    across = unit_vector("normal", normal)
+
+    def residual(pose: Pose) -> Array:
+        found: Array = np.abs(pose.position(marker) @ across - offset)
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        return (level(robot.marker(marker), across, offset),)
+
+    return checked_term(f"plane {marker}", residual, weight, tolerance, aims)
+
+
+def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
+    """Let a marker be no further in a direction (3,) than direction . x = most [m]; with (0, 0, 1) it stays below a height."""
+    along = unit_vector("direction", direction)
+
+    def residual(pose: Pose) -> Array:
+        found: Array = np.maximum(pose.position(marker) @ along - most, 0.0)
+        return found
+
+    def aims(robot: Robot) -> tuple[Aim, ...]:
+        return (below(robot.marker(marker), along, most),)
+
+    return checked_term(f"at_most {marker}", residual, weight, tolerance, aims)

@@ -1,4 +1,4 @@
-"""Damped least squares with restarts, for the terms that have a derivative; what the others say of it is looked at afterwards."""
+"""Damped least squares with restarts, for the terms that have a derivative; the other terms are checked afterwards."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.roadmap.ik.aim_kinds import KINDS
-from mobee.roadmap.ik.needed import Flags, needed
-from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.aims import KINDS
+from mobee.roadmap.ik.problem import Flags, Problem, needed
 from mobee.roadmap.ik.term import Aim
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.robot.robot import Robot
 from mobee.threads import checked_threads
 
 RESTARTS, AT_ONCE = 40, 4
@@ -65,7 +65,7 @@ class Descent:
         `goals`: what the aims besides the problem's own are to be at each start, (B, reals of those), see `aim_reals`; None: as given.
         """
         from mobee._core.least_squares import descend  # loads the core: not before somebody asks
-        from mobee.engine.engine import robot_handle
+        from mobee.model.engine import robot_handle
 
         robot = self._problem.model.robot
         ends = np.array(q, dtype=np.float64, order="C")

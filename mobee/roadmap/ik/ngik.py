@@ -1,4 +1,4 @@
-"""Natural gradient inverse kinematics: a pose from any sum of costs (thesis 3.2)."""
+"""Natural gradient inverse kinematics: finds a pose that minimises a sum of costs (thesis 3.2)."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.collision.contact import Contact, ContactTable
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
+from mobee.model.contact import Contact, ContactTable
+from mobee.model.model import Model
 from mobee.roadmap.evolution.search import Restart, Search
 from mobee.roadmap.ik.least_squares import least_squares
 from mobee.roadmap.ik.problem import Cost, Problem
-from mobee.robot.robot import Array
 
 METHODS = ("hybrid", "nes", "least_squares")
 EVALUATIONS = 20_000

@@ -1,21 +1,91 @@
-"""Poses to be judged: which motors may move, and what the terms say of batches of them."""
+"""The pose search problem: which motors move, which are sampled, and the costs of batches of poses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
-from mobee.pose import Pose
-from mobee.real_array import real_array
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.roadmap.ik.aims import MOTOR
 from mobee.roadmap.ik.costs import term
-from mobee.roadmap.ik.solids import solid_model
-from mobee.roadmap.ik.term import Term
-from mobee.robot.robot import Array, Ints, Robot
+from mobee.roadmap.ik.term import Aim, Term
+from mobee.robot.per_robot import per_robot
+from mobee.robot.robot import Robot
+
+_KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
+
+
+def solid_model(model: Model) -> Model:
+    """The model without fields, in the same world; the same as before for the same model."""
+    known = _KNOWN.get(model)
+    if known is None:
+        known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
+    known.reaching = model.reaching
+    return known
+
+
+@per_robot
+def solid_robot(robot: Robot) -> Robot:
+    """The robot without its fields."""
+    kept = [index for index, shape in enumerate(robot.shapes) if shape.role == "solid"]
+    number = {index: k for k, index in enumerate(kept)}
+    pairs = [(number[int(a)], number[int(b)]) for a, b in robot.solid_pairs]
+    return replace(
+        robot,
+        shapes=tuple(robot.shapes[index] for index in kept),
+        solid_pairs=np.array(pairs, dtype=np.intp).reshape(-1, 2),
+        field_pairs=np.empty((0, 2), dtype=np.intp),
+        base_shapes=frozenset(number[index] for index in robot.base_shapes if index in number),
+    )
+
+
+Flags = NDArray[np.bool_]
+
+PROBES = 3  # random poses in which a motor is moved, to see whether a term feels it
+_FELT = 1e-9
+
+
+def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
+    """Of the motors that may move, those (d,) that move an aim or are felt by a term that has none, as a plain function of a finger.
+
+    Contacts do not count: that a finger could touch is no reason to spread it.
+    """
+    moves = _movers(problem.model.robot, aims)[problem.free]
+    others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
+    still = np.flatnonzero(~moves)
+    if not others or not len(still):
+        return moves
+    rng, low, high = np.random.default_rng(0), *problem.limits.T
+    drawn = rng.uniform(low, high, (PROBES, 1 + len(still), len(low)))
+    drawn[:, 1:] = np.where(np.eye(len(low), dtype=bool)[still], drawn[:, 1:], drawn[:, :1])
+    pose = problem.model.evaluate(problem.whole(drawn.reshape(-1, len(low))))
+    for one in others:
+        said = one.residual(pose).reshape(PROBES, -1)
+        moves[still[(np.abs(said[:, 1:] - said[:, :1]) > _FELT).sum(axis=0) > 0]] = True
+    return moves
+
+
+def _movers(robot: Robot, aims: Iterable[Aim]) -> Flags:
+    """The motors (n,) before the links of aims, and those that are aims themselves."""
+    scale = robot.coupling[0]
+    moves = np.zeros(len(robot.motors), dtype=bool)
+    for aim in aims:
+        if aim.kind == MOTOR:
+            moves[aim.motor] = True
+        for link in (aim.first_link, aim.second_link):
+            while link > 0:
+                moves |= scale[link - 1] != 0.0
+                link = robot.joints[link - 1].parent
+    return moves
+
 
 Cost = Term | Callable[[Pose, Any], ArrayLike]
 

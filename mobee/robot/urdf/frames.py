@@ -1,4 +1,4 @@
-"""Frames as URDF writes them: `<origin xyz="..." rpy="...">`, a turn about the fixed axes x, y, z, in that order."""
+"""Frames of URDF: `<origin xyz=... rpy=...>`, rotations about the fixed axes x, y, z in that order."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from math import atan2, cos, hypot, sin
 
 import numpy as np
 
-from mobee.robot.robot import Array
-from mobee.robot.xml_node import Node
+from mobee.arrays import Array
+from mobee.robot.xml.node import Node
 
 FARTHEST = 1e6  # m: beyond it a number is a slip, and the arithmetic would lose millimetres
 

@@ -1,4 +1,4 @@
-"""Masses out of <inertial>, and back into it."""
+"""Reads and writes masses as <inertial>."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.robot.bodies import ball_of_water, from_six, one_a_link, to_six
-from mobee.robot.number_text import number, numbers
-from mobee.robot.robot import Array, Body
+from mobee.robot.numbers import number, numbers
+from mobee.robot.robot import Body
 from mobee.robot.urdf.frames import Frame, bounded, child, read_origin
 from mobee.robot.urdf.layout import Skeleton
 from mobee.robot.urdf.tree import Tree
-from mobee.robot.xml_node import SMALLEST, Node
+from mobee.robot.xml.node import SMALLEST, Node
 
 SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

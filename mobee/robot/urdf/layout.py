@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.robot.robot import Array, Joint, Marker
+from mobee.arrays import Array
+from mobee.robot.robot import Joint, Marker
 from mobee.robot.urdf.frames import IDENTITY, Frame, child, triple
 from mobee.robot.urdf.motors import stated_limits
 from mobee.robot.urdf.tree import Tree, UrdfJoint
-from mobee.robot.xml_node import Node
-from mobee.robot.xml_volume import Z, turn_about
+from mobee.robot.xml.node import Node
+from mobee.robot.xml.volume import Z, turn_about
 
 
 @dataclass(slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""The points of a COLLADA file: geometries where the scene places them, nothing else.
+"""Reads the points of COLLADA files, placed as in their scene.
 
 Lengths are turned into metres by the file's <unit>. Its <up_axis> is left alone, as ROS tools do: the URDF says which way is up.
 """
@@ -12,10 +12,10 @@ from typing import NoReturn
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.errors import RobotFileError
-from mobee.robot.robot import Array, Ints
-from mobee.robot.xml_file import LineHandler, parse_xml
-from mobee.robot.xml_volume import turn_about
+from mobee.robot.xml.file import LineHandler, parse_xml
+from mobee.robot.xml.volume import turn_about
 
 DEEPEST = 100
 MOST_ELEMENTS = 50_000

@@ -1,4 +1,4 @@
-"""Motors, limits and couplings (<mimic>) out of the joints of a URDF file."""
+"""Reads motors, limits and couplings (<mimic>) of a URDF."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from math import copysign, inf, isinf, pi
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.robot.motor_units import angle_unit, outside_zones
-from mobee.robot.robot import Array, Motor
+from mobee.robot.robot import Motor
 from mobee.robot.urdf.frames import FARTHEST, bounded, child
 from mobee.robot.urdf.tree import UrdfJoint, read_name
-from mobee.robot.xml_node import Node, listed, nearest
+from mobee.robot.xml.node import Node, listed, nearest
 
 LEAST = 1e-6  # of a factor between a joint and its motor
 TURN = 2.0 * pi  # rad, of a joint without limits

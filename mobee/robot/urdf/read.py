@@ -1,4 +1,4 @@
-"""Reads a robot from a URDF file, and from the SRDF beside it: see docs/robots.md for what becomes of what."""
+"""Reads a robot from a URDF and its SRDF; docs/robots.md lists what is read as what."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array, Joint, Motor, Part, Robot, Shape
+from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 from mobee.robot.urdf.hull import CORNERS, FEWEST, Corners
 from mobee.robot.urdf.inertial import read_bodies
 from mobee.robot.urdf.layout import Skeleton, lay_out, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
 from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
 from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown
-from mobee.robot.urdf.srdf import Srdf, find_srdf, read_parts, read_srdf
-from mobee.robot.urdf.states import Home, choose_home, homed
+from mobee.robot.urdf.srdf import Home, Srdf, choose_home, find_srdf, homed, read_parts, read_srdf
 from mobee.robot.urdf.tree import Tree, UrdfJoint, read_tree
-from mobee.robot.xml_ignore import without_ignored
-from mobee.robot.xml_node import Node, read_xml
+from mobee.robot.xml.node import Node, read_xml
+from mobee.robot.xml.pairs import without_ignored
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Solids out of the collision geometry of a URDF link, and the fields that grow around them."""
+"""Reads solids from collision geometry, and generates the fields around them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, RobotFileError
-from mobee.robot.robot import Array, Shape
-from mobee.robot.urdf.bounding import smallest, smallest_capsule
+from mobee.robot.robot import Shape
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
-from mobee.robot.urdf.hull import Corners, convex_hull
-from mobee.robot.urdf.mesh import read_mesh
-from mobee.robot.urdf.mesh_path import find_mesh
-from mobee.robot.xml_body import MOST_SHAPES
-from mobee.robot.xml_node import SMALLEST, Node, nearest
+from mobee.robot.urdf.hull import Corners, convex_hull, smallest, smallest_capsule
+from mobee.robot.urdf.mesh import find_mesh, read_mesh
+from mobee.robot.xml.body import MOST_SHAPES
+from mobee.robot.xml.node import SMALLEST, Node, nearest
 
 Meshes = Literal["hull", "bounding"]
 GEOMETRIES = ("sphere", "cylinder", "capsule", "box", "mesh")

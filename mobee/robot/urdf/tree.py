@@ -1,4 +1,4 @@
-"""The links and joints of a URDF file as a checked tree."""
+"""Reads the links and joints of a URDF as a checked tree."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from mobee.robot.urdf.frames import Frame, child, read_origin, triple
-from mobee.robot.xml_node import Node, listed, nearest, shown
+from mobee.robot.xml.node import Node, listed, nearest, shown
 
 MOVING = ("revolute", "continuous", "prismatic")
 MOST_LINKS = 1000

@@ -1,14 +1,21 @@
-"""The SRDF beside a URDF: parts as groups, home, and the pairs of links that are not tested."""
+"""Writes an SRDF: groups, home and disabled pairs; adds disabled pairs to an existing one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
+from xml.sax.saxutils import quoteattr
 
-from mobee.robot.number_text import number
+from mobee.errors import RobotFileError
+from mobee.robot.numbers import number
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.pairs import adjacent_links
+from mobee.robot.xml.node import Node, read_xml
 
 
 def write_srdf(robot: Robot, masters: Sequence[tuple[int, float, float]], path: Path) -> None:
@@ -31,3 +38,84 @@ def write_srdf(robot: Robot, masters: Sequence[tuple[int, float, float]], path: 
             ET.SubElement(root, "enable_collisions", link1=first, link2=second)
     ET.indent(root, " ")
     path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+
+
+NamePair = frozenset[str]
+_END = re.compile(rb"[ \t]*</robot\s*>")
+
+
+def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tuple[str, str, str]]) -> None:
+    """Write an SRDF with <disable_collisions> for pairs of links, (link1, link2, reason): all of it, or nothing.
+
+    `base`: the SRDF whose text is kept word for word, the new lines behind it; None begins one for a robot of that name.  Raises
+    RobotFileError if that text cannot take the lines, or if the file cannot be written.
+    """
+    lines = [f"<disable_collisions link1={quoteattr(a)} link2={quoteattr(b)} reason={quoteattr(why)}/>" for a, b, why in pairs]
+    text = _merged(base, lines) if base is not None else _begun(name, lines)
+    target = path.resolve()
+    try:
+        with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".", suffix=".srdf", delete=False) as file:
+            unfinished = Path(file.name)
+            file.write(text)
+        try:
+            if target.exists():
+                shutil.copymode(target, unfinished)
+            else:
+                unfinished.chmod(0o666 & ~_umask())
+            if base is not None:
+                _check(unfinished, base, lines)
+            unfinished.replace(target)
+        finally:
+            unfinished.unlink(missing_ok=True)
+    except OSError as error:
+        raise RobotFileError(f"{path}: cannot be written: {error.strerror or error}. Name another file: --write-srdf FILE.") from None
+
+
+def disabled_and_enabled(path: Path) -> tuple[set[NamePair], set[NamePair]]:
+    """The pairs of links that an SRDF names in <disable_collisions> and in <enable_collisions>; raises RobotFileError."""
+    root = read_xml(path)
+    return _pairs(root, "disable_collisions"), _pairs(root, "enable_collisions")
+
+
+def _pairs(root: Node, tag: str) -> set[NamePair]:
+    return {frozenset((node.optional("link1") or "", node.optional("link2") or "")) for node in root if node.tag == tag}
+
+
+def _begun(name: str, lines: list[str]) -> bytes:
+    return "\n".join(
+        ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(name)}>", *(f" {line}" for line in lines), "</robot>", ""]
+    ).encode()
+
+
+def _merged(base: Path, lines: list[str]) -> bytes:
+    """The text with lines before its last </robot>."""
+    text = base.read_bytes()
+    ends = list(_END.finditer(text))
+    if not ends:
+        raise RobotFileError(f"{base}: has no </robot> before which lines can be put. Write <robot name=...></robot>, in UTF-8.")
+    end = ends[-1]
+    newline = b"\r\n" if b"\r\n" in text else b"\n"
+    added = b"".join(b" " + line.encode("ascii", "xmlcharrefreplace") + newline for line in lines)
+    before = text[: end.start()]
+    if before and not before.endswith(b"\n"):
+        before += newline
+    return before + added + text[end.start() :]
+
+
+def _check(unfinished: Path, base: Path, lines: list[str]) -> None:
+    """Raise unless the new text says what the old one said, and the lines: its last </robot> may stand in a comment."""
+    before, after = read_xml(base), read_xml(unfinished)
+    if [_content(node) for node in after][: len(before.children)] != [_content(node) for node in before] or len(after.children) != len(
+        before.children
+    ) + len(lines):
+        raise RobotFileError(f"{base}: lines cannot be put before its last </robot>. Remove what stands behind that.")
+
+
+def _content(node: Node) -> tuple[object, ...]:
+    return (node.tag, tuple(sorted(node.attributes.items())), tuple(_content(inner) for inner in node))
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

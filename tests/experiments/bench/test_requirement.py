@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from experiments.bench.requirement import all_passed, judged, lines
+from experiments.bench.verdicts import all_passed, judged, lines
 
 
 @pytest.mark.parametrize(

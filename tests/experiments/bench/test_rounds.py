@@ -5,8 +5,8 @@ import threading
 
 import pytest
 
-from experiments.bench import rounds
-from experiments.bench.rounds import Contestant, one_core, rates
+from experiments.bench import verdicts as rounds
+from experiments.bench.verdicts import Contestant, one_core, rates
 
 
 class ProcessorTime:

@@ -8,7 +8,7 @@ import pytest
 from experiments.bench.vi import Settings, contestants, measure, report, verdict
 from experiments.bench.vi_peers import Problem, QuanteconMissing, load_quantecon
 from experiments.bench.vi_workload import at_work, of_size
-from mobee.learning.policy_iteration import policy_iteration
+from mobee.learning.value_iteration import policy_iteration
 from mobee_cli.__main__ import main
 
 

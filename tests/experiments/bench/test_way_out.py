@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.bench.way_out import Place, reach, way_out
-from mobee.collision.world_object import WorldObject
+from experiments.bench.collision_peers import Place, reach, way_out
+from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Shape
 
 X, Z, ALONG = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.ones(3) / np.sqrt(3.0)

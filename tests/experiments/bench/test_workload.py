@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.bench import workload
-from mobee.collision.tested_pairs import tested_pairs as rules
-from mobee.engine.hands import NOBODY
+from mobee.model.fcl_engine import tested_pairs as rules
+from mobee.model.hands import NOBODY
 
 
 def test_it_has_the_size_that_it_says() -> None:

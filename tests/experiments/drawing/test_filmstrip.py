@@ -10,8 +10,8 @@ from experiments.drawing.cloud import cloud_solids, marker_cloud
 from experiments.drawing.filmstrip import Strip, filmstrip, panels
 from experiments.drawing.motion import Motion, motion_through, recorded
 from experiments.drawing.scene import object_solids, robot_solids, trail_solids
-from mobee.collision.geometry import sphere
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model.world_object import sphere
 
 ARM = ["r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"]
 PALM = "right_palm"

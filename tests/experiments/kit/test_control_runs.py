@@ -5,7 +5,7 @@ import pytest
 
 from experiments.kit.control_runs import place, random_posture, run_plant
 from mobee import load_robot
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.simulation import OfflinePlant
 from tests.mobee.control.two_parts import two_part_arm
 

@@ -5,8 +5,9 @@ import pytest
 
 from experiments.kit.control_runs import PlantRun
 from experiments.kit.safety_measures import clause_label, clause_violations, deepest, is_listed, limit_violations, oscillation
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 
 ICUB = load_robot("icub")
 DT = 0.01

@@ -10,16 +10,16 @@ from scipy import stats
 
 from experiments.kit.statistics import (
     decides,
+    estimate,
     gini,
     interquartile_mean,
     interval,
     mean_over,
     probability_of_improvement,
     ratio,
+    ratio_estimate,
     ratio_interval,
     relative_spread,
-    told,
-    told_ratio,
 )
 from mobee.errors import InvalidValue
 
@@ -112,8 +112,8 @@ def test_one_bound_is_enough_to_decide():
 
 
 def test_a_mean_is_told_with_its_interval():
-    assert told([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
-    assert told([321, 320, 320, 320], 0).startswith("320 [320, ")
+    assert estimate([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
+    assert estimate([321, 320, 320, 320], 0).startswith("320 [320, ")
 
 
 @given(st.lists(st.integers(0, 50), min_size=2, max_size=30).filter(any))
@@ -128,5 +128,5 @@ def test_equal_counts_have_no_spread():
 
 
 def test_a_ratio_is_told_with_its_interval():
-    assert told_ratio([2.0, 2.0], [4.0, 4.0]) == "0.50 [0.50, 0.50]"
+    assert ratio_estimate([2.0, 2.0], [4.0, 4.0]) == "0.50 [0.50, 0.50]"
     assert mean_over(["a", "bbb"], len) == 2.0

@@ -7,7 +7,7 @@ import pytest
 from experiments.kit.cells import Cell
 from experiments.kit.sweep import Condition, Sweep, grouped, grouped_by
 from mobee.errors import InvalidValue
-from mobee.roadmap.ompl_base import OmplMissing
+from mobee.roadmap.ompl import OmplMissing
 from tests.experiments.finished_cells import finished
 
 

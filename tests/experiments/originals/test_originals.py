@@ -12,7 +12,7 @@ from experiments.originals.checkouts import find_originals
 from experiments.originals.compare import compare
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
-from mobee.robot.write_xml import write_upgraded
+from mobee.robot.xml.write import write_upgraded
 from tests.experiments.originals.random_original import random_original
 from tests.mobee.robot.same_robot import assert_same_robot
 

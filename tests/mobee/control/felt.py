@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control import Forces, Gains, constraint_forces
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

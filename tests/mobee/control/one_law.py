@@ -10,7 +10,7 @@ import numpy as np
 from mobee._core import address
 from mobee._core import law as core
 from mobee._core.tables import INTERVAL, view
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 
 class OneLaw:

@@ -8,10 +8,10 @@ import pytest
 
 from mobee.control import Controller, Forces, Gains
 from mobee.control.checked import LARGEST_FORCE
-from mobee.control.modality import FRICTION, INERTIA
+from mobee.control.law import FRICTION, INERTIA
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics.gravity import gravity_torque
-from mobee.model import Model
+from mobee.model.masses import gravity_torque
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
 

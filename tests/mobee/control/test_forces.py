@@ -7,7 +7,7 @@ import pytest
 
 from mobee.control.forces import constraint_forces
 from mobee.control.gains import Gains
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.robot.robot import Clause
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
 

@@ -9,12 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.control import Controller, Gains, constraint_forces
-from mobee.control.clauses import stack_clauses
+from mobee.control.law import stack_clauses
 from mobee.control.stability import largest_step
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import touching, two_part_arm
 

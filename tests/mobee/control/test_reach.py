@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.control.reach import reach_path
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array
 from tests.mobee.planar import planar_arm
 
 ARM = Model(planar_arm())

@@ -9,15 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.control import Controller, Gains, Settle
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.reach import ReachTarget
 from mobee.reference import reach
 from mobee.reference.forces import State
 from mobee.robot.load import load_robot
 from mobee.robot.motor_units import motor_units
-from mobee.robot.robot import Array, Part, Robot
+from mobee.robot.robot import Part, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from tests.mobee.control.two_parts import two_part_arm
 from tests.mobee.planar import planar_arm, tree

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from mobee.arrays import Array
 from mobee.control import Controller, Gains
-from mobee.control.reach import reach_path
-from mobee.control.reacher import Reacher
+from mobee.control.reach import Reacher, reach_path
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.reach import ReachTarget
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array
 from mobee.simulation import MotorParameters, Motors
 from tests.mobee.planar import planar_arm
 

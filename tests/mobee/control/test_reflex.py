@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.control.reflex import Reflex
-from mobee.control.reflex_settings import ReflexSettings
-from mobee.control.violation import Violation
+from mobee.arrays import Array
+from mobee.control.reflex import Reflex, ReflexSettings, Violation
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 
 DT = 0.01
 FAST = np.array([1000.0, 1000.0])  # rad/s: no target is held back

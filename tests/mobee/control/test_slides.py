@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.control.law import Law
 from mobee.control.stability import largest_step
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.robot.motor_units import SLIDE_RANGE
-from mobee.robot.robot import Array, Clause, Robot
+from mobee.robot.robot import Clause, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from tests.mobee.control.two_parts import two_part_arm
 

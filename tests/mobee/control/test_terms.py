@@ -9,11 +9,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from mobee.arrays import Array
 from mobee.control import Controller, Forces, State, Term, constraint_forces
 from mobee.control.forces import told_terms
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Array
 from mobee.simulation import OfflinePlant
 from tests.mobee.control.two_parts import STRETCHED, touching
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mobee import Model, load_robot, load_world
-from mobee.control.violation import Violation, Watch
+from mobee.arrays import Array
+from mobee.control.reflex import Violation, Watch
 from mobee.errors import InvalidValue
-from mobee.pose import Pose
-from mobee.robot.robot import Array
+from mobee.model.pose import Pose
 
 ROBOT = load_robot("icub")
 MODEL = Model(ROBOT, load_world("table"))

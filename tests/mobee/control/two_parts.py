@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mobee.collision import World, sphere
-from mobee.model import Model
+from mobee.model import World, sphere
+from mobee.model.model import Model
 from mobee.robot.robot import Part, Robot
 from tests.mobee.planar import planar_arm
 

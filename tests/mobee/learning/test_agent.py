@@ -5,10 +5,10 @@ import pytest
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.divergence import kl_divergence
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
 from mobee.learning.tabular import TabularPlant, ideal
+from mobee.learning.transitions import kl_divergence
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
 from tests.mobee.learning.toys import TORSO, FickleDice, InstantPlant, Interrupting, arm, torso, toy_robot

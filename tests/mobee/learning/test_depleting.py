@@ -7,7 +7,7 @@ import pytest
 
 from mobee._core import observations
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.depleting import _next_counts
+from mobee.learning.explorers import _next_counts
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import value_iteration
 from tests.mobee.learning.toys import InstantPlant, arm

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.learning.divergence import information_gain, kl_divergence
+from mobee.learning.transitions import information_gain, kl_divergence
 
 PRINTED = 5e-5
 

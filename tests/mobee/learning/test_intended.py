@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mobee.learning.intended import passing, shortest_actions, steps_between
+from mobee.learning.planner import passing, shortest_actions, steps_between
 from mobee.learning.tabular import TabularPlant, half_space, ideal
 from tests.mobee.learning.toys import arm
 

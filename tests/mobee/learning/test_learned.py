@@ -8,7 +8,7 @@ import pytest
 
 from mobee.errors import MobeeError, UnknownName
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.learned import load_learned
+from mobee.learning.record import load_learned
 from mobee.store import Transition, TransitionStore
 from tests.mobee.learning.toys import FickleDice, arm, torso, toy_robot
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.learning.policy_iteration import policy_iteration
+from mobee.learning.value_iteration import policy_iteration
 from tests.mobee.learning.tables import chain, random_problem
 
 

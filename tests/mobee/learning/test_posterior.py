@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.posterior import dirichlet
+from mobee.learning.explorers import dirichlet
 from tests.mobee.learning.toys import InstantPlant, arm
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.lattice import Lattice
-from mobee.learning.recorded import space_from
+from mobee.learning.record import space_from
 from mobee.learning.space import Space
 from mobee.learning.voronoi import Voronoi
 from tests.mobee.learning.toys import arm, torso, toy_robot

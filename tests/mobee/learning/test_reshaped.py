@@ -5,7 +5,7 @@ import pytest
 
 import mobee
 from mobee import Space
-from mobee.learning.edge_table import edges_of
+from mobee.learning.neighbours import edges_of
 from mobee.learning.reshaped import carried, pruned, with_shortcuts
 from mobee.store import Transition
 from tests.mobee.learning.toys import toy_robot

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
-from mobee.learning.divergence import kl_divergence
 from mobee.learning.space import Space
-from mobee.learning.transitions import TransitionModel
+from mobee.learning.transitions import TransitionModel, kl_divergence
 from mobee.learning.value_iteration import value_iteration
 from mobee.reference.learning import imagined, observe
 from tests.mobee.learning.toys import arm, torso

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue, MobeeError
-from mobee.learning.policy_iteration import policy_iteration
 from mobee.learning.transitions import TransitionModel
-from mobee.learning.value_iteration import METHODS, value_iteration
+from mobee.learning.value_iteration import METHODS, policy_iteration, value_iteration
 from mobee.reference.learning import action_values
 from tests.mobee.learning.tables import Table, chain, random_problem
 from tests.mobee.learning.toys import arm

@@ -6,10 +6,11 @@ import heapq
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import ActionInterrupted
 from mobee.learning.lattice import Lattice
 from mobee.plant import Outcome
-from mobee.robot.robot import Array, Motor, Part, Robot
+from mobee.robot.robot import Motor, Part, Robot
 
 # iCub simulator, degrees
 TORSO = {"torso_yaw": (-50, 50), "torso_roll": (-30, 30), "torso_pitch": (-10, 70)}

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control import Gains
-from mobee.robot.robot import Array, Clause, Motor, Part, Robot
+from mobee.robot.robot import Clause, Motor, Part, Robot
 from tests.mobee.planar import tree
 
 Rng = np.random.Generator

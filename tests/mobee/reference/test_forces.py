@@ -11,8 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
+from mobee.arrays import Array
 from mobee.control import Gains
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
 from mobee.reference.contact_forces import projected
 from mobee.reference.forces import (
     State,
@@ -28,8 +30,8 @@ from mobee.reference.forces import (
     squash_norm,
     work_force,
 )
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Clause, Robot
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Clause, Robot
 from tests.mobee.control.felt import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching
 from tests.mobee.planar import planar_arm

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee import kinematics
-from mobee.kinematics.gravity import gravity_torque
-from mobee.model import Model
+from mobee.model import kinematics
+from mobee.model.masses import gravity_torque
+from mobee.model.model import Model
 from mobee.reference.kinematics import cross_matrix, jacobian, link_frames, marker_at, marker_jacobian, moved, rotation, weight_torque
 from mobee.robot.load import load_robot
 from tests.mobee.planar import LENGTH, planar_arm

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.control import Controller, Gains
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
 from mobee.reference.forces import State
 from mobee.reference.law import TERMS, acceleration, at_rest, hold, is_settled, step, torque
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array
+from mobee.robot.load import load_robot
 from tests.mobee.control.two_parts import two_part_arm
 from tests.mobee.reference.drawn import apart, drawn_gains, drawn_pose, drawn_robot
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.reference import motors as reference
-from mobee.robot.robot import Array
 from mobee.simulation import MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
 from tests.mobee.reference.drawn import Rng, drawn_pose, drawn_robot

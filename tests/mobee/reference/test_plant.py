@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from mobee.arrays import Array
 from mobee.control import Gains
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
 from mobee.reference.forces import State
 from mobee.reference.law import TERMS, Term
 from mobee.reference.plant import Plant
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array
+from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from tests.mobee.control.two_parts import touching, two_part_arm
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mobee.control import Controller, Forces, Gains
 from mobee.errors import InvalidValue
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.reach import AIMS, ReachTarget
 from mobee.reference import reach
 from mobee.reference.forces import State, damping, spring

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mobee import minimize
-from mobee.roadmap.building.region import Region
+from mobee.roadmap.building.chart import Region
 
 D = 1.0
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.edge_watch import EdgeWatch, apart
-from mobee.roadmap.edges import check_edges
+from mobee.roadmap.edges import EdgeWatch, apart, check_edges
 
 STEP = 0.005
 COUNT = 40

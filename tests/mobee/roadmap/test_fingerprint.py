@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.fingerprint import robot_digest, world_digest
+from mobee.roadmap.archive import robot_digest, world_digest
 
 
 def test_a_robot_read_again_under_another_name_is_the_same(icub: mobee.Robot) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import mobee
 from mobee.errors import MobeeError
-from mobee.roadmap import free_way
+from mobee.roadmap import graph as free_way
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.graph import graph
 from mobee.roadmap.roadmap import Roadmap

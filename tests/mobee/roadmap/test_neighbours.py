@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.roadmap.graph import components
-from mobee.roadmap.neighbours import nearest, nearest_before, short, sorted_edges
+from mobee.roadmap.graph import components, nearest, nearest_before, short, sorted_edges
 
 SPACING = np.array([0.1, 10.0])
 

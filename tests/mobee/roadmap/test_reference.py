@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.roadmap.reference import reference, rounded
+from mobee.roadmap.playback import reference, rounded
 
 SPEEDS, ACCELERATIONS = np.array([0.3, 0.1, 0.5]), np.array([2.0, 1.0, 5.0])
 DT = 0.01

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mobee.kinematics.forward import link_transforms
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms
+from mobee.robot.robot import Robot
 
 DATA = Path(__file__).parents[2] / "data"
 

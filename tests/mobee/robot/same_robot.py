@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.kinematics.forward import link_transforms
-from mobee.robot.robot import Array, Ints, Robot, Shape
+from mobee.arrays import Array, Ints
+from mobee.model.kinematics import link_transforms
+from mobee.robot.robot import Robot, Shape
 
 
 def assert_same_motors(one: Robot, other: Robot) -> None:

@@ -4,8 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.robot.bodies import ball_of_water, can_be, from_six, one_a_link, to_six
-from mobee.robot.robot import Array, Body
+from mobee.robot.robot import Body
 
 
 def cloud(seed: int, count: int) -> tuple[Array, Array]:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mobee.robot.robot import Robot, Shape
-from mobee.robot.xml_node import Node, read_xml
-from mobee.robot.zero_position import KNOWN, read_robot
+from mobee.robot.xml.node import Node, read_xml
+from mobee.robot.xml.read import KNOWN, read_robot
 
 FILE = Path(__file__).parents[2] / "fuzz" / "seeds" / "every_tag.xml"
 

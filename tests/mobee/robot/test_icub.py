@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mobee.model import Model
+from mobee.arrays import Array
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
 from mobee.robot.icub_urdf import write_upper_body_urdf
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 from tests.mobee.robot.poses import marker_frame, motor_vector, reference_poses, satisfied
 
 YARP_ARM = (

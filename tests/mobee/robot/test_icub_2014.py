@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from tests.mobee.robot.poses import marker_frame, motor_vector, reference_poses

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
-from mobee.kinematics.forward import link_transforms
-from mobee.model import Model
+from mobee.model.kinematics import link_transforms
+from mobee.model.model import Model
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.xml_volume import Z, turn_about
+from mobee.robot.xml.volume import Z, turn_about
 
 ICUB, KATANA = load_robot("icub"), load_robot("katana")
 AT, TURN = np.array([-0.4, 0.3, 0.306]), turn_about(Z, 0.7)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
-from mobee.model import Model
-from mobee.robot.load import ROBOTS, load_robot, load_world, shipped_robots, shipped_worlds
+from mobee.model.model import Model
+from mobee.model.world_file import load_world, shipped_worlds
+from mobee.robot.load import ROBOTS, load_robot, shipped_robots
 from tests.mobee.robot.urdf_files import arm_with, srdf_file
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from mobee.robot.load import load_robot
 from mobee.robot.pairs import joined_links
 from mobee.robot.robot import Robot
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.read import read_robot
 from tests.mobee.robot.robot_files import robot_file
 
 

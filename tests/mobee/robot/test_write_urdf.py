@@ -11,11 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.kinematics.forward import link_transforms
+from mobee.model.kinematics import link_transforms
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.write_urdf import write_urdf
-from mobee.robot.write_xml import write_xml
+from mobee.robot.urdf.write import write_urdf
+from mobee.robot.xml.write import write_xml
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.test_write_xml import random_robot
 from tests.mobee.robot.urdf_files import foreign

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
-from mobee.robot.write_xml import write_xml
+from mobee.robot.xml.write import write_xml
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 

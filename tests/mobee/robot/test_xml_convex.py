@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.xml_convex import read_convex
-from mobee.robot.xml_node import Node
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.body import read_convex
+from mobee.robot.xml.node import Node
+from mobee.robot.xml.read import read_robot
 from tests.mobee.robot.robot_files import robot_file
 
 TETRAHEDRON = "0 0 0  .1 0 0  0 .2 0  0 0 .3"

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from mobee.arrays import Ints
 from mobee.errors import RobotFileError
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Ints, Robot
+from mobee.robot.robot import Robot
 from tests.mobee.robot.robot_files import TAIL
 
 # A chain a, b, c far apart: a solid on each link, two fields on each of b and c, all of one part.

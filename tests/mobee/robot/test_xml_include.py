@@ -7,7 +7,7 @@ import pytest
 
 from mobee.errors import RobotFileError
 from mobee.robot.load import load_robot
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.read import read_robot
 
 ARM = (
     '<bodypart name="arm"><motor name="pan" minPos="0" maxPos="90"><joint z="1">'

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.xml_node import read_xml
+from mobee.robot.xml.node import read_xml
 
 BOMB = """<?xml version="1.0"?>
 <!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mobee.check import check_file
 from mobee.errors import RobotFileError
-from mobee.robot.check import check_file
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 
 HEAD, TAIL = '<ZeroPositionKinematicTree version="1.0" robotName="old">', "</ZeroPositionKinematicTree>"

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.write_xml import write_upgraded
+from mobee.robot.xml.write import write_upgraded
 from tests.mobee.robot.same_robot import assert_same_robot
 
 ARM = """<ZeroPositionKinematicTree{version} robotName="pointer">

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.robot.robot import Array
-from mobee.robot.xml_node import Node
-from mobee.robot.xml_volume import Y, align, read_volume, turn_about
+from mobee.arrays import Array
+from mobee.robot.xml.node import Node
+from mobee.robot.xml.volume import Y, align, read_volume, turn_about
 
 angles = st.floats(-np.pi, np.pi)
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.load import load_world
-from mobee.robot.xml_world import read_world
+from mobee.model.world_file import load_world, read_world
 
 
 def written(folder: Path, *lines: str) -> Path:

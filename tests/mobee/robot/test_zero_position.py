@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.kinematics.forward import link_transforms
+from mobee.model.kinematics import link_transforms
 from mobee.robot.robot import Robot
-from mobee.robot.zero_position import read_robot
+from mobee.robot.xml.read import read_robot
 from tests.mobee.robot.robot_files import robot_file
 
 ARM = (

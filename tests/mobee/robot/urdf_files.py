@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 
 HEAD = '<robot name="toy">'
 LINKS = '<link name="base"/><link name="upper"/><link name="lower"/>'

@@ -10,8 +10,9 @@ import pytest
 
 from mobee import sphere
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from mobee.simulation.rigid import living, stiffened
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.simulation import OfflinePlant, run_batch
 from tests.mobee.control.two_parts import two_part_arm
 

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.robot.robot import Array
-from mobee.simulation.braking import Braking
+from mobee.arrays import Array
+from mobee.simulation.motors import Braking
 
 N, DT = 6, 0.01
 LOWER, UPPER = np.linspace(-2.0, -0.5, N), np.linspace(0.5, 2.0, N)

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mobee.arrays import Array
 from mobee.control import Controller, Gains
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors, OfflinePlant
 
 ICUB = load_robot("icub")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee.control.modality import FRICTION, INERTIA
+from mobee.control.law import FRICTION, INERTIA
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters, Motors

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mobee.arrays import Array
 from mobee.control import Gains, Settle
 from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
-from mobee.model import Model
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array, Robot
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from tests.mobee.control.two_parts import touching, two_part_arm
 

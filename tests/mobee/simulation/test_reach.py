@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee.collision import sphere
+from mobee.arrays import Array
 from mobee.control import Controller, Gains, Settle
 from mobee.errors import ActionInterrupted, InvalidValue
-from mobee.model import Model
+from mobee.model import sphere
+from mobee.model.model import Model
+from mobee.model.world_file import load_world
 from mobee.reach import TARGET, ReachTarget
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array
+from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors, OfflinePlant
 from tests.mobee.control.two_parts import two_part_arm
 

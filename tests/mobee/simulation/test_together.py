@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from mobee import BatchInterrupted, advance_together, run_together, sphere
-from mobee.collision.world import World
 from mobee.control import Gains, Term
 from mobee.errors import ActionInterrupted, InvalidValue
-from mobee.model import Model
+from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.model.world_file import load_world
 from mobee.reach import ReachTarget
-from mobee.robot.load import load_robot, load_world
+from mobee.robot.load import load_robot
 from mobee.simulation import OfflinePlant
 
 ICUB, ICUB_2014, KATANA = (load_robot(name) for name in ("icub", "icub_2014", "katana"))

@@ -14,7 +14,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     orphaned: float = 10.0
     """Seconds without a router."""
-    dawdle: float = 0.0
+    inject_test_delay: float = 0.0
     """Seconds spent on every object."""
     gains: Literal["default", "published_2014"] = "default"
     """A word out of few."""

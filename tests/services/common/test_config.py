@@ -53,7 +53,7 @@ def test_an_unknown_field_is_told_with_file_line_and_nearest_name(tmp_path: Path
     text = line(["--config", file], capsys)
     assert f"{file}:3: " in text
     assert "'dawdel'" in text
-    assert "Did you mean 'dawdle'?" in text
+    assert "Did you mean 'inject_test_delay'?" in text
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,7 @@ from bus_schema import VERSION, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Event, Forces, Geometry, WorldObject
 from bus_schema.rpc import Config, Done, Empty, Failure, Stat, Take, Taken
 from services.common import rpc
-from services.common.bus import Bus
-from services.common.delivery import DATA, LATEST
+from services.common.bus import DATA, LATEST, Bus
 from services.common.rpc import CallFailed
 from tests.services.harness import QUICK_END, Program, Rig, free_endpoint, rig, wait_for
 
@@ -309,7 +308,7 @@ def test_a_signal_ends_a_service_that_dials_a_silent_listener(bus: Rig) -> None:
 def test_a_signal_ends_a_service_in_the_middle_of_a_flood(tmp_path: Path, bus: Rig) -> None:
     """Also what a flood may not do: keep calls from being answered, or fill the memory."""
     with rig(tmp_path, bus.robot) as alone:
-        program = another(alone, "--dawdle", "0.0002")
+        program = another(alone, "--inject_test_delay", "0.0002")
         clock = alone.bus.publisher(keys.CLOCK, Clock, LATEST)
         publisher = alone.bus.publisher(keys.world("ball"), WorldObject, DATA)
         enough = threading.Event()

@@ -14,7 +14,7 @@ from bus_schema import keys
 from bus_schema.messages import Command, Message, Motion
 from bus_schema.rpc import Done, Force, Goal, Started, Take, Taken
 from mobee import Gains, load_robot
-from mobee.robot.robot import Array
+from mobee.arrays import Array
 from services.common.rpc import CallFailed
 from tests.services.fake_model import FakeModel
 from tests.services.fake_sim import FakeSim

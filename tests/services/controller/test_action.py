@@ -32,7 +32,7 @@ def test_an_action_moves_and_settles_at_its_goal(run: Stage) -> None:
 
 def test_an_action_that_does_not_die_down_times_out(run: Stage) -> None:
     _, epoch = run.own("torso")
-    run.sim.frozen = True  # the spring pulls for ever, so the commanded velocity stays
+    run.sim.frozen = True  # the spring pulls indefinitely, so the commanded velocity stays
     run.goal("torso", epoch, near("torso", 0.5), "in_vain")
     for _ in range(60):
         if run.motion("torso").status == "timeout":

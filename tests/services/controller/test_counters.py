@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from services.controller import counters
-from services.controller.counters import Counters
+from services.controller import commanding as counters
+from services.controller.commanding import Counters
 
 
 def test_the_first_step_has_no_period_and_the_others_are_compared_with_what_was_due(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,8 @@ from bus_schema import keys
 from bus_schema.messages import Reach, Targets
 from bus_schema.rpc import ReachFor, Started
 from mobee import Model
-from mobee.robot.robot import Array
-from services.common.delivery import LATEST
+from mobee.arrays import Array
+from services.common.bus import LATEST
 from tests.services.controller.stage import ROBOT, SETTLE, Stage, near, refused
 from tests.services.harness import wait_for
 

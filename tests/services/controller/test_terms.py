@@ -10,8 +10,8 @@ import pytest
 from bus_schema import keys
 from bus_schema.messages import ContactItem, Forces
 from mobee import InvalidValue, Model, Term, load_world
+from mobee.arrays import Array
 from mobee.control import State
-from mobee.robot.robot import Array
 from services.controller.terms import ToldContacts, load_terms
 from tests.services.controller.stage import ROBOT, Stage, staged
 from tests.services.harness import rig, wait_for

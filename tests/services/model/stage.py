@@ -17,8 +17,8 @@ from bus_schema.rpc import (
     World,
 )
 from mobee import Model, load_robot, load_world
-from mobee.robot.robot import Array
-from services.common.delivery import DATA
+from mobee.arrays import Array
+from services.common.bus import DATA
 from tests.services.fake_sim import FakeSim
 from tests.services.harness import Program, Rig, wait_for
 

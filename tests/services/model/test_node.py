@@ -17,7 +17,7 @@ from bus_schema.rpc import (
 )
 from mobee import Gains, constraint_forces
 from mobee.control.forces import told_terms
-from mobee.kinematics.quaternion import to_matrix
+from mobee.model.quaternion import to_matrix
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.model.stage import TICK, Stage, library, on_the_table

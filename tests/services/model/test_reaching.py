@@ -13,8 +13,7 @@ from bus_schema import keys
 from bus_schema.messages import Reach, Targets
 from bus_schema.rpc import AddObject, Done, MoveObject, OneName
 from mobee.reach import TARGET
-from services.common.bus import Publisher
-from services.common.delivery import LATEST
+from services.common.bus import LATEST, Publisher
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.model.stage import BALL, UPRIGHT, Stage, library

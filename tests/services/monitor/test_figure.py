@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mobee.collision import World, sphere
+from mobee.model import World, sphere
 from mobee.robot.robot import Robot
-from tests.mobee.robot.check.arm import arm
+from tests.mobee.check.arm import arm
 
 rr = pytest.importorskip("rerun")
 from services.monitor import palette  # noqa: E402  # only where Rerun is

@@ -5,7 +5,7 @@ import pytest
 
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from services.monitor.sweep import sweep
+from services.monitor.view import sweep
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from bus_schema import keys
 from bus_schema.messages import Clock, Command, Event, State, Truth
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.load import load_robot
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from tests.services.harness import Rig, wait_for
 
 ROBOT = load_robot("icub")

@@ -8,12 +8,11 @@ import numpy as np
 
 from bus_schema import VERSION
 from bus_schema.messages import Command
+from mobee.arrays import Array
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array
 from mobee.simulation.motors import MotorParameters, Motors
+from services.robot_sim.admission import Limits, Order
 from services.robot_sim.gate import Drive, Gate
-from services.robot_sim.limits import Limits
-from services.robot_sim.order import Order
 
 ROBOT = load_robot("icub")
 PART = "torso"

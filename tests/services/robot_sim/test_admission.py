@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bus_schema import Refused
-from services.robot_sim.admission import MARGIN, START, Admission
-from services.robot_sim.order import Order
+from services.robot_sim.admission import MARGIN, START, Admission, Order
 from tests.services.robot_sim.gated import LIMITS, N
 
 FINE = np.full(N, 0.01)

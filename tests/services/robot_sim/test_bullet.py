@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from mobee import Model
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.backend import BackendUnavailable
+from services.robot_sim.bullet_scene import load_solid_pairs
 from services.robot_sim.config import Config
+from services.robot_sim.kinematic import BackendUnavailable
 from services.robot_sim.make import make_backend
-from services.robot_sim.pairs import load_solid_pairs
 
 pytest.importorskip("pybullet")
 from services.robot_sim.bullet import BulletBackend  # noqa: E402  # only where PyBullet is

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee import Controller, Gains, Model
-from mobee.control.modality import FRICTION, INERTIA, Modality
-from mobee.kinematics.gravity import gravity_torque
-from mobee.robot.load import load_robot, load_world
-from mobee.robot.robot import Array
+from mobee.arrays import Array
+from mobee.control.law import FRICTION, INERTIA, Modality
+from mobee.model.masses import gravity_torque
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.bullet_torque import Gears, Motion
 

@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.robot_sim.backend import SolidContact
-from services.robot_sim.counters import Counters
-from services.robot_sim.stops import Stops
+from services.robot_sim.counters import Counters, Stops
+from services.robot_sim.kinematic import SolidContact
 from tests.services.robot_sim.gated import Gated
 
 

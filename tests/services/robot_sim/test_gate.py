@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from bus_schema import Refused
 from mobee.simulation.motors import MotorParameters
+from services.robot_sim.admission import Order
 from services.robot_sim.gate import Gate
-from services.robot_sim.order import Order
 from tests.services.robot_sim.gated import LIMITS, PART, ROBOT, WHERE, Gated, N
 
 VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]

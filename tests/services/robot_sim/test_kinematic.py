@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.kinematics.gravity import gravity_torque
-from mobee.robot.load import load_robot, load_world
+from mobee.model.masses import gravity_torque
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.kinematic import KinematicBackend
 

@@ -14,7 +14,7 @@ from bus_schema.chain import Answer, Commands, Order
 from bus_schema.messages import Clock, Command, Event, State, StepDone
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee import load_robot
-from services.common.delivery import LATEST, STEP
+from services.common.bus import LATEST, STEP
 from tests.services.harness import Rig, rig, wait_for
 
 ROBOT = load_robot("icub")

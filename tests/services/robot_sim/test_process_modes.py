@@ -9,8 +9,8 @@ import pytest
 from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
-from mobee.kinematics.gravity import gravity_torque
-from services.common.delivery import LATEST
+from mobee.model.masses import gravity_torque
+from services.common.bus import LATEST
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.robot_sim.bench import DT, ELBOW, ROBOT, Bench, elbow

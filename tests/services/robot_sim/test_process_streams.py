@@ -13,7 +13,7 @@ from bus_schema import keys
 from bus_schema.chain import Commands, Order, Tick
 from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty, PartMeta, Place
-from services.common.delivery import LATEST
+from services.common.bus import LATEST
 from services.common.rpc import CallFailed
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ARM, DT, ROBOT, Bench, elbow

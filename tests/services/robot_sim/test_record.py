@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.robot.load import load_robot, load_world
+from mobee.model.world_file import load_world
+from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.config import Config
 from services.robot_sim.kinematic import KinematicBackend
 from services.robot_sim.make import make_backend
-from services.robot_sim.record import CONTACTS, POSITIONS, Recorded
+from services.robot_sim.watch import CONTACTS, POSITIONS, Recorded
 
 ROBOT = load_robot("icub")
 DT = 0.01

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.robot_sim.streams import PHASES, Phases
+from services.robot_sim.sensors import PHASES, Phases
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
 

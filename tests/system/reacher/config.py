@@ -9,4 +9,4 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     run_dir: str = ""
     """Folder for what came of it."""
     in_vain: bool = False
-    """Reach for what is out of reach, for ever."""
+    """Reach for what is out of reach, indefinitely."""

@@ -11,7 +11,8 @@ from bus_schema import keys
 from bus_schema.messages import Command, Message, Motion, State
 from bus_schema.rpc import Driven, Goal, Started, Take, Taken, WithEpoch
 from experiments.claims.ch4_reflex.babbling_commands import Commanded, Ending, PositionMove, Targets
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed
 from services.common.service import Service
 

@@ -58,7 +58,7 @@ from experiments.kit.progress import Progress
 from experiments.kit.recordings import POSITIONS
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
-from mobee.roadmap.ompl_base import require_ompl
+from mobee.roadmap.ompl import require_ompl
 from mobee.store import STORE
 
 TRIES, LIVE, FRESH_TARGETS, MOVING_THINGS = 800, 54, 50, 8

@@ -17,12 +17,13 @@ from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.belief import PeerBelief, approach
 from experiments.kit.reaching.targets import grid
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World, load_robot, load_world
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.learned import load_learned
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
+from mobee.learning.record import load_learned
 from mobee.reach import Aim, ReachPlant, ReachTarget
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.store import TransitionStore
 
 ROBOT, GAINS, RATE = "icub", "default", 50  # Hz

@@ -31,8 +31,8 @@ from experiments.kit.live import read_done
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_touches
 from mobee import Model, OfflinePlant
+from mobee.arrays import Array
 from mobee.reach import RADIUS, ReachTarget
-from mobee.robot.robot import Array
 
 BLOCK = "block.json"
 STILL = 20  # ticks before a request, in which the motion of joints at rest is measured

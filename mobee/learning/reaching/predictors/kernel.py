@@ -1,4 +1,4 @@
-"""Kernel regression (Nadaraya and Watson) of the rewards over poses and targets; its scales are chosen by leaving one out."""
+"""Nadaraya-Watson kernel regression of the rewards over poses and targets; scales by leave-one-out."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.learning.reaching.predictors.covariance import joint_squares
-from mobee.learning.reaching.predictors.independent import Independent
-from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.learning.reaching.predictors.prior import DistancePrior
-from mobee.learning.reaching.predictors.reached import Reached, around
-from mobee.robot.robot import Array
+from mobee.learning.reaching.predictors.predictor import DistancePrior, Reaches
+from mobee.learning.reaching.predictors.reached import Independent, Reached, around
 
 JOINTS = (0.05, 0.15, 0.3, 0.5, 0.8)  # scales of the poses, in units of the spread of the samples
 PLACES = (0.03, 0.06, 0.1, 0.15, 0.25)  # of the targets, m

@@ -1,4 +1,4 @@
-"""What a reach would leave of the way to a target if the arm were linear: springs at its joints, and a pull at its hand.
+"""Predicts the remaining error of a reach from a linear arm: springs at the joints, a force at the hand.
 
 In the pose of a state with the Jacobian J, a pull of the remaining way e turns the joints by g J^T e, against their springs.  So of the
 way w, e = (I + g J J^T)^-1 w is left.  How far the joints give, g, is one number for all states, fitted to the rewards seen.
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
 from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import Reached
-from mobee.robot.robot import Array, Ints
 
 GIVES = (0.0, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)  # rad/m^2
 USUAL = 20.0  # before anything is known

@@ -1,4 +1,4 @@
-"""The nearest reaches: rewards of those from similar poses over a similar way from the hand to the target."""
+"""Nearest-neighbour regression: rewards of reaches from similar poses over similar vectors from hand to target."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array, Ints
+from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import joint_squares
-from mobee.learning.reaching.predictors.independent import Independent
 from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.learning.reaching.predictors.reached import around
-from mobee.learning.reaching.room import forget
-from mobee.robot.robot import Array, Ints
+from mobee.learning.reaching.predictors.reached import Independent, around
 
 NEIGHBOURS = 5
 WAY = 0.1  # m: as far apart as one joint at both ends of its samples, divided by:

@@ -1,4 +1,4 @@
-"""A few small neural networks that each learn from their own draw of the reaches: what they disagree about is not known yet."""
+"""A small ensemble of neural networks; their disagreement is the uncertainty."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.robot.robot import Array
 
 NETWORKS, HIDDEN = 5, 32
 STEPS, BATCH = 4, 64  # of descent after each reach

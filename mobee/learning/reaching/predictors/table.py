@@ -1,4 +1,4 @@
-"""A table of every state and target: what reaching brought just there, and nothing learned for anywhere else."""
+"""A table of mean rewards for each state and target, without generalisation."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.independent import Independent
+from mobee.arrays import Array
 from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.learning.reaching.predictors.reached import IMAGINED, around
-from mobee.robot.robot import Array
+from mobee.learning.reaching.predictors.reached import IMAGINED, Independent, around
 
 NOISE = 0.05  # standard deviation of a reward around its mean, before repeats tell
 

@@ -1,4 +1,4 @@
-"""The published predictor: averages over a state's history, weighted by how near its targets were (thesis eq. 8.5)."""
+"""The published predictor: averages over a state's history weighted by the distance of targets (thesis eq. 8.5)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.histories import Histories
 from mobee.learning.reaching.predictors.predictor import Reaches
-from mobee.robot.robot import Array
 
 _NO_DEVIATION = (
     "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."

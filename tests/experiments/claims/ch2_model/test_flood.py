@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mobee
-import mobee.collision.world
+import mobee.model.world
 from experiments.claims.ch2_model import flood
 from experiments.claims.ch2_model.flood import Flood, binned, flood_model, rates
 from experiments.claims.ch2_model.flood_endurance import (
@@ -25,7 +25,7 @@ from experiments.claims.ch2_model.flood_endurance import (
 from experiments.claims.ch2_model.flood_threads import Oscillator
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.records import read_records
-from mobee.collision.snapshot import changed
+from mobee.model.snapshot import changed
 from tests.experiments.small_run import options_of
 
 HEAD = "robot,objects,edits,seconds,evaluations\n"
@@ -131,7 +131,7 @@ def test_four_threads_edit_for_some_seconds_and_nothing_is_torn(tmp_path):
 
 
 def test_a_world_whose_rows_lag_behind_its_objects_does_not_pass(tmp_path, monkeypatch):
-    monkeypatch.setattr(mobee.collision.world, "changed", lambda old, new: replace(changed(old, new), rows=old.rows))
+    monkeypatch.setattr(mobee.model.world, "changed", lambda old, new: replace(changed(old, new), rows=old.rows))
     verdict = endure(tmp_path, threads=2, duration=0.5, seed=0)
     assert not verdict["passed"]
     assert "rows are not those of the objects" in verdict["torn"]

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.claims.ch5_control import shove
 from experiments.kit.control_runs import icub_at_table
-from mobee.control.modality import FRICTION, INERTIA
+from mobee.control.law import FRICTION, INERTIA
 from mobee.simulation import OfflinePlant
 from tests.experiments.small_run import small_run
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mobee.learning.reaching.alike import DETOUR, IMAGINED, JOINT, WAY, AlikeFailures
+from mobee.learning.reaching.failures import DETOUR, IMAGINED, JOINT, WAY, AlikeFailures
 from mobee.learning.reaching.predictors import Reaches
 from tests.mobee.learning.reaching.toy import HANDS, SPACE
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.problems import Problems
+from mobee.learning.reaching.tries import Problems
 from mobee.reach import ReachTarget
 
 A, B, C = (ReachTarget(np.array([x, 0.0, 0.2])) for x in (-0.3, -0.2, -0.0))

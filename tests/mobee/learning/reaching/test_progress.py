@@ -4,7 +4,7 @@ import numpy as np
 
 from mobee.learning.reaching.predictors import Reaches
 from mobee.learning.reaching.predictors.table import Table
-from mobee.learning.reaching.progress import AT_RANDOM, WINDOW, Progress
+from mobee.learning.reaching.strategies import AT_RANDOM, WINDOW, Progress
 
 MADE = Reaches(np.zeros((3, 2)) + np.arange(3)[:, None], np.zeros((3, 3)))
 STEADY = next(seed for seed in range(100) if np.random.default_rng(seed).random() >= AT_RANDOM)

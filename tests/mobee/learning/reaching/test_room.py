@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.room import forget, room_for
+from mobee.learning.reaching.histories import forget, room_for
 
 
 def test_an_array_that_is_long_enough_is_kept_and_another_grows_twice_as_long():

@@ -6,7 +6,7 @@ import pytest
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.lattice import Lattice
 from mobee.learning.reaching.where import hands_of, reaches_of
-from mobee.model import Model
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
 
 ROBOT = load_robot("icub")

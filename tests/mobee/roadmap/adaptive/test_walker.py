@@ -5,7 +5,7 @@ import pytest
 
 import mobee
 from mobee.roadmap.adaptive.explorer import MapExplorer
-from mobee.roadmap.adaptive.map_store import MapStore
+from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import Walker
 from tests.mobee.roadmap.toy_map import SQUARE, BlockedPlant, random_map, square, wall
 

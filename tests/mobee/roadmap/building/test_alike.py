@@ -5,8 +5,7 @@ import pytest
 
 import mobee
 from mobee import costs, tasks
-from mobee.roadmap.building.alike import made_alike
-from mobee.roadmap.building.goals import Goals
+from mobee.roadmap.building.goals import Goals, made_alike
 from mobee.roadmap.ik.problem import Problem
 from tests.mobee.planar import planar_arm
 

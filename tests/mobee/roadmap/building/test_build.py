@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.building import build, draft, outset
+from mobee.roadmap.building import build, draft
+from mobee.roadmap.building import search_schedule as outset
 from mobee.roadmap.building.draft import Progress
 
 MOTORS = ["torso", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow", "r_wrist_prosup", "r_wrist_pitch", "r_wrist_yaw"]

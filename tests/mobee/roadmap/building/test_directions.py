@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.roadmap.building.directions import directions
+from mobee.roadmap.building.chart import directions
 
 
 @pytest.mark.parametrize(("dimensions", "widest"), [(1, 0.0), (2, 8.0), (3, 20.0), (4, 60.0), (6, 75.0)])

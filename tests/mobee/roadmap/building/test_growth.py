@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from mobee import MobeeError
-from mobee.roadmap.building import outset
+from mobee.roadmap.building import search_schedule as outset
 from mobee.roadmap.building.chart import NEAREST
 from mobee.roadmap.building.front import Front
 from mobee.roadmap.building.growth import Growth

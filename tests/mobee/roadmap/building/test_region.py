@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from mobee.roadmap.building.region import FLAT, Region
+from mobee.roadmap.building.chart import FLAT, Region
 
 
 @settings(max_examples=15, deadline=None)

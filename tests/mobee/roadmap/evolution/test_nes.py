@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
-from mobee.roadmap.evolution.nes import METHODS, NES
-from mobee.roadmap.evolution.rates import default_population, path_rates, published_utilities
+from mobee.roadmap.evolution.nes import METHODS, NES, default_population, path_rates, published_utilities
 
 D = 4
 seeds = st.integers(0, 10_000)
@@ -82,7 +81,7 @@ def test_the_shape_stays_positive_definite_under_absurd_ranks() -> None:
 def test_the_exponential_is_that_of_the_whole_matrix() -> None:
     from scipy.linalg import expm
 
-    from mobee.roadmap.evolution.shapes import turned
+    from mobee.roadmap.evolution.nes import turned
 
     rng = np.random.default_rng(0)
     z, weights, shape = rng.standard_normal((7, 4)), rng.uniform(-0.2, 0.5, 7), rng.standard_normal((4, 4))
@@ -94,7 +93,7 @@ def test_the_exponential_is_that_of_the_whole_matrix() -> None:
 def test_a_long_series_ends() -> None:
     from scipy.linalg import expm
 
-    from mobee.roadmap.evolution.shapes import turned
+    from mobee.roadmap.evolution.nes import turned
 
     z = np.array([[4.0, 0.0], [0.0, 2.0]])
     np.testing.assert_allclose(turned(np.eye(2), z, np.ones(2), 1.0), expm(np.diag([7.5, 1.5])), rtol=1e-10)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee import NES
-from mobee.roadmap.evolution.searches import Searches
+from mobee.roadmap.evolution.search import Searches
 
 
 def test_each_of_several_searches_does_what_one_alone_does() -> None:

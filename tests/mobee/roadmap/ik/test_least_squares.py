@@ -10,8 +10,7 @@ from mobee.errors import InvalidValue
 from mobee.roadmap.ik import costs
 from mobee.roadmap.ik.aims import level
 from mobee.roadmap.ik.least_squares import Descent, aim_reals, least_squares
-from mobee.roadmap.ik.needed import needed
-from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.problem import Problem, needed
 
 PALMS = "left_palm", "right_palm"
 CLOSED = (

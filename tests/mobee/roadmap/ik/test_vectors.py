@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.roadmap.ik.vectors import angle_between, lengths, unit_vector, units, vector
+from mobee.roadmap.ik.costs import angle_between, lengths, unit_vector, units, vector
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-6, 0.5, np.pi / 2, 3.0, np.pi - 1e-6, np.pi])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.robot.urdf.bounding import Primitive, bounding_sphere, smallest, smallest_capsule
+from mobee.robot.urdf.hull import Primitive, bounding_sphere, smallest, smallest_capsule
 
 
 def outside(points: np.ndarray, primitive: Primitive) -> float:

@@ -8,7 +8,7 @@ import pytest
 from mobee.errors import RobotFileError
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.write_urdf import write_urdf
+from mobee.robot.urdf.write import write_urdf
 
 URDF = """<robot name="arm">
  <link name="base"/>

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.urdf.mesh_path import find_mesh
-from mobee.robot.xml_node import Node
+from mobee.robot.urdf.mesh import find_mesh
+from mobee.robot.xml.node import Node
 
 
 @pytest.fixture

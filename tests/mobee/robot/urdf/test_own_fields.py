@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.model import Model
-from mobee.robot.robot import Array, Robot
+from mobee.arrays import Array
+from mobee.model.model import Model
+from mobee.robot.robot import Robot
 from mobee.robot.urdf import UrdfOptions, read_urdf
-from mobee.robot.urdf.own_fields import segment_distances
+from mobee.robot.urdf.pairs import segment_distances
 from tests.mobee.robot.urdf_files import foreign, srdf_file, urdf_file
 
 BODY = '<link name="{0}"><collision><geometry>{1}</geometry></collision></link>'

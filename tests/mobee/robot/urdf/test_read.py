@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mobee.arrays import Array
 from mobee.errors import InvalidValue, RobotFileError
-from mobee.kinematics.forward import link_transforms
-from mobee.kinematics.jacobian import point_jacobian
+from mobee.model.kinematics import link_transforms, point_jacobian
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from mobee.robot.urdf import UrdfOptions, read_urdf
-from mobee.robot.write_urdf import write_urdf
+from mobee.robot.urdf.write import write_urdf
 from tests.mobee.robot.urdf_files import ARM, foreign, urdf_file
 
 # prismatic and mimic: panda, pr2_gripper, r2d2, xarm with its gripper; continuous: laikago, mini_cheetah, racecar, r2d2

@@ -15,11 +15,11 @@ from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.learning import Course
 from experiments.kit.reaching.planner_peer import PlannerPeer
 from mobee import Model
+from mobee.arrays import Array
 from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.plant import Outcome
 from mobee.reach import ReachTarget
-from mobee.robot.robot import Array
 
 
 @dataclass(frozen=True, slots=True)

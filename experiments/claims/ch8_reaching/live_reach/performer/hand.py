@@ -10,8 +10,9 @@ from bus_schema.messages import Clock, Geometry, Reach
 from bus_schema.rpc import AddObject, Done, MoveObject, OneName, Place, Request
 from experiments.claims.ch8_reaching.live_reach.problems import SPEED
 from experiments.kit.reaching.arm import PART
+from mobee.arrays import Array
 from mobee.reach import RADIUS
-from mobee.robot.robot import Array, Robot
+from mobee.robot.robot import Robot
 from services.common.bus_plant import BusPlant
 from services.common.lockstep import Participant
 from services.common.service import Service

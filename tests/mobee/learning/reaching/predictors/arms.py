@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.learning.reaching.predictors import Reaches, RewardPredictor
-from mobee.robot.robot import Array
 
 STATES, TARGETS = 12, 6
 FAR = np.array([50.0, -40.0, 60.0])  # m: from where nothing is alike

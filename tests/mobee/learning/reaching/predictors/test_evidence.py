@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.predictors import evidence
-from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
-from mobee.learning.reaching.predictors.evidence import most_likely, surprise
+from mobee.learning.reaching.predictors import covariance as evidence
+from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, most_likely, points, surprise, usual
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.reached import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches

@@ -5,9 +5,8 @@ import pytest
 
 from mobee.learning.reaching.predictors import gaussian_process
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
-from mobee.learning.reaching.predictors.gaussian_process import GaussianProcess, thinned
+from mobee.learning.reaching.predictors.gaussian_process import BLOCK, GaussianProcess, thinned
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.posterior import BLOCK
 from mobee.learning.reaching.predictors.reached import Reached
 from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
 
@@ -46,7 +45,7 @@ def test_targets_forgotten_in_memory_are_worked_out_again(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 100)
     other = taught(GaussianProcess(made, refits=()), seen)
     expected = [other.mean(target) for target in places()]
-    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", 80e3)
+    monkeypatch.setattr("mobee.learning.reaching.predictors.gaussian_process.KEPT", 80e3)
     process = taught(GaussianProcess(made, refits=()), seen)
     for _ in range(2):
         for target, mean in zip(places(), expected, strict=True):
@@ -72,7 +71,7 @@ def test_what_is_kept_of_targets_is_bounded_by_its_bytes(monkeypatch, targets, k
     process = GaussianProcess(made, refits=())
     process.mean(places()[0])
     (one,) = process._posterior._asked.values()
-    monkeypatch.setattr("mobee.learning.reaching.predictors.posterior.KEPT", targets * (one.rows.nbytes + 2 * one.covariance.nbytes))
+    monkeypatch.setattr("mobee.learning.reaching.predictors.gaussian_process.KEPT", targets * (one.rows.nbytes + 2 * one.covariance.nbytes))
     for distance in range(6):
         process.mean(np.array([distance, 0.0, 0.0]))
     assert len(process._posterior._asked) == kept

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.prior import KNOTS, DistancePrior, lengths
+from mobee.learning.reaching.predictors.predictor import KNOTS, DistancePrior, lengths
 from mobee.learning.reaching.predictors.reached import EXPECTED, Reached
 from tests.mobee.learning.reaching.predictors.arms import FAR, places, reaches
 

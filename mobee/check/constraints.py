@@ -1,0 +1,189 @@
+"""Checks clauses: contradictions with limits or each other, violations at home, rows without effect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice, product
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.check.finding import Finding, some
+from mobee.check.subject import Subject
+from mobee.control.gains import Gains
+from mobee.control.law import stack_clauses
+from mobee.robot.robot import Clause
+
+ROUNDING = np.deg2rad(0.01)
+
+
+def constraints(subject: Subject) -> Iterator[Finding]:
+    """All that can be said of the robot's clauses."""
+    robot = subject.robot
+    dead = False
+    for index, clause in enumerate(robot.clauses):
+        least, most = row_range(clause, subject.range)
+        if most.max() <= 0:
+            dead = True
+            yield _impossible(subject, index, most)
+        else:
+            yield from _idle_rows(subject, index, least, most)
+        at_home = clause.a @ subject.home + clause.b
+        if most.max() > 0 and at_home.max() < -ROUNDING:
+            yield _violated_at_home(subject, index)
+        elif most.max() > 0 and (at_home / np.linalg.norm(clause.a, axis=1)).max() < Gains.default().constraint_width - ROUNDING:
+            yield _pushed_at_home(subject, index, float(at_home.max()))
+    if not dead:
+        yield from _contradiction(subject, robot.clauses)
+
+
+def row_range(clause: Clause, limits: Array) -> tuple[Array, Array]:
+    """Smallest and largest a.q + b of every row within the limits (n, 2), each (rows,) rad."""
+    ends = clause.a[:, :, None] * limits[None]
+    return ends.min(axis=2).sum(axis=1) + clause.b, ends.max(axis=2).sum(axis=1) + clause.b
+
+
+def _impossible(subject: Subject, index: int, most: Array) -> Finding:
+    return Finding(
+        "error",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"{_name(subject, index)} cannot be satisfied within the limits: a.q + b reaches {_degrees(most.max())} at most",
+        "the controller would push indefinitely against the limits",
+        'check the sign: a row is satisfied when a.q + b > 0, and negate="true" flips it; b is in degrees',
+    )
+
+
+def _violated_at_home(subject: Subject, index: int) -> Finding:
+    clause, home = subject.robot.clauses[index], subject.home
+    return Finding(
+        "warning",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"home violates {_name(subject, index)}: a.q + b is {_degrees((clause.a @ home + clause.b).max())} there",
+        "the robot is pushed away from home before anything has happened",
+        "move the home or correct the constraint (satisfied is a.q + b > 0)",
+    )
+
+
+def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
+    return Finding(
+        "note",
+        "constraint",
+        subject.where("clause", str(index)),
+        f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_degrees(value)} there",
+        f"the default gains push within {_degrees(Gains.default().constraint_width)} of it: the robot does not rest at home",
+        "nothing, if that is meant; else move the home",
+    )
+
+
+def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Iterator[Finding]:
+    """Rows that are true in every pose, which makes the clause useless, and rows that are true in none."""
+    where, name = subject.where("clause", str(index)), _name(subject, index)
+    if least.max() > 0:
+        yield Finding(
+            "note",
+            "constraint",
+            where,
+            f"{name} is satisfied in every pose within the limits: a.q + b is never below {_degrees(least.max())}",
+            "it excludes nothing; at most it pushes near its boundary",
+            "remove it, or check sign and unit (degrees)",
+        )
+        return
+    for row in np.flatnonzero(most <= 0):
+        yield Finding(
+            "note",
+            "constraint",
+            where,
+            f"row {row + 1} of {name} is satisfied in no pose within the limits: a.q + b stays below {_degrees(most[row])}",
+            "the other rows decide alone",
+            "remove the row, or check sign and unit (degrees)",
+        )
+
+
+def _contradiction(subject: Subject, clauses: Sequence[Clause]) -> Iterator[Finding]:
+    starts = np.concatenate([subject.home[None], subject.samples])
+    fighting = conflict(clauses, subject.range, starts)
+    if fighting:
+        others = ", ".join(subject.where("clause", str(index)) for index in fighting[1:])
+        yield Finding(
+            "error",
+            "constraint",
+            subject.where("clause", str(fighting[0])),
+            f"{_name(subject, fighting[0])} contradicts {others}: no pose within the limits was found that satisfies them together",
+            "wherever the robot is, a constraint pushes it",
+            "check the signs: a row is satisfied when a.q + b > 0; all lists of a part must hold together",
+        )
+
+
+def _name(subject: Subject, index: int) -> str:
+    clause = subject.robot.clauses[index]
+    motors = [subject.robot.motors[column] for column in np.flatnonzero(clause.a.any(axis=0))]
+    return f"the constraint on {some(motors)}"
+
+
+def _degrees(value: float) -> str:
+    return f"{np.rad2deg(value):.4g} deg"
+
+
+CHOICES = 64  # ways of choosing a row of every clause that are tried, after those that are nearly satisfied
+STEPS = 400  # of correction a choice
+FIRST = 8  # poses that are corrected
+MARGIN = 1e-6  # rad
+
+
+def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
+    """Indices of a smallest set of clauses that no pose was found to satisfy together; () if all can be.
+
+    `limits` (n, 2) rad, `poses` (k, n) rad within them to begin from.  A witness proves that clauses agree; that none is found proves
+    nothing, but the clauses named are then few, and a person sees.
+    """
+    for group in _connected(clauses):
+        if _satisfiable([clauses[k] for k in group], limits, poses):
+            continue
+        kept = group
+        for index in group:
+            fewer = [k for k in kept if k != index]
+            if fewer and not _satisfiable([clauses[k] for k in fewer], limits, poses):
+                kept = fewer
+        return tuple(kept)
+    return ()
+
+
+def _connected(clauses: Sequence[Clause]) -> list[list[int]]:
+    """Clauses in groups that share no motor: only within one can they contradict each other."""
+    groups: list[tuple[set[int], list[int]]] = []
+    for index, clause in enumerate(clauses):
+        motors, members = set(np.flatnonzero(clause.a.any(axis=0)).tolist()), [index]
+        for group in [group for group in groups if group[0] & motors]:
+            groups.remove(group)
+            motors, members = motors | group[0], group[1] + members
+        groups.append((motors, sorted(members)))
+    return [members for _, members in groups]
+
+
+def _satisfiable(clauses: Sequence[Clause], limits: Array, poses: Array) -> bool:
+    rows = stack_clauses(clauses, poses.shape[1])
+    best = np.maximum.reduceat(poses @ rows.a.T + rows.b, rows.starts, axis=1).min(axis=1)
+    if best.max() > 0:
+        return True
+    nearest = poses[np.argsort(-best)[:FIRST]]
+    likely = (tuple(int((clause.a @ q + clause.b).argmax()) for clause in clauses) for q in nearest)
+    every = islice(product(*(range(len(clause.b)) for clause in clauses)), CHOICES)
+    return any(_corrected(clauses, choice, limits, nearest) for choice in dict.fromkeys(chain(likely, every)))
+
+
+def _corrected(clauses: Sequence[Clause], choice: tuple[int, ...], limits: Array, poses: Array) -> bool:
+    """Projects the poses onto the chosen rows in turn and back into the limits, until one of them satisfies all."""
+    a = np.array([clause.a[row] for clause, row in zip(clauses, choice, strict=True)])
+    b = np.array([clause.b[row] for clause, row in zip(clauses, choice, strict=True)])
+    squares = (a**2).sum(axis=1)
+    q = poses.copy()
+    for _ in range(STEPS):
+        if ((q @ a.T + b) > 0).all(axis=1).any():
+            return True
+        for row, offset, square in zip(a, b, squares, strict=True):
+            lack = np.maximum(MARGIN - (q @ row + offset), 0.0)
+            q += (lack / square)[:, None] * row
+        q = np.clip(q, limits[:, 0], limits[:, 1])
+    return False

@@ -1,0 +1,148 @@
+"""Checks a file: warnings of its reader, how an older version was understood, then the robot or world in it."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mobee.check.finding import SEVERITIES, Finding
+from mobee.check.hulls import hulls
+from mobee.check.robot import check_robot
+from mobee.check.world import check_world
+from mobee.errors import InvalidValue, RobotFileError, UnknownName
+from mobee.model.world import World
+from mobee.model.world_file import WORLDS, load_world, shipped_worlds
+from mobee.robot.load import ROBOTS, find_file, load_robot, shipped_robots
+from mobee.robot.robot import Robot
+from mobee.robot.urdf.hull import Corners
+from mobee.robot.urdf.shapes import Meshes
+from mobee.robot.xml.file import is_folder
+from mobee.robot.xml.node import Node, descendants, read_xml, shown
+from mobee.robot.xml.versions import CONVERT, WORLD_TAGS, upgrade_robot, upgrade_world
+
+
+def source(root: Node) -> Iterator[Finding]:
+    """Findings in the elements of a zero-position XML file or of a world, which are rewritten into today's grammar on the way."""
+    where = f"{root.file}:{root.line}"
+    yield from _empty_names(root)
+    remarks = upgrade_world(root) if root.tag in WORLD_TAGS else upgrade_robot(root)
+    for remark in remarks:
+        if remark.severity == "note":  # of the others its reader has warned
+            yield Finding(
+                "note",
+                "older-version",
+                f"{remark.node.file}:{remark.node.line}",
+                remark.what,
+                "the file is of an older version, and this is how it was understood",
+                remark.remedy or CONVERT,
+            )
+    if root.tag != "world" and not root.optional("robotName"):
+        yield Finding(
+            "note",
+            "robot-name",
+            where,
+            f"the robot has no robotName: it is called {root.file.stem!r}, after its file",
+            "its name is how services find each other: copied under another name the file is another robot",
+            f'add robotName="{root.file.stem}"',
+        )
+
+
+def _empty_names(root: Node) -> Iterator[Finding]:
+    for node in descendants(root):
+        if "name" in node.attributes and not node.optional("name") and node.tag != "world":
+            yield Finding(
+                "warning",
+                "empty-name",
+                f"{node.file}:{node.line}",
+                f"<{shown(node.tag)}> has an empty name",
+                "it gets a name that counts what came before it, which changes when the file does",
+                "write a name, or leave the attribute out",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What a file holds, and what is wrong with it."""
+
+    content: Robot | World
+    findings: tuple[Finding, ...]
+
+
+def check_file(
+    name_or_path: str | Path,
+    world: World | None = None,
+    *,
+    field: float | None = None,
+    meshes: Meshes | None = None,
+    corners: Corners | None = None,
+    srdf: str | Path | None = None,
+    home: str | None = None,
+) -> Checked:
+    """Everything that is wrong with a shipped robot or world, or with a file of one; errors first.
+
+    `world`: what a robot is also checked against, at home; the others: of a URDF, as in load_robot.
+    Raises RobotFileError, UnknownName or InvalidValue when it cannot be read at all, or not with these options.
+    """
+    _refuse(name_or_path)
+    path = world_file(name_or_path)
+    said: list[Finding] = []
+    content: Robot | World
+    if path is None:
+        with _listening(said):
+            content = load_robot(name_or_path, field=field, meshes=meshes, corners=corners, srdf=srdf, home=home)
+        found = check_robot(content, world)
+        file = find_file(name_or_path, ROBOTS, "robot")
+        if file.suffix.lower() != ".urdf":
+            found += source(read_xml(file, repair=True))
+        elif corners != "all" and any(shape.vertices is not None for shape in content.shapes):
+            with _listening([]):
+                exact = load_robot(name_or_path, field=field, meshes=meshes, corners="all", srdf=srdf, home=home)
+            found += hulls(content, exact)
+    elif world is not None or any(option is not None for option in (field, meshes, corners, srdf, home)):
+        raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it and options of a URDF.")
+    else:
+        with _listening(said):
+            content = load_world(path)
+        root = read_xml(path, repair=True)
+        said_of_form = list(source(root))
+        lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in root}
+        found = check_world(content, lines) + said_of_form
+    return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
+
+
+def _refuse(name_or_path: str | Path) -> None:
+    """Raise for a folder, and for a name that neither a robot nor a world has."""
+    given, path = str(name_or_path), Path(name_or_path)
+    known = {*shipped_robots(), *shipped_worlds()}
+    if given in known:
+        return
+    if is_folder(path):
+        raise RobotFileError(f"{path}: is a folder. Give the path of a .xml or .urdf file in it.")
+    if not path.suffix and path.name == given:
+        raise UnknownName("robot or world", given, known)
+
+
+def world_file(name_or_path: str | Path) -> Path | None:
+    """The file of a world; None when it is a robot's, or is none at all."""
+    given, path = str(name_or_path), Path(name_or_path)
+    if given in shipped_worlds() and given not in shipped_robots():
+        return WORLDS / f"{given}.xml"
+    if path.suffix.lower() != ".xml" or not path.is_file():
+        return None
+    return path if read_xml(path, repair=True).tag in WORLD_TAGS else None
+
+
+@contextmanager
+def _listening(said: list[Finding]) -> Iterator[None]:
+    """What a reader warns of meanwhile, as findings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
+        where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
+        said.append(Finding("warning", "reader", where, what, "the robot is not all that the file says", remedy))

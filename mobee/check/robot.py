@@ -1,0 +1,54 @@
+"""Runs all checks of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from mobee.check.constraints import constraints
+from mobee.check.fields import fields
+from mobee.check.finding import SEVERITIES, Finding
+from mobee.check.masses import masses
+from mobee.check.motors import coupling, home_limits, home_zones, idle_motors, idle_parts, joint_limits, unreachable_markers
+from mobee.check.names import identical_shapes, names_differing_in_case, unusable_names
+from mobee.check.subject import Subject
+from mobee.check.touching import always_touching, foreign_solids, home_contacts, world_contacts
+from mobee.check.units import radians, size
+from mobee.model.world import World
+from mobee.robot.robot import Robot
+
+Check = Callable[[Subject], Iterator[Finding]]
+
+CHECKS: tuple[Check, ...] = (
+    joint_limits,
+    home_limits,
+    home_zones,
+    coupling,
+    idle_motors,
+    idle_parts,
+    size,
+    radians,
+    always_touching,
+    home_contacts,
+    world_contacts,
+    foreign_solids,
+    fields,
+    constraints,
+    unreachable_markers,
+    masses,
+    identical_shapes,
+    names_differing_in_case,
+    unusable_names,
+)
+
+
+def check_robot(robot: Robot, world: World | None = None) -> list[Finding]:
+    """Everything that is wrong with a robot, errors first; with a world also what it touches there at home.
+
+    Poses are sampled with a fixed seed: the same robot is answered the same way.
+    """
+    subject = Subject(robot, world)
+    with np.errstate(invalid="ignore"):  # joints without limits are a finding, not a failure of the others
+        found = [finding for check in CHECKS for finding in check(subject)]
+    return sorted(found, key=lambda finding: SEVERITIES.index(finding.severity))

@@ -1,0 +1,343 @@
+"""Checks which links touch at home or in every pose and which pairs are never tested; writes them into an SRDF."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.check.finding import Finding, count, length, some
+from mobee.check.subject import SEED, Subject
+from mobee.errors import InvalidValue, RobotFileError
+from mobee.model.contact import Contact
+from mobee.model.model import Model
+from mobee.robot.load import ROBOTS, find_file, load_robot
+from mobee.robot.robot import LinkPair, Robot, Shape
+from mobee.robot.urdf.srdf import find_srdf
+from mobee.robot.urdf.write_srdf import disabled_and_enabled, write_disabled
+from mobee.robot.xml.file import is_file
+from mobee.robot.xml.node import read_xml
+
+SAME_LINK = "on the same link, which is rigid"
+SAME_PART = "fields of the same part, which overlap wherever it bends"
+SINGLE = "left out singly: other shapes of these links are tested"
+OTHER_ROLE = {
+    "solid": "solids that an <ignore> or the rule of 2014 leaves out, while fields of these links are tested",
+    "field": "fields that an <ignore> or the rule of 2014 leaves out, while solids of these links are tested",
+}
+UNKNOWN = "left out by an <ignore> of the file, or by who made the robot"
+
+
+@dataclass(frozen=True, slots=True)
+class UntestedGroup:
+    """Pairs that are never tested for one reason: names of links, and how many pairs of shapes that leaves out."""
+
+    reason: str
+    kind: str  # the reason without what it names: groups of one kind are summed up together
+    links: tuple[tuple[str, str], ...]
+    solids: int  # pairs of solids
+    fields: int  # pairs of fields
+
+
+def untested_groups(robot: Robot) -> list[UntestedGroup]:
+    """All pairs of links with shapes that are never tested against each other, by reason, the largest group first.
+
+    Solids are never tested against fields of the same robot, so such pairs are not listed.
+    """
+    links: dict[str, set[tuple[int, int]]] = defaultdict(set)
+    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
+    pairs: dict[str, Ints] = {"solid": robot.solid_pairs, "field": robot.field_pairs}
+    met = {role: {frozenset((robot.shapes[i].link, robot.shapes[j].link)) for i, j in tested} for role, tested in pairs.items()}
+    for column, (role, tested) in enumerate(pairs.items()):
+        done = {frozenset(pair) for pair in tested.tolist()}
+        chosen = [index for index, shape in enumerate(robot.shapes) if shape.role == role]
+        for i, j in combinations(chosen, 2):
+            if frozenset((i, j)) not in done:
+                reason = _reason(robot, i, j, met)
+                low, high = sorted((robot.shapes[i].link, robot.shapes[j].link))
+                links[reason].add((low, high))
+                counts[reason][column] += 1
+    groups = [
+        UntestedGroup(reason, _kind(reason), tuple((robot.links[a], robot.links[b]) for a, b in sorted(joined)), *counts[reason])
+        for reason, joined in links.items()
+    ]
+    return sorted(groups, key=lambda group: (-group.solids - group.fields, group.reason))
+
+
+def _kind(reason: str) -> str:
+    """The reason without what it names: "adjacent" of "adjacent: joint elbow"."""
+    if reason.startswith("joined at"):
+        return "joined at a joint or at joints that are close together"
+    return re.split(r": | \(|, line ", reason, maxsplit=1)[0]
+
+
+def _reason(robot: Robot, i: int, j: int, met: Mapping[str, set[LinkPair]]) -> str:
+    """Why two shapes of one role are not tested; `met`: for each role the pairs of links of which some shapes are."""
+    one, other = robot.shapes[i], robot.shapes[j]
+    links = frozenset((one.link, other.link))
+    if one.link == other.link:
+        return SAME_LINK
+    if links in robot.untested:
+        return robot.untested[links]
+    if links in met[one.role]:
+        return SINGLE
+    if one.role == "field" and one.part == other.part:
+        return SAME_PART
+    return OTHER_ROLE[one.role] if any(links in tested for tested in met.values()) else UNKNOWN
+
+
+POSES = 10_000  # random ones: a pair that touches in all of them touches in every pose that matters
+CHUNK = 500  # poses evaluated at once
+
+LinkNames = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class TouchingPair:
+    """Two links whose solids touch; of a URDF its own links, before those of fixed joints are merged."""
+
+    first: str
+    second: str
+    reason: Literal["Default", "Always"]  # at home, or in all random poses: MoveIt's words
+    depth: float  # m, of the deepest contact at home; 0 where they do not touch there
+    share: float  # of the random poses in which they touch
+
+
+def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]:
+    """The pairs that touch at home or in all random poses, those that always touch first; a fixed seed draws the poses.
+
+    Of a robot in which no world object is: only its own solids are looked at, fields do not count.
+    """
+    subject = Subject(replace(robot, field_pairs=robot.field_pairs[:0]))
+    model = Model(subject.limited)
+    names = {(i, j): _links(subject, i, j) for i, j in map(sorted, robot.solid_pairs.tolist())}
+    depth: dict[LinkNames, float] = {}
+    index = {shape.name: number for number, shape in enumerate(robot.shapes)}
+    for contact in model.evaluate(subject.home).contacts:
+        first, second = sorted((index[contact.first], index[contact.second]))
+        pair = names[first, second]
+        depth[pair] = max(depth.get(pair, 0.0), contact.depth)
+    times: dict[LinkNames, int] = defaultdict(int)
+    rng, (low, high) = np.random.default_rng(SEED), subject.range.T
+    for start in range(0, poses, CHUNK):
+        batch = rng.uniform(low, np.maximum(high, low), (min(CHUNK, poses - start), len(low)))
+        for pair, more in _counted(model, batch, names).items():
+            times[pair] += more
+    found = [
+        TouchingPair(*pair, "Always" if times[pair] == poses else "Default", depth.get(pair, 0.0), times[pair] / poses)
+        for pair in {*depth, *(pair for pair, count in times.items() if count == poses)}
+    ]
+    return tuple(sorted(found, key=lambda pair: (pair.reason, -pair.share, pair.first, pair.second)))
+
+
+def _counted(model: Model, poses: Array, names: dict[tuple[int, int], LinkNames]) -> dict[LinkNames, int]:
+    """In how many of the poses (k, n) each pair of links touches."""
+    numbers = model.evaluate(poses).table.numbers
+    seen: dict[LinkNames, set[int]] = defaultdict(set)
+    for pose, first, second in numbers[:, [0, 2, 3]].tolist():
+        seen[names[min(first, second), max(first, second)]].add(pose)
+    return {pair: len(touching) for pair, touching in seen.items()}
+
+
+def _links(subject: Subject, first: int, second: int) -> LinkNames:
+    shapes, links = subject.robot.shapes, subject.robot.links
+    one, other = (subject.urdf_link(shapes[i].name) or links[shapes[i].link] for i in (first, second))
+    return (one, other) if one < other else (other, one)
+
+
+def always_touching(subject: Subject) -> Iterator[Finding]:
+    """Pairs that overlap in every sampled pose."""
+    for first, second, kind in sorted(subject.always):
+        yield Finding(
+            "warning",
+            "always-touching",
+            subject.where("shape", first),
+            f"{kind}s {first!r} and {second!r} overlap in every pose tried",
+            "their contact says nothing, and hides others behind a force that never ends"
+            if kind == "field"
+            else "every pose counts as a collision, so no plan is ever valid",
+            f"make one smaller, or leave the pair out: {_ignoring(subject, first, second)}{_written(subject) if kind == 'solid' else ''}",
+        )
+
+
+def _written(subject: Subject) -> str:
+    """What writes the lines of a URDF's solids."""
+    return " (--write-srdf writes it)" if subject.is_urdf else ""
+
+
+def _ignoring(subject: Subject, first: str, second: str) -> str:
+    """What leaves out the pair of links of two shapes."""
+    link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
+    if link1 and link2:
+        return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
+    links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
+    return f'<ignore first="{links[first]}" second="{links[second]}"/>'
+
+
+def home_contacts(subject: Subject) -> Iterator[Finding]:
+    """Solids that collide and fields that push at home, where they do not in every pose."""
+    world = subject.world.objects if subject.world else {}
+    for contact in subject.at_home:
+        if (contact.first, contact.second, contact.kind) in subject.always:
+            continue
+        pair = f"{contact.first!r} and {contact.second!r}{' of the world' if contact.second in world else ''}"
+        if contact.kind == "solid":
+            yield Finding(
+                "error",
+                "home-collision",
+                subject.where("shape", contact.first),
+                f"at home {pair} collide, {length(contact.depth)} deep",
+                "the robot starts in a collision that it could not have moved into",
+                _parting(subject, contact),
+            )
+        else:
+            yield Finding(
+                "warning",
+                "home-force",
+                subject.where("shape", contact.first),
+                f"at home fields {pair} overlap by {length(contact.depth)}"
+                if contact.second not in world
+                else f"at home field {pair} overlap by {length(contact.depth)}",
+                "the force pushes the robot away from its home before anything has happened",
+                "make a field smaller, or move the home",
+            )
+
+
+def world_contacts(subject: Subject) -> Iterator[Finding]:
+    """What the robot touches at home in the world, in one line; nothing without a world."""
+    if subject.world is None:
+        return
+    world = subject.world.objects
+    touched = [contact for contact in subject.at_home if contact.second in world]
+    pairs = (f"{contact.kind} {contact.first!r} and {contact.second!r} ({length(contact.depth)})" for contact in touched)
+    yield Finding(
+        "note",
+        "world",
+        subject.where("robot", subject.robot.name),
+        f"at home in this world of {count(world, 'object')} the robot touches {some(pairs) or 'nothing'}",
+        "",
+        "",
+    )
+
+
+def _parting(subject: Subject, contact: Contact) -> str:
+    """What to do about two solids that collide at home."""
+    if not subject.is_urdf:
+        return "move the home, make a shape smaller, or correct where one is placed"
+    remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
+    if contact.second_link < 0:
+        return remedy
+    return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, contact.first, contact.second)}{_written(subject)}"
+
+
+def foreign_solids(subject: Subject) -> Iterator[Finding]:
+    """Parts whose fields reach, at home, into solids of another part whose own fields are not felt there: the deepest of each two parts."""
+    deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
+    for field, solid, depth in subject.foreign:
+        parts = field.part, solid.part
+        if parts not in deepest or depth > deepest[parts][2]:
+            deepest[parts] = field, solid, depth
+    for (part, other), (field, solid, depth) in sorted(deepest.items()):
+        yield Finding(
+            "note",
+            "foreign-solid",
+            subject.where("shape", field.name),
+            f"at home field {field.name!r} of part {part!r} reaches {length(depth)} into solid {solid.name!r} of {other!r}",
+            f"fields feel fields only: {part} comes this near without a force",
+            f"nothing, if the limits keep them apart; else test the fields of {subject.robot.links[solid.link]!r} against those of "
+            f"{subject.robot.links[field.link]!r} (`mobee check --pairs` says why they are not)"
+            if _left_out(subject, field.link, solid.link)
+            else f"give the link of {solid.name!r} a field that encloses it, or make {field.name!r} smaller",
+        )
+
+
+def _left_out(subject: Subject, one: int, other: int) -> bool:
+    """Whether both links have fields that are never tested against each other."""
+    shapes, links = subject.robot.shapes, {one, other}
+    bearing = {shape.link for shape in shapes if shape.role == "field"}
+    return links <= bearing and not any({shapes[i].link, shapes[j].link} == links for i, j in subject.robot.field_pairs)
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """What was written where, and what still touches at home."""
+
+    path: Path
+    merged: bool  # whether the file was there before, or took over the text of another SRDF
+    pairs: tuple[TouchingPair, ...]  # new in the file
+    enabled: tuple[TouchingPair, ...]  # not written: the file asks for their test
+    touching: int  # contacts of solids at home, of the robot as it is now read
+    found: bool  # whether load_robot finds the file by itself
+
+
+def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any) -> LeftOut:
+    """Write <disable_collisions> for every two links of a URDF whose solids touch at home or in all of many random poses.
+
+    `out`: the SRDF; None: the one that the robot is read with, or a new one beside it.  What is in an SRDF stays, word for word;
+    it is written whole or not at all.  `options`: of load_robot.  Raises RobotFileError or InvalidValue where that cannot be done.
+    """
+    path = find_file(urdf, ROBOTS, "robot")
+    if path.suffix.lower() != ".urdf":
+        raise InvalidValue(f"{path} is no URDF: in zero-position XML <ignore first= second=> leaves out a pair. Leave out --write-srdf.")
+    used = _used(path, options.get("srdf"))
+    target = _target(path, out, used, options.get("srdf"))
+    base = target if is_file(target) else used
+    robot = _read(path, options, base)
+    _require_links(robot, path)
+    disabled, enabled = disabled_and_enabled(base) if base is not None else (set(), set())
+    touching = [pair for pair in touching_pairs(robot) if frozenset((pair.first, pair.second)) not in disabled]
+    new = tuple(pair for pair in touching if frozenset((pair.first, pair.second)) not in enabled)
+    if new or not is_file(target):
+        write_disabled(target, base, robot.name, ((pair.first, pair.second, pair.reason) for pair in new))
+    again = _read(path, options, target)
+    left = sum(contact.kind == "solid" for contact in Model(again).evaluate(again.home).contacts)
+    wanted = tuple(pair for pair in touching if pair not in new)
+    return LeftOut(target, base is not None, new, wanted, left, _is_found(path, target))
+
+
+def _read(path: Path, options: dict[str, Any], srdf: Path | None) -> Robot:
+    """The robot; what its reader warns of is for the check to say."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return load_robot(path, **options | {"srdf": srdf})
+
+
+def _used(path: Path, srdf: str | Path | None) -> Path | None:
+    """The SRDF that load_robot reads."""
+    if srdf is not None:
+        return Path(srdf)
+    root = read_xml(path)
+    return find_srdf(path, root.optional("name") or path.stem)
+
+
+def _is_found(path: Path, srdf: Path) -> bool:
+    found = _used(path, None)
+    return found is not None and found.resolve() == srdf.resolve()
+
+
+def _target(path: Path, out: Path | None, used: Path | None, srdf: str | Path | None) -> Path:
+    target = out or used or path.with_suffix(".srdf")
+    if target.suffix.lower() != ".srdf":
+        raise InvalidValue(f"{target} is no name for an SRDF. Give one that ends in .srdf.")
+    if srdf is not None and is_file(target) and target.resolve() != Path(srdf).resolve():
+        raise InvalidValue(
+            f"{target} is there already, and the robot is read with {srdf}. Read it with --srdf {target}, or name a new file."
+        )
+    return target
+
+
+def _require_links(robot: Robot, path: Path) -> None:
+    """Raise where several links stand in one line: lines are all that says which link of the URDF a shape is on."""
+    subject = Subject(robot)
+    unknown = next((shape for shape in robot.shapes if subject.urdf_link(shape.name) is None), None)
+    if unknown is not None:
+        line = subject.where("shape", unknown.name)
+        raise RobotFileError(f"{line}: several links stand in this line. Put each on lines of its own: xmllint --format {path.name}")

@@ -1,0 +1,87 @@
+"""Rewards from outside that an agent pursues instead of, or in addition to, information gain (thesis 6.5)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
+
+Goal = Array | Sequence[int] | Callable[[int, int, int], float]
+PURSUING = ("curious",)  # explorers that plan for an external reward
+
+
+class External:
+    """An external reward R(s, a) over a space.
+
+    Args:
+        space: the states and actions.
+        goal: target states (every action taken in one of them pays 1), or rewards of shape (S, A), or a function that
+            gives the reward of a state, an action and the action's goal state.
+        weight: the external reward times this is added to the intrinsic one; None: it replaces it.
+
+    Raises:
+        InvalidValue: no such state, a reward that is no finite number, or a wrong shape.
+    """
+
+    def __init__(self, space: Space, goal: Goal, weight: float | None = None) -> None:
+        if weight is not None and not np.isfinite(weight):
+            raise InvalidValue(f"goal_weight={weight!r}: give a finite factor, or None to replace the intrinsic reward.")
+        self.weight = weight
+        exists = space.goals != NO_ACTION
+        rewards = _rewards(space, goal)
+        if rewards.shape != exists.shape or not np.isfinite(rewards[exists]).all():
+            raise InvalidValue(
+                f"goal holds rewards of shape {rewards.shape}, or some that are not finite: give one for each state and action, "
+                f"shape {exists.shape}, or target states, or a function of state, action and goal state."
+            )
+        self.reward: Array = np.where(exists, rewards, -np.inf)
+        """R(s, a), shape (S, A), -inf where there is no action (read only)."""
+        self.reward.flags.writeable = False
+
+    def combined(self, intrinsic: Array) -> Array:
+        """The reward to plan with, shape (S, A), -inf where there is no action."""
+        if self.weight is None:
+            return self.reward
+        return np.where(intrinsic == -np.inf, -np.inf, intrinsic + self.weight * self.reward)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """A digest of the rewards and their weight, for the record of a run (plain JSON values)."""
+        return {"digest": hashlib.sha256(self.reward.tobytes()).hexdigest()[:16], "weight": self.weight}
+
+
+def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
+    """The external reward of an agent, None without a goal; raises InvalidValue where its explorer would ignore it."""
+    if goal is None:
+        if weight is not None:
+            raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
+        return None
+    if explorer not in PURSUING:
+        raise InvalidValue(f"the explorer {explorer!r} pursues no goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
+    return External(space, goal, weight)
+
+
+def target_states(space: Space, given: Any) -> Ints:
+    """The states given as one number or several, ascending; raises InvalidValue where the space has no such state."""
+    states = np.unique(np.asarray(given))
+    if states.dtype.kind not in "iu" or not len(states) or states[0] < 0 or states[-1] >= len(space):
+        raise InvalidValue(f"{given!r}: {space.part} has no such state. Valid are 0 to {len(space) - 1}.")
+    return states.astype(np.intp)
+
+
+def _rewards(space: Space, goal: Goal) -> Array:
+    if callable(goal):
+        rows = [[goal(s, a, int(g)) if g != NO_ACTION else 0.0 for a, g in enumerate(row)] for s, row in enumerate(space.goals)]
+        return np.array(rows, dtype=np.float64)
+    if np.ndim(goal) >= 2:
+        return np.asarray(goal, dtype=np.float64)
+    rewards = np.zeros(space.goals.shape)
+    rewards[target_states(space, goal)] = 1.0
+    return rewards

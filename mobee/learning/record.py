@@ -1,0 +1,93 @@
+"""Rebuilds spaces and transition models from the record of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mobee.errors import InvalidValue, MobeeError, UnknownName
+from mobee.learning.lattice import Lattice
+from mobee.learning.space import Space
+from mobee.learning.transitions import TransitionModel
+from mobee.learning.voronoi import Voronoi
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from mobee.store import TransitionStore
+
+_OF_A_RECORD = {"robot", "digest", "kind"}
+
+
+def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
+    """The space that has these `Space.settings`, on the robot of that name.
+
+    Raises InvalidValue if the record is none of a space or of another robot, MobeeError if the space that is made
+    now is not the one on record (the robot's limits, or this program, are others).
+    """
+    kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space}
+    if not isinstance(settings, Mapping):
+        raise InvalidValue(f"{settings!r} is no record of a space: give Space.settings.")
+    kind = settings.get("kind", "lattice")
+    if kind not in kinds or not {"robot", "digest", "joints"} <= settings.keys():
+        raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is none of a space: give Space.settings.")
+    if settings["robot"] != robot.name:
+        raise InvalidValue(f"the space on record is of robot {settings['robot']!r}, given {robot.name!r}: load that robot.")
+    arguments = {name: value for name, value in settings.items() if name not in _OF_A_RECORD}
+    if arguments.get("seed", 0) is None:  # samples that were given, not drawn
+        del arguments["seed"]
+    space = kinds[kind](robot, **arguments)
+    if space.settings["digest"] != settings["digest"]:
+        raise MobeeError(
+            f"the space made from the record ({kind} of {space.part}) has other samples or neighbours than the one recorded "
+            f"(digest {space.settings['digest']}, on record {settings['digest']}): use the robot file and the version of then."
+        )
+    return space
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """The space and model of an agent, rebuilt from its transitions."""
+
+    part: str
+    space: Space
+    model: TransitionModel
+    transitions: int
+    state: int
+    """Where it was last."""
+
+
+def load_learned(file: str | Path, part: str | None = None, robot: Robot | None = None) -> Learned:
+    """Rebuild what the agent of a part learned from its transitions on disk.
+
+    Args:
+        file: of a TransitionStore.
+        part: whose; needed where the file holds several.
+        robot: whose space it is; needed where it is none that comes with mobee.
+
+    Raises:
+        MobeeError, UnknownName: no such file or agent, nothing to learn from, or a robot that is not the one on record.
+    """
+    if not Path(file).is_file():
+        raise MobeeError(
+            f"{file}: there is no such file; runs of `mobee launch` keep their transitions so. Experiments keep cells, without a model to "
+            "plan with; `mobee export` reads both."
+        )
+    with TransitionStore(file, part or "", read_only=True) as store:
+        agents = store.agents()
+        if not agents:
+            raise MobeeError(f"{file} holds no transitions yet.")
+        if part is None and len(agents) > 1:
+            raise MobeeError(f"{file} holds several agents: name one of {', '.join(agents)}.")
+        name = agents[0] if part is None else part
+        if name not in agents:
+            raise UnknownName("agent", name, agents)
+        settings, made = store.settings(name), store.load(name)
+    if "space" not in settings:
+        raise MobeeError(f"{file}: {name} has no space on record; it was not a curious agent that wrote this.")
+    space = space_from(settings["space"], robot if robot is not None else load_robot(settings["space"]["robot"]))
+    known = {key: settings[key] for key in ("initial", "divergence", "forgetting") if key in settings}
+    model = TransitionModel(space, **known)
+    for transition in made:
+        model.observe(transition.s, transition.a, transition.s_next)
+    return Learned(name, space, model, len(made), made[-1].s_next)

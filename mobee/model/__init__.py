@@ -1,0 +1,7 @@
+"""The egocentric model: link poses, contacts and projected contact forces of a robot in a world (thesis chapter 2)."""
+
+from mobee.model.contact import Contact
+from mobee.model.world import World, WorldObject
+from mobee.model.world_object import Geometry, box, capsule, cylinder, sphere
+
+__all__ = ["Contact", "Geometry", "World", "WorldObject", "box", "capsule", "cylinder", "sphere"]

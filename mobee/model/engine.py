@@ -1,0 +1,143 @@
+"""The engine of one robot: holds the objects of the core that evaluations use, for any number of threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee._core import engine as core
+from mobee._core.tables import ROW_BYTES
+from mobee.arrays import Array
+from mobee.errors import UnknownName
+from mobee.model.contact import ContactTable
+from mobee.model.hands import NOBODY, Hands, hand_numbers
+from mobee.model.robot_tables import Carried, robot_tables
+from mobee.model.snapshot import ATTACHED, Snapshot
+from mobee.robot.per_robot import per_robot
+from mobee.robot.robot import Robot
+
+GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
+PER_CELL = 8  # objects, aimed at
+
+
+@per_robot
+def robot_handle(robot: Robot) -> core.Handle:
+    """The robot in the core."""
+    return core.robot(*robot_tables(robot).for_core())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A robot among the free objects of one snapshot.  It never changes."""
+
+    snapshot: Snapshot
+    handle: core.Handle
+    nothing: ContactTable  # that of all poses without contacts
+
+
+class _Room(core.Room):
+    """A room, and what was asked last of one pose there."""
+
+    __slots__ = ("cut", "reaching", "scene")
+
+    def __init__(self, motors: int) -> None:
+        super().__init__(motors)
+        self.scene: Scene | None = None
+        self.reaching: Hands = NOBODY
+        self.cut = False
+
+    def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:
+        """Ask something else."""
+        self.ask(scene.handle, hand_numbers(reaching), cut)
+        self.scene, self.reaching, self.cut = scene, reaching, cut
+        return scene
+
+
+class Engine:
+    """Evaluates poses of one robot; evaluations in several threads do not wait for each other."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._motors = len(robot.motor_table)
+        self._shapes = tuple(shape.name for shape in robot.shapes)
+        self._bare = robot_handle(robot)
+        self._laden: tuple[tuple[bytes, ...], core.Handle] = (), self._bare
+        self._scene: Scene | None = None
+        self._rooms: list[_Room] = []  # of evaluations that have ended
+
+    def transforms(self, q: Array) -> Array:
+        """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
+        return core.link_poses(self._bare, q, len(self.robot.links))
+
+    def jacobians(self, q: Array, link: int, point: Array) -> Array:
+        """How the point (3,) of a link, root frame at zero pose, moves with each motor in the poses q (B, n): (B, 6, n)."""
+        return core.jacobians(self._bare, q, link, point)
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
+        """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
+
+        `reaching`: who spares the targets; `cut`: a part's motors feel only what happens to its own links, as in the original
+        program.  The results are the same for any number of threads.
+        """
+        scene = self.scene_of(snapshot)
+        try:
+            room = self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            room = _Room(self._motors)
+        numbers, reals, torque = room.evaluate(scene.handle, q, hand_numbers(reaching), cut, threads)
+        self._rooms.append(room)
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
+
+    def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
+        """The same for one pose, of which `q` are the bytes."""
+        try:
+            room = self._rooms.pop()  # as one step: other threads take rooms too
+        except IndexError:
+            room = _Room(self._motors)
+        scene = room.scene
+        if scene is None or scene.snapshot is not snapshot or room.reaching is not reaching or room.cut is not cut:
+            scene = room.ask_for(self.scene_of(snapshot), reaching, cut)
+        count = core.evaluate_one(room.asked, q)
+        if count > room.most:
+            room.make_space(2 * count)
+            core.evaluate_one(room.asked, q)
+        table = ContactTable(self._shapes, snapshot.names, room.rows[: count * ROW_BYTES]) if count else scene.nothing
+        found = table, room.torque.copy()
+        self._rooms.append(room)
+        return found
+
+    def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
+        """The table of what the core has written."""
+        return ContactTable(self._shapes, snapshot.names, (numbers, reals))
+
+    def scene_of(self, snapshot: Snapshot) -> Scene:
+        """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
+        known = self._scene
+        if known is not None and known.snapshot is snapshot:
+            return known
+        carried = [k for k, role in enumerate(snapshot.roles) if role == ATTACHED] if snapshot.attached else []
+        count = len(snapshot.roles)
+        side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
+        robot = self._robot_with(snapshot, carried)
+        handle = core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side)
+        new = Scene(snapshot, handle, ContactTable(self._shapes, snapshot.names, (core.NO_NUMBERS, core.NO_REALS)))
+        self._scene = new
+        return new
+
+    def _robot_with(self, snapshot: Snapshot, carried: list[int]) -> core.Handle:
+        """The robot with what it carries; made anew only when that has changed."""
+        if not carried:
+            return self._bare
+        links = [snapshot.objects[snapshot.names[k]].link or "" for k in carried]
+        key = tuple(link.encode() + snapshot.rows[k].tobytes() for link, k in zip(links, carried, strict=True))
+        known = self._laden
+        if known[0] == key:
+            return known[1]
+        for link in links:
+            if link not in self.robot.links:
+                raise UnknownName("link", link, self.robot.links)
+        things = [Carried(self.robot.links.index(link), snapshot.rows[k]) for link, k in zip(links, carried, strict=True)]
+        new = core.robot(*robot_tables(self.robot, things).for_core())
+        self._laden = key, new
+        return new

@@ -1,0 +1,128 @@
+"""Masses, centres of mass, gravity torques and potential energy of a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mobee.arrays import Array, Ints, real_array
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import link_transforms, tables
+from mobee.robot.per_robot import per_robot
+from mobee.robot.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Masses:
+    """The links of a robot that have a mass."""
+
+    links: Ints  # (B,)
+    weights: Array  # (B,) kg
+    moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
+
+    def moved(self, transforms: Array) -> Array:
+        """Mass times centre (..., B, 3) kg m, root frame, from all links' transforms (..., L, 4, 4)."""
+        moments: Array = (transforms[..., self.links, :3, :] @ self.moments)[..., 0]
+        return moments
+
+
+@per_robot
+def masses(robot: Robot) -> Masses:
+    """Those of a robot; B is 0 where its file says nothing of masses."""
+    links = np.array([body.link for body in robot.bodies], dtype=np.intp)
+    weights = np.array([body.mass for body in robot.bodies])
+    centres = np.array([[*body.centre, 1.0] for body in robot.bodies]).reshape(len(links), 4)
+    return Masses(links, weights, (weights[:, None] * centres)[..., None])
+
+
+def centre_of_mass(robot: Robot, transforms: Array) -> Array:
+    """The centre of mass (..., 3) m, root frame, from all links' transforms (..., L, 4, 4); raises InvalidValue if no link has a mass."""
+    if not robot.bodies:
+        raise InvalidValue(f"{robot.name!r} has no masses (<mass> in its file), so nothing says where its centre of mass is.")
+    known = masses(robot)
+    centre: Array = known.moved(transforms).sum(axis=-2) / known.weights.sum()
+    return centre
+
+
+@per_robot
+def centre_of_mass_at_home(robot: Robot) -> Array:
+    """The same (3,) m in the robot's home posture."""
+    return centre_of_mass(robot, link_transforms(robot, robot.home))
+
+
+EARTH = (0.0, 0.0, -9.81)  # m/s^2, root frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Carriers:
+    """The joints that carry a mass."""
+
+    joints: Ints  # (C,)
+    carried: Array  # (C, B) 1 where the joint carries the link's mass
+    loads: Array  # (C,) kg
+    frames: Array  # (C, 4, 2) axis and point of the joints, each with its fourth coordinate
+    slides: NDArray[np.bool_]  # (C,)
+    drives: Array  # (C, n) joint per motor
+
+
+def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
+    """The torque [N m] with which the motors hold the robot still against its weight.
+
+    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame.  Returns (..., n), for a prismatic joint's motor that
+    counts in m the force [N]: the derivative of the potential energy with respect to q.  Zeros where the robot has no masses.
+    """
+    q = _checked(robot, q)
+    if not robot.bodies:
+        return np.zeros(q.shape)
+    m, transforms = _carriers(robot), link_transforms(robot, q)
+    carried = m.carried @ masses(robot).moved(transforms)
+    frames = transforms[..., m.joints + 1, :3, :] @ m.frames  # a joint leaves its own axis where it is
+    axes, points = frames[..., 0], frames[..., 1]
+    pull = np.asarray(gravity, dtype=float)
+    # g . (axis x lever) = (g x axis) . lever: no cross product with the lever
+    turning = ((axes @ _crossed(pull)) * (carried - m.loads[:, None] * points)).sum(axis=-1)
+    sliding = (axes @ pull) * m.loads
+    torque: Array = -np.where(m.slides, sliding, turning) @ m.drives
+    return torque
+
+
+def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
+    """The potential energy [J] of the robot's masses, shape (...,), zero at the root frame's origin; arguments as gravity_torque."""
+    q = _checked(robot, q)
+    if not robot.bodies:
+        return np.zeros(q.shape[:-1])
+    energy: Array = -masses(robot).moved(link_transforms(robot, q)).sum(axis=-2) @ np.asarray(gravity, dtype=float)
+    return energy
+
+
+def _checked(robot: Robot, q: Array) -> Array:
+    q, n = real_array("q", q), len(robot.motor_table)
+    if q.ndim == 0 or q.shape[-1] != n:
+        raise InvalidValue(f"q of shape {q.shape}: must be (..., {n}), a position for every motor of {robot.name}")
+    return q
+
+
+def _crossed(v: Array) -> Array:
+    """The matrix (3, 3) whose product with rows of axes gives v x axis."""
+    return np.array([[0.0, v[2], -v[1]], [-v[2], 0.0, v[0]], [v[1], -v[0], 0.0]])
+
+
+@per_robot
+def _carriers(robot: Robot) -> _Carriers:
+    t = tables(robot)
+    carried = np.zeros((len(robot.joints), len(robot.bodies)))
+    for column, body in enumerate(robot.bodies):
+        carried[t.ancestry[body.link], column] = 1.0
+    joints = np.flatnonzero(carried.any(axis=1))
+    frames = np.zeros((len(joints), 4, 2))
+    frames[:, :3, 0], frames[:, :3, 1], frames[:, 3, 1] = t.axes[joints], t.points[joints], 1.0
+    return _Carriers(
+        joints=joints,
+        carried=carried[joints],
+        loads=carried[joints] @ masses(robot).weights,
+        frames=frames,
+        slides=t.revolute[joints] == 0.0,
+        drives=np.ascontiguousarray(t.coupling[:, joints].T),
+    )

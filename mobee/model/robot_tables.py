@@ -1,0 +1,273 @@
+"""The tables of a robot that the core reads, and the clusters of shapes that are bounded together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.model.volumes import VOLUME, Volumes, convex_row, volume_row
+from mobee.robot.robot import LinkPair, Robot, Shape
+
+MANY_CORNERS = 32  # of a hull: with more, the farthest one is sought along its edges
+
+Flags = NDArray[np.bool_]
+_Edges = tuple[NDArray[np.int32], NDArray[np.int32]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """A world object that a link carries: a shape of that link."""
+
+    link: int
+    row: Volumes  # () VOLUME, in the link's frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotTables:
+    """`RobotTables` of core/robot.cpp: of S shapes in the order of C clusters, J joints, and the corners of all hulls."""
+
+    motors: int
+    own_shapes: int  # without what is carried
+    parent: Ints  # (J,) links
+    slides: Flags  # (J,)
+    border: Flags  # (J,) whether the link it moves belongs to another part than the link it is mounted on
+    axis: Array  # (J, 3)
+    point: Array  # (J, 3) m
+    motor: Ints  # (K, J) each joint's motors, K the largest number of motors on one joint
+    scale: Array  # (K, J) by how much they turn it
+    offset: Array  # (J,)
+    volume: Volumes  # (S,)
+    link: Ints  # (S,)
+    name: Ints  # (S,) which shape each is; from len(robot.shapes) on, which carried object
+    field: Flags  # (S,)
+    meets_world: Flags  # (S,)
+    cluster: Ints  # (C + 1,) where each begins
+    tested: Flags  # (S, S) symmetric: which two shapes are tested against each other
+    corner: Array  # (V, 3) m, in the axes of their hull
+    edge_start: NDArray[np.int32]  # (V + 1,) where the edges of each corner begin
+    edge: NDArray[np.int32]  # the corner of the same hull that each edge leads to
+
+    def for_core(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
+        """Counts and arrays as `mobee._core.engine.robot` takes them."""
+        integers = ("parent", "slides", "border", "motor", "link", "name", "field", "meets_world", "cluster")
+        others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge")
+        arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.int64) for name in integers}
+        arrays |= {name: np.ascontiguousarray(getattr(self, name)) for name in others}
+        counts = {
+            "motors": self.motors,
+            "joints": len(self.parent),
+            "drives": len(self.motor),
+            "shapes": len(self.volume),
+            "own_shapes": self.own_shapes,
+            "clusters": len(self.cluster) - 1,
+            "corners": len(self.corner),
+            "edges": len(self.edge),
+        }
+        return counts, arrays
+
+
+def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
+    """The tables of a robot with what its links carry; raises InvalidValue for a robot whose numbers contradict each other."""
+    _check(robot)
+    rows, corner, edges = _rows(robot.shapes)
+    rows = np.concatenate([rows, *(one.row.reshape(1) for one in carried)])
+    link = np.array([shape.link for shape in robot.shapes] + [one.link for one in carried], dtype=np.intp)
+    field = np.array([shape.role == "field" for shape in robot.shapes] + [False] * len(carried), dtype=np.bool_)
+    groups = clusters(robot, rows, link, field, len(robot.shapes))
+    order = np.array([index for group in groups for index in group], dtype=np.intp)
+    motor, scale, offset = _drives(robot)
+    axis, point = (np.array([getattr(joint, what) for joint in robot.joints], dtype=float).reshape(-1, 3) for what in ("axis", "point"))
+    return RobotTables(
+        motors=len(robot.motor_table),
+        own_shapes=len(robot.shapes),
+        parent=np.array([joint.parent for joint in robot.joints], dtype=np.intp),
+        slides=np.array([joint.kind == "prismatic" for joint in robot.joints], dtype=np.bool_),
+        border=_borders(robot),
+        axis=axis,
+        point=point,
+        motor=motor,
+        scale=scale,
+        offset=offset,
+        volume=rows[order],
+        link=link[order],
+        name=order,
+        field=field[order],
+        meets_world=np.array([index not in robot.base_shapes for index in order], dtype=np.bool_),
+        cluster=np.cumsum([0, *(len(group) for group in groups)]),
+        tested=_tested(robot, carried)[np.ix_(order, order)],
+        corner=corner,
+        edge_start=edges[0],
+        edge=edges[1],
+    )
+
+
+def _check(robot: Robot) -> None:
+    """What the core takes for granted."""
+    for index, joint in enumerate(robot.joints):
+        if not 0 <= joint.parent <= index:
+            raise InvalidValue(f"joint {joint.name!r} of {robot.name!r} is mounted on link {joint.parent}; it must be one of 0 to {index}.")
+    for shape in robot.shapes:
+        if not 0 <= shape.link < len(robot.links):
+            raise InvalidValue(
+                f"shape {shape.name!r} of {robot.name!r} is on link {shape.link}; it must be one of 0 to {len(robot.links) - 1}."
+            )
+    for marker in robot.markers.values():
+        if not 0 <= marker.link < len(robot.links):
+            raise InvalidValue(
+                f"marker {marker.name!r} of {robot.name!r} is on link {marker.link}; it must be one of 0 to {len(robot.links) - 1}."
+            )
+    if len(robot.links) != len(robot.joints) + 1:
+        raise InvalidValue(
+            f"{robot.name!r} has {len(robot.links)} links and {len(robot.joints)} joints; each joint moves a link but the first."
+        )
+
+
+def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:
+    rows, corners, edges, first = np.zeros(len(shapes), dtype=VOLUME), [np.zeros((0, 3))], list[list[int]](), 0
+    for index, shape in enumerate(shapes):
+        if shape.vertices is None:
+            rows[index] = volume_row(shape)
+            continue
+        own, joined = _hull(shape.vertices)
+        rows[index] = convex_row(shape, own, first)
+        corners.append(own)
+        edges += joined
+        first += len(own)
+    starts = np.cumsum([0, *(len(joined) for joined in edges)], dtype=np.int32)
+    return rows, np.concatenate(corners), (starts, np.array([other for joined in edges for other in joined], dtype=np.int32))
+
+
+def _hull(vertices: Array) -> tuple[Array, list[list[int]]]:
+    """The corners (v, 3) of the hull of some points and which others an edge joins each one to; without edges if they are few, or flat."""
+    none: tuple[Array, list[list[int]]] = vertices, [[] for _ in vertices]
+    if len(vertices) <= MANY_CORNERS:
+        return none
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(vertices)
+    except (QhullError, ValueError):
+        return none
+    number = {int(corner): place for place, corner in enumerate(hull.vertices)}
+    joined: list[set[int]] = [set() for _ in number]
+    for a, b, c in hull.simplices.tolist():
+        for one, other in ((a, b), (b, c), (c, a)):
+            joined[number[one]].add(number[other])
+            joined[number[other]].add(number[one])
+    return vertices[hull.vertices], [sorted(others) for others in joined]
+
+
+def _tested(robot: Robot, carried: Sequence[Carried]) -> Flags:
+    count = len(robot.shapes)
+    tested = np.zeros((count + len(carried),) * 2, dtype=np.bool_)
+    for pairs in (robot.solid_pairs, robot.field_pairs):
+        tested[pairs[:, 0], pairs[:, 1]] = tested[pairs[:, 1], pairs[:, 0]] = True
+    for k, one in enumerate(carried, start=count):
+        for index, shape in enumerate(robot.shapes):
+            tested[k, index] = tested[index, k] = meets(robot, one.link, shape.link)
+        for other, two in enumerate(carried[: k - count], start=count):
+            tested[k, other] = tested[other, k] = meets(robot, one.link, two.link)
+    return tested
+
+
+def meets(robot: Robot, link: int, other: int) -> bool:
+    """Whether what a link carries is tested against what is on another: never on its own, nor where the robot's links are not."""
+    pair: LinkPair = frozenset((link, other))
+    return link != other and pair not in robot.untested
+
+
+def _drives(robot: Robot) -> tuple[Ints, Array, Array]:
+    matrix, offset = robot.coupling
+    most = int((matrix != 0.0).sum(axis=1).max(initial=1))
+    motor, scale = np.zeros((most, len(offset)), dtype=np.intp), np.zeros((most, len(offset)))
+    for joint, row in enumerate(matrix):
+        for slot, index in enumerate(np.flatnonzero(row)):
+            motor[slot, joint], scale[slot, joint] = index, row[index]
+    return motor, scale, offset
+
+
+def _borders(robot: Robot) -> Flags:
+    matrix, _ = robot.coupling
+    part: list[str | None] = [None]
+    for j, joint in enumerate(robot.joints):
+        driven = np.flatnonzero(matrix[j])
+        part.append(robot.motor_table[int(driven[0])].part if driven.size else part[joint.parent])
+    return np.array([part[j + 1] != part[joint.parent] for j, joint in enumerate(robot.joints)], dtype=np.bool_)
+
+
+SMALL = 0.25  # of the robot's own radius; measured on the benchmark: 0.1 and 0.5 make the broad phase a fifth slower
+SAMPLES = 16
+
+
+_CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
+
+
+def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
+    """Indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
+    groups = _CACHE.get(robot)  # what is carried changes while the robot moves, its own groups never do
+    if groups is None:
+        groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], field[:own])
+    return groups + [[index] for index in range(own, len(rows))]
+
+
+def _own_clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags) -> list[list[int]]:
+    centers = _sampled_centers(robot, rows, link)
+    groups: list[list[int]] = []
+    for kind in (False, True):
+        members = [[int(i) for i in np.flatnonzero((link == k) & (field == kind))] for k in range(len(robot.links))]
+        groups += _merge(robot, members, centers, rows["bound"])
+    return [sorted(group, key=lambda index: rows["kind"][index]) for group in groups]  # runs of one kind are guessed right
+
+
+def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array) -> list[list[int]]:
+    """Merge every link, leaves first, into the group of the link that carries it where the two together are small."""
+    present = [i for group in members for i in group]
+    if not present:
+        return []
+    limit = SMALL * _radius(centers, bound, present)
+    groups = [list(group) for group in members]
+    for joint in range(len(robot.joints) - 1, -1, -1):
+        parent, child = robot.joints[joint].parent, joint + 1
+        if not groups[child]:
+            continue
+        if not groups[parent] or _radius(centers, bound, groups[parent] + groups[child]) < limit:
+            groups[parent], groups[child] = groups[parent] + groups[child], []
+    return [group for group in groups if group]
+
+
+def _radius(centers: Array, bound: Array, group: list[int]) -> float:
+    """Mean over the sampled poses of the radius of the sphere about the group's mean that holds it."""
+    inside = centers[:, group]
+    between = inside - inside.mean(axis=1, keepdims=True)
+    return float((np.sqrt((between * between).sum(axis=2)) + bound[group]).max(axis=1).mean())
+
+
+def _sampled_centers(robot: Robot, rows: Volumes, link: Ints) -> Array:
+    """Where the shapes are in random poses, (SAMPLES, S, 3)."""
+    rng = np.random.default_rng(0)
+    low, high = np.clip(robot.limits, -10.0, 10.0).T  # rad; some joints turn without end
+    matrix, offset = robot.coupling
+    angles = rng.uniform(low, high, (SAMPLES, len(low))) @ matrix.T + offset
+    turn, shift = [np.broadcast_to(np.eye(3), (SAMPLES, 3, 3))], [np.zeros((SAMPLES, 3))]
+    for j, joint in enumerate(robot.joints):
+        carrier_turn, carrier_shift = turn[joint.parent], shift[joint.parent]
+        if joint.kind == "prismatic":
+            turn.append(carrier_turn)
+            shift.append(carrier_shift + (carrier_turn @ joint.axis) * angles[:, j, None])
+            continue
+        u = joint.axis
+        skew = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+        s, c = np.sin(angles[:, j, None, None]), 1.0 - np.cos(angles[:, j, None, None])
+        own = np.eye(3) + s * skew + c * (skew @ skew)
+        turn.append(carrier_turn @ own)
+        shift.append((carrier_turn @ (joint.point - own @ joint.point)[:, :, None])[:, :, 0] + carrier_shift)
+    turns, shifts = np.stack(turn, axis=1)[:, link], np.stack(shift, axis=1)[:, link]
+    placed: Array = (turns @ rows["position"][:, :, None])[..., 0] + shifts
+    return placed

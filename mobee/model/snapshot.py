@@ -1,0 +1,81 @@
+"""An immutable state of the world: its objects, and the arrays that the engine reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.model.volumes import VOLUME, Volumes, volume_row
+from mobee.model.world_object import Role, WorldObject
+
+OBSTACLE, TARGET, GHOST, ATTACHED, ATTACHED_GHOST = range(5)
+_FREE: dict[Role, int] = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
+_CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": ATTACHED_GHOST}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A consistent state of the world; it never changes, each edit makes the next.
+
+    `names`, `rows` and `roles` are in the order of `objects`, in which they were added.  `rows` (N,): see
+    mobee.model.volumes; of an attached object in the frame of its link.  `roles` (N,): OBSTACLE, TARGET, GHOST, or ATTACHED
+    and ATTACHED_GHOST for what is attached to a link.
+    """
+
+    version: int
+    objects: MappingProxyType[str, WorldObject]
+    names: tuple[str, ...]
+    rows: Volumes  # (N,) VOLUME, contiguous
+    roles: NDArray[np.int64]  # (N,)
+    attached: tuple[str, ...]  # names
+
+
+EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empty(0, dtype=np.int64), ())
+
+
+def extended(old: Snapshot, new: WorldObject) -> Snapshot:
+    """The next snapshot, with an object more at the end."""
+    count, role = len(old.names), _code(new)
+    rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
+    rows[:count], rows[count] = old.rows, volume_row(new)
+    roles[:count], roles[count] = old.roles, role
+    attached = (*old.attached, new.name) if role >= ATTACHED else old.attached
+    return Snapshot(old.version + 1, _with(old, new), (*old.names, new.name), rows, roles, attached)
+
+
+def changed(old: Snapshot, new: WorldObject) -> Snapshot:
+    """The next snapshot, with the object of that name replaced at its place."""
+    place, role = old.names.index(new.name), _code(new)
+    rows, roles, attached = old.rows.copy(), old.roles, old.attached
+    rows[place] = volume_row(new)
+    if role != roles[place]:
+        roles = roles.copy()
+        roles[place] = role
+        attached = tuple(old.names[i] for i in np.flatnonzero(roles >= ATTACHED))
+    return Snapshot(old.version + 1, _with(old, new), old.names, rows, roles, attached)
+
+
+def shortened(old: Snapshot, name: str) -> Snapshot:
+    """The next snapshot, without the object of that name."""
+    place, count = old.names.index(name), len(old.names)
+    rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
+    rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
+    roles[:place], roles[place:] = old.roles[:place], old.roles[place + 1 :]
+    objects = old.objects.copy()
+    del objects[name]
+    names = old.names[:place] + old.names[place + 1 :]
+    attached = tuple(other for other in old.attached if other != name)
+    return Snapshot(old.version + 1, MappingProxyType(objects), names, rows, roles, attached)
+
+
+def _with(old: Snapshot, new: WorldObject) -> MappingProxyType[str, WorldObject]:
+    objects = old.objects.copy()
+    objects[new.name] = new
+    return MappingProxyType(objects)
+
+
+def _code(thing: WorldObject) -> int:
+    return (_FREE if thing.link is None else _CARRIED)[thing.role]

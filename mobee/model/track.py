@@ -1,0 +1,67 @@
+"""Evaluates poses that follow each other closely, with a neighbour list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from mobee._core import engine as core
+from mobee.arrays import Array
+from mobee.model.contact import ContactTable
+from mobee.model.engine import Engine, Scene
+from mobee.model.hands import Hands, hand_numbers
+from mobee.model.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from mobee.model.pose import Pose
+
+
+class Neighbours:
+    """Finds the contacts of one robot pose after pose, with a list of the pairs nearer than the skin [m].  Not for two threads at once.
+
+    `cut`: as of `Engine.contacts`.
+    """
+
+    def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
+        self._engine = engine
+        self._core = core.Following(skin, cut)
+        self._known: tuple[Scene, Hands] | None = None
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
+        """What `Engine.contacts` gives for the poses q (B, n), one after the other."""
+        self.enter(snapshot, reaching)
+        numbers, reals, torque = self._core.follow(q)
+        return self._engine.table(snapshot, numbers, reals), torque
+
+    def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
+        """Be in that world; what is remembered of another is forgotten.  Returns the address of the core's `Neighbours`."""
+        scene = self._engine.scene_of(snapshot)
+        known = self._known
+        if known is None or known[0] is not scene or known[1] != reaching:
+            self._core.enter(scene.handle, hand_numbers(reaching))
+            self._known = scene, reaching
+        return self._core.at
+
+
+class Track:
+    """Evaluates poses of one model that follow each other closely: the same results as `Model.evaluate`, sooner.
+
+    Pairs that cannot touch before something has moved by half the skin are not looked at again.  Cheap to make; not for two
+    threads at once: each user has its own.  Where the steps are large it is as fast as `Model.evaluate`.
+    """
+
+    def __init__(self, evaluate: Callable[[ArrayLike], Pose], engine: object, skin: float) -> None:
+        self._evaluate = evaluate
+        self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
+
+    def evaluate(self, q: ArrayLike) -> Pose:
+        """The pose at q (n,), or the poses along a path (..., n) rad in this order; raises InvalidValue as `Model.evaluate` does.
+
+        The contacts are found at once, not when they are asked for.
+        """
+        pose = self._evaluate(q)
+        if self._neighbours is not None:
+            pose.feel(self._neighbours)
+        return pose

@@ -1,0 +1,68 @@
+"""Volumes as rows of the table that the core reads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array
+from mobee.robot.robot import ShapeKind
+
+CODES: dict[ShapeKind, int] = {"sphere": 0, "capsule": 1, "cylinder": 2, "box": 3, "convex": 4}
+
+VOLUME = np.dtype(
+    [
+        ("kind", np.int64),
+        ("position", np.float64, (3,)),
+        ("rotation", np.float64, (3, 3)),
+        ("half", np.float64, (3,)),
+        ("bound", np.float64),
+    ]
+)
+"""`VolumeRow` of core/robot.hpp.  Half sizes: sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges; convex (first
+corner in the table of corners, number of corners, 0).  `bound`: radius of the ball about the position that holds the volume."""
+
+Volumes = NDArray[Any]  # of VOLUME
+
+
+class Volume(Protocol):
+    """What a robot's Shape and a WorldObject have in common."""
+
+    @property
+    def kind(self) -> ShapeKind: ...  # noqa: D102
+    @property
+    def size(self) -> tuple[float, ...]: ...  # noqa: D102
+    @property
+    def position(self) -> Array: ...  # noqa: D102
+    @property
+    def rotation(self) -> Array: ...  # noqa: D102
+
+
+def bound(volume: Volume, vertices: Array | None = None) -> float:
+    """The radius [m] of the ball about a volume's position that holds it; a convex one needs its vertices (v, 3) m."""
+    if vertices is not None:
+        return float(np.sqrt((vertices * vertices).sum(axis=1)).max())
+    size = volume.size
+    if volume.kind == "box":
+        return math.hypot(*size) / 2.0
+    radius, half = size[0], size[1] / 2.0 if len(size) > 1 else 0.0
+    return math.hypot(radius, half) if volume.kind == "cylinder" else radius + half
+
+
+def volume_row(volume: Volume) -> Volumes:
+    """The row () of a sphere, capsule, cylinder or box."""
+    size = volume.size
+    half = [length / 2.0 for length in size] if volume.kind == "box" else [size[0], size[1] / 2.0 if len(size) > 1 else 0.0, 0.0]
+    return _row(volume, half, bound(volume))
+
+
+def convex_row(volume: Volume, vertices: Array, first: int) -> Volumes:
+    """The row () of a convex volume whose vertices (v, 3) m stand from `first` on in the table of corners."""
+    return _row(volume, [first, len(vertices), 0.0], bound(volume, vertices))
+
+
+def _row(volume: Volume, half: list[float], radius: float) -> Volumes:
+    return np.array((CODES[volume.kind], volume.position, volume.rotation, half, radius), dtype=VOLUME)

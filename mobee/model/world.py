@@ -1,0 +1,160 @@
+"""The objects around the robot; they may be edited while other threads evaluate."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model.snapshot import EMPTY, Snapshot, changed, extended, shortened
+from mobee.model.world_object import (
+    Color,
+    Geometry,
+    Role,
+    WorldObject,
+    placed,
+    seen_from,
+    valid_color,
+    valid_name,
+    valid_position,
+    valid_role,
+    valid_rotation,
+    valid_shape,
+)
+from mobee.robot.robot import Robot
+
+__all__ = ["Color", "Role", "Snapshot", "World", "WorldObject", "placed", "seen_from"]
+
+
+class Followed(Protocol):
+    """A pose of a robot, as a Model gives it."""
+
+    @property
+    def robot(self) -> Robot:
+        """Whose links."""
+
+    @property
+    def transforms(self) -> Array:
+        """Where its links are, (L, 4, 4)."""
+
+
+class World:
+    """A set of named objects; every edit makes a new snapshot, so any thread may edit while others evaluate.
+
+    Roles: an "obstacle" repels; a "target" too, except from the link that reaches for it; a "ghost" is only shown.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._snapshot = EMPTY
+        self._followed: Followed | None = None
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest consistent state; reading it takes no lock."""
+        return self._snapshot
+
+    @property
+    def objects(self) -> Mapping[str, WorldObject]:
+        """The newest objects by name, read-only, in the order in which they were added."""
+        return self._snapshot.objects
+
+    @property
+    def version(self) -> int:
+        """How many edits there have been."""
+        return self._snapshot.version
+
+    def add(
+        self,
+        name: str,
+        shape: Geometry,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        role: Role = "obstacle",
+        color: Sequence[float] | None = None,
+    ) -> None:
+        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken or empty."""
+        valid_name(name)
+        volume, at = valid_shape(name, shape), valid_position(name, position)
+        turn = np.eye(3) if rotation is None else valid_rotation(name, rotation)
+        new = WorldObject(name, volume.kind, volume.size, at, turn, valid_role(name, role), valid_color(name, color))
+        with self._lock:
+            if name in self._snapshot.objects:
+                raise InvalidValue(f"world object {name!r} exists already; move or remove it, or choose another name.")
+            self._snapshot = extended(self._snapshot, new)
+
+    def move(self, name: str, *, position: ArrayLike | None = None, rotation: ArrayLike | None = None) -> None:
+        """Put an object elsewhere in the root frame; what is not given stays.  An attached object must be detached first."""
+        at = None if position is None else valid_position(name, position)
+        turn = None if rotation is None else valid_rotation(name, rotation)
+        with self._lock:
+            old = self._get(name)
+            if old.link is not None:
+                raise InvalidValue(f"world object {name!r} is attached to link {old.link!r} and moves with it; detach it first.")
+            moved = replace(old, position=old.position if at is None else at, rotation=old.rotation if turn is None else turn)
+            self._snapshot = changed(self._snapshot, moved)
+
+    def remove(self, name: str) -> None:
+        """Take an object away."""
+        with self._lock:
+            self._get(name)
+            self._snapshot = shortened(self._snapshot, name)
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Make an object an "obstacle", a "target" or a "ghost"."""
+        valid = valid_role(name, role)
+        with self._lock:
+            self._snapshot = changed(self._snapshot, replace(self._get(name), role=valid))
+
+    def attach(self, name: str, link: str, relative: tuple[ArrayLike, ArrayLike] | None = None) -> None:
+        """Let an object move with a link of the robot, which then no longer touches it.
+
+        `relative`: position (3,) m and rotation (3, 3) in the link's frame, which is the root frame at zero pose.  Without
+        it the object stays where it is relative to the link in the pose that a Model of this world evaluated last
+        (Model.attach takes the pose explicitly).
+        """
+        pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
+        with self._lock:
+            old = self._get(name)
+            if pose is None:
+                seen = self._followed  # once: both links in the same pose
+                here = old if old.link is None else placed(old, link_pose(seen, old.link))
+                pose = seen_from(link_pose(seen, link), here)
+            elif self._followed is not None:
+                link_pose(self._followed, link)
+            self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
+
+    def detach(self, name: str) -> None:
+        """Leave an attached object where it is in the pose that a Model of this world evaluated last."""
+        with self._lock:
+            old = self._get(name)
+            if old.link is None:
+                raise InvalidValue(f"world object {name!r} is not attached to any link.")
+            self._snapshot = changed(self._snapshot, placed(old, link_pose(self._followed, old.link)))
+
+    def follow(self, pose: Followed) -> None:
+        """Told by a Model at every single-pose evaluation, for `attach` and `detach`."""
+        self._followed = pose
+
+    def _get(self, name: str) -> WorldObject:
+        if name not in self._snapshot.objects:
+            raise UnknownName("world object", name, self._snapshot.objects)
+        return self._snapshot.objects[name]
+
+
+def link_pose(seen: Followed | None, link: str) -> Array:
+    """Where a link is, (4, 4); raises UnknownName, and InvalidValue where no pose has been seen."""
+    if seen is None:
+        raise InvalidValue(f"where link {link!r} is, no model has said yet: evaluate a pose first, or give `relative`.")
+    links = seen.robot.links
+    if link not in links:
+        raise UnknownName("link", link, links)
+    pose: Array = seen.transforms[links.index(link)]
+    return pose

@@ -1,0 +1,123 @@
+"""Keeps the observations and changes of an adaptive roadmap on disk."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mobee.database import explained, transaction
+from mobee.errors import UnknownName
+from mobee.plant import Outcome
+from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
+from mobee.store import Transition, TransitionStore
+
+TABLE = """
+CREATE TABLE IF NOT EXISTS map_changes (
+    agent TEXT NOT NULL, number INTEGER NOT NULL, n INTEGER NOT NULL, change TEXT NOT NULL, PRIMARY KEY (agent, number))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """`what`: the method of an AdaptiveRoadmap; `given`: its arguments, as plain JSON values; after `n` transitions."""
+
+    n: int
+    what: str
+    given: dict[str, Any]
+
+
+class MapStore(TransitionStore):
+    """A TransitionStore that keeps the changes of a map between its transitions, too.
+
+    Args:
+        path, agent, read_only: of the AgentFile, which says too what is raised.
+    """
+
+    def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
+        super().__init__(path, agent, read_only)
+        if not read_only:
+            with explained(self.path), transaction(self._db):
+                self._db.execute(TABLE)
+
+    def changed(self, what: str, **given: Any) -> None:
+        """Commit a change that is made now; it is on disk when this returns."""
+        with explained(self.path), transaction(self._db):
+            (number,) = self._db.execute("SELECT count(*) FROM map_changes WHERE agent = ?", (self.agent,)).fetchone()
+            self._db.execute("INSERT INTO map_changes VALUES (?, ?, ?, ?)", (self.agent, number, self._last, json.dumps([what, given])))
+
+    def changes(self) -> list[Change]:
+        """All changes of this agent's map, in order."""
+        with explained(self.path):
+            if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'map_changes'").fetchone() is None:
+                return []
+            rows = self._db.execute("SELECT n, change FROM map_changes WHERE agent = ? ORDER BY number", (self.agent,)).fetchall()
+        return [Change(n, *json.loads(change)) for n, change in rows]
+
+
+CHANGES = ("grow", "join", "prune")
+
+
+class MapRecord:
+    """An adaptive map and, if there is one, its store: on one that holds something the map becomes what it was.
+
+    Raises MobeeError if the store is of another map or other settings.
+    """
+
+    def __init__(self, roadmap: AdaptiveRoadmap, store: MapStore | None, settings: dict[str, Any]) -> None:
+        self.roadmap, self._store = roadmap, store
+        self.transitions = 0
+        """Edges observed, those of the store included."""
+        self.joined: set[int] = set()
+        """Vertices that are there since a way was joined to the map."""
+        if store is not None:
+            store.bind(settings)
+            self._replay(store)
+
+    def observe(self, state: int, action: int, arrived: int, outcome: Outcome) -> None:
+        """Take what became of an edge."""
+        made = Transition(
+            n=self.transitions + 1,
+            s=state,
+            a=action,
+            s_next=arrived,
+            reward=0.0,
+            settled=outcome.settled,
+            duration=outcome.duration,
+            q=tuple(outcome.q.tolist()),
+            touched=outcome.touched,
+        )
+        if self._store is not None:
+            self._store.append(made)
+        self._learn(made)
+
+    def change(self, what: str, **given: Any) -> Any:
+        """Call a method of the map that changes it ("grow", "join", "prune") with plain JSON values; returns what it returns."""
+        if what not in CHANGES:
+            raise UnknownName("change of a map", what, CHANGES)
+        if self._store is not None:
+            self._store.changed(what, **given)
+        return self._apply(what, given)
+
+    def _apply(self, what: str, given: dict[str, Any]) -> Any:
+        result = getattr(self.roadmap, what)(**given)
+        if what == "join":
+            self.joined.update(result.tolist())
+        elif what == "prune":
+            self.joined = {int(result[vertex]) for vertex in self.joined if result[vertex] >= 0}
+        return result
+
+    def _learn(self, made: Transition) -> None:
+        self.roadmap.observe(made.s, made.a, made.s_next)
+        self.transitions = made.n
+
+    def _replay(self, store: MapStore) -> None:
+        changes = store.changes()[::-1]
+        for made in store.load():
+            while changes and changes[-1].n < made.n:
+                change = changes.pop()
+                self._apply(change.what, change.given)
+            self._learn(made)
+        for change in changes[::-1]:
+            self._apply(change.what, change.given)

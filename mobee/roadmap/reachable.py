@@ -1,0 +1,86 @@
+"""Finds reachable places and poses for a marker by inverse kinematics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.model.contact import links_moved
+from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.model.world_object import sphere
+from mobee.roadmap.ik import costs
+from mobee.roadmap.ik.least_squares import Descent
+from mobee.roadmap.ik.problem import Problem
+
+POINT = 1e-3  # m, radius of what stands for a place
+SHELL, FAR = 0.02, 0.5  # m
+MET = 1e-4  # m from the place: on it
+STARTS = 23  # random ones
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest:
+    """The posture (n,) rad whose marker is nearest to a place, where the marker is then, (3,) m, and how far from the place [m]."""
+
+    q: Array
+    position: Array
+    distance: float
+
+
+def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
+    """The posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
+
+    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`: nothing keeps it from
+    touching, and what it finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker, or
+    for what is no place or no q.
+    """
+    motors = [model.robot.motors[motor] for motor in _movers(model, part, marker)]
+    problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)
+    low, high = problem.limits.T
+    drawn = np.random.default_rng(seed).uniform(low, high, (STARTS, len(low)))
+    ends, missing = Descent(problem).ends(np.concatenate([problem.start[None], problem.whole(drawn)]))
+    best = int(missing[:, 0].argmin())
+    return Nearest(ends[best], model.evaluate(ends[best]).position(marker), float(missing[best, 0]))
+
+
+def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
+    """The link in whose solid shapes `position` (3,) m lies in the posture q (n,) rad, of those that the part does not move; or None."""
+    robot, world = model.robot, World()
+    world.add("place", sphere(POINT), position=position)
+    table = Model(robot, world).evaluate(q).table
+    moved = links_moved(robot)[part]
+    inside = [int(link) for link in table.first_link[(table.second_link < 0) & (table.kind == 0)] if int(link) not in moved]
+    return robot.links[inside[0]] if inside else None
+
+
+def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Array) -> Array | None:
+    """About the nearest place to `position` (3,) m that is outside the body, see `body_at`, and to which the part can bring the marker.
+
+    Within FAR, on shells that are SHELL apart; None if there is none.
+    """
+    where = np.asarray(position, dtype=np.float64)
+    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    nearest = nearest_posture(model, part, marker, where, q).distance
+    for distance in np.arange(max(nearest, SHELL), FAR, SHELL):
+        for place in where + distance * ways:
+            if body_at(model, part, place, q) is None and nearest_posture(model, part, marker, place, q).distance < SHELL:
+                return np.asarray(place)
+    return None
+
+
+def _movers(model: Model, part: str, marker: str) -> Ints:
+    """The part's motors that move the marker."""
+    robot = model.robot
+    where = robot.part(part)
+    rows = np.abs(model.jacobian(np.stack([robot.home, robot.limits.mean(axis=1)]), marker)).max(axis=(0, 1))
+    motors = where.start + np.flatnonzero(rows[where.slice] > 0.0)
+    if not len(motors):
+        able = [name for name in robot.markers if robot.markers[name].link in links_moved(robot)[part]]
+        raise InvalidValue(f"{part} does not move the marker {marker!r}. Valid: {', '.join(able) or 'none'}.")
+    return motors

@@ -1,0 +1,216 @@
+"""Writes a robot as URDF for other programs, with an SRDF beside it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.robot.drives import drives_of
+from mobee.robot.numbers import number, numbers
+from mobee.robot.robot import Marker, Motor, Robot, Shape
+from mobee.robot.urdf.frames import rpy_of
+from mobee.robot.urdf.hull import facets
+from mobee.robot.urdf.inertial import inertial_element
+from mobee.robot.urdf.write_srdf import write_srdf
+from mobee.robot.xml.pairs import role_elements
+
+
+@dataclass(slots=True)
+class GeometryWriter:
+    """Draws shapes of one robot; `folder` is where meshes go, and is made when the first one comes."""
+
+    folder: Path
+    written: int = 0
+
+    def solid(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
+        """Add a solid to a link whose frame stands at `point`; a capsule is drawn as a cylinder with two spheres."""
+        for name, part in _parts(shape):
+            geometry = self._geometry(part)
+            for tag in ("visual", "collision"):
+                element = ET.SubElement(link, tag, name=name)
+                _origin(element, part, point)
+                element.append(geometry)
+            if note:
+                ET.SubElement(element, "mobee", note)
+
+    def field(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
+        """Note a field, which URDF has no word for."""
+        element = ET.SubElement(link, "mobee", {"field": shape.name} | note)
+        _origin(element, shape, point)
+        element.append(self._geometry(shape))
+
+    def _geometry(self, shape: Shape) -> ET.Element:
+        geometry = ET.Element("geometry")
+        match shape.kind:
+            case "sphere":
+                ET.SubElement(geometry, "sphere", radius=number(shape.size[0]))
+            case "capsule" | "cylinder":
+                ET.SubElement(geometry, shape.kind, radius=number(shape.size[0]), length=number(shape.size[1]))
+            case "box":
+                ET.SubElement(geometry, "box", size=numbers(np.array(shape.size)))
+            case _:
+                ET.SubElement(geometry, "mesh", filename=self._mesh(shape))
+        return geometry
+
+    def _mesh(self, shape: Shape) -> str:
+        """Write the hull as an STL in text, for a binary one keeps seven digits only; returns its path from the URDF's folder."""
+        if shape.vertices is None:
+            raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
+        self.folder.mkdir(exist_ok=True)
+        name = f"{re.sub(r'[^A-Za-z0-9_]', '_', shape.name)[:60]}_{self.written}.stl"
+        self.written += 1
+        lines = ["solid hull"]
+        for corners in facets(shape.vertices):
+            normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+            lines.append(f"facet normal {numbers(normal / max(float(np.linalg.norm(normal)), 1e-300))}")
+            lines.append("outer loop")
+            lines += [f"vertex {numbers(corner)}" for corner in corners]
+            lines += ["endloop", "endfacet"]
+        (self.folder / name).write_text("\n".join([*lines, "endsolid hull", ""]), encoding="ascii")
+        return f"{self.folder.name}/{name}"
+
+
+def _parts(shape: Shape) -> list[tuple[str, Shape]]:
+    if shape.kind != "capsule":
+        return [(shape.name, shape)]
+    radius, height = shape.size
+    cylinder = Shape(shape.name, shape.link, "cylinder", shape.size, shape.position, shape.rotation, shape.role, shape.part)
+    parts = [(shape.name, cylinder)]
+    for side, half in enumerate((height / 2, -height / 2)):
+        end = shape.position + half * shape.rotation[:, 2]
+        cap = Shape(shape.name, shape.link, "sphere", (radius,), end, np.eye(3), shape.role, shape.part)
+        parts.append((f"{shape.name}_cap_{side}", cap))
+    return parts
+
+
+def _origin(element: ET.Element, shape: Shape, point: Array) -> None:
+    ET.SubElement(element, "origin", xyz=numbers(shape.position - point), rpy=numbers(rpy_of(shape.rotation)))
+
+
+Master = tuple[int, float, float]  # joint, scale, offset
+
+
+def write_urdf(robot: Robot, path: str | Path) -> Path:
+    """Write a robot to a URDF file and return its path; x.srdf and, for convex shapes, the folder x_meshes come beside it.
+
+    Every link's frame stands at its joint and is not turned at zero pose. The first joint of a motor stands for it, the others mimic
+    that joint; markers are links on fixed joints. `load_robot` reads it back as the same robot, but for the clauses, and for
+    convex shapes of more than 64 vertices, which it encloses. Raises InvalidValue for a joint that no motor or more than one drives.
+    """
+    path = Path(path)
+    drives_of(robot)  # or else there is no master
+    masters = tuple(_master(motor) for motor in robot.motor_table)
+    part_of = ["", *(robot.motor_table[drive.motor].part for drive in drives_of(robot))]
+    root = ET.Element("robot", name=robot.name)
+    root.append(ET.Comment(_comment(robot)))
+    writer = GeometryWriter(path.with_name(f"{path.stem}_meshes"))
+    points = [np.zeros(3), *(joint.point for joint in robot.joints)]
+    for index, name in enumerate(robot.links):
+        _write_body(robot, ET.SubElement(root, "link", name=name), index, points[index], part_of[index] or part_of[1], writer)
+    for motor, master in zip(robot.motor_table, masters, strict=True):
+        for joint, scale, offset in motor.joints:
+            _write_joint(robot, root, motor, master, (joint, scale, offset), points)
+    _write_markers(robot, root, points)
+    _write_pairs(robot, root)
+    ET.indent(root, " ")
+    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    write_srdf(robot, masters, path.with_suffix(".srdf"))
+    return path
+
+
+def _master(motor: Motor) -> Master:
+    """The joint that stands for a motor: one that moves as it does, else the first."""
+    return next((drive for drive in motor.joints if drive[1:] == (1.0, 0.0)), motor.joints[0])
+
+
+def _comment(robot: Robot) -> str:
+    lines = ["Written by mobee convert."]
+    if not robot.bodies:
+        lines.append("It holds no masses.")
+    elif any(body.inertia is None for body in robot.bodies):
+        lines.append('Where <mobee assumed="true"/> stands only the mass is known; the moments of inertia are those of a ball of water.')
+    if robot.clauses:
+        lines.append("Not in this file: at least one row of every clause holds, a.q + b > 0 in rad.")
+    for index, clause in enumerate(robot.clauses):
+        rows = []
+        for row, offset in zip(clause.a, clause.b, strict=True):
+            terms = [f"{number(row[k])} {robot.motors[k]}" for k in np.flatnonzero(row)]
+            rows.append(f"{' + '.join(terms)} + {number(offset)} > 0")
+        lines.append(f"clause {index}, {clause.part}: {' or '.join(rows)}")
+    return "\n".join(["", *lines, ""]).replace("--", "- -")
+
+
+def _write_body(robot: Robot, link: ET.Element, index: int, point: Array, part: str, writer: GeometryWriter) -> None:
+    link.extend(inertial_element(body, point) for body in robot.bodies if body.link == index)
+    for k, shape in enumerate(robot.shapes):
+        if shape.link != index:
+            continue
+        note = {} if shape.part == part else {"part": shape.part}
+        if (k in robot.base_shapes) != (index == 0):
+            note["base"] = "true" if index else "false"
+        write = writer.field if shape.role == "field" else writer.solid
+        write(link, shape, point, note)
+
+
+def _write_joint(robot: Robot, root: ET.Element, motor: Motor, master: Master, drive: Master, points: list[Array]) -> None:
+    index, scale, offset = drive
+    joint = robot.joints[index]
+    element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
+    ET.SubElement(element, "origin", xyz=numbers(joint.point - points[joint.parent]), rpy="0 0 0")
+    ET.SubElement(element, "parent", link=robot.links[joint.parent])
+    ET.SubElement(element, "child", link=robot.links[index + 1])
+    ET.SubElement(element, "axis", xyz=numbers(joint.axis))
+    low, high = np.sort(scale * motor.limits + offset)
+    speed, effort = motor.max_velocity * abs(scale), motor.max_torque / abs(scale)
+    ET.SubElement(element, "limit", lower=number(low), upper=number(high), velocity=number(speed), effort=number(effort))
+    if index != master[0]:
+        factor = scale / master[1]
+        shift = number(offset - factor * master[2])
+        ET.SubElement(element, "mimic", joint=robot.joints[master[0]].name, multiplier=number(factor), offset=shift)
+        return
+    note = {} if motor.name == joint.name else {"motor": motor.name}
+    note |= {} if (scale, offset) == (1.0, 0.0) else {"scale": number(scale), "offset": number(offset)}
+    ET.SubElement(element, "mobee", note | {"acceleration": number(motor.max_acceleration)})
+
+
+def _write_markers(robot: Robot, root: ET.Element, points: list[Array]) -> None:
+    links = set(robot.links)
+    joints = {joint.name for joint in robot.joints}
+    for marker in robot.markers.values():
+        name = _free(marker.name, links)
+        link = ET.SubElement(root, "link", name=name)
+        ET.SubElement(link, "mobee", {"marker": marker.name} | _normal(marker))
+        joint = ET.SubElement(root, "joint", name=_free(f"{name}_fixed", joints), type="fixed")
+        ET.SubElement(joint, "origin", xyz=numbers(marker.position - points[marker.link]), rpy=numbers(rpy_of(marker.rotation)))
+        ET.SubElement(joint, "parent", link=robot.links[marker.link])
+        ET.SubElement(joint, "child", link=name)
+
+
+def _normal(marker: Marker) -> dict[str, str]:
+    normal = marker.rotation.T @ marker.normal
+    return {} if abs(normal[2] - 1.0) < 1e-15 else {"normal": numbers(normal)}
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """The name, changed where it is taken already; then it is."""
+    while name in taken:
+        name += "_marker"
+    taken.add(name)
+    return name
+
+
+def _write_pairs(robot: Robot, root: ET.Element) -> None:
+    own = any(robot.shapes[a].part == robot.shapes[b].part for a, b in robot.field_pairs.tolist())
+    rest = [
+        element
+        for role, pairs in (("solid", robot.solid_pairs), ("field", robot.field_pairs))
+        for element in role_elements(robot, role, pairs, own)
+    ]
+    if rest or own:
+        ET.SubElement(root, "mobee", {"ownFields": "true"} if own else {}).extend(rest)

@@ -1,0 +1,1 @@
+"""Reads and writes robots as zero-position XML, of every version of the grammar."""

@@ -1,0 +1,65 @@
+"""The robot read so far from a file, and the reader's position in its tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from mobee.arrays import Array
+from mobee.robot.join import Placed
+from mobee.robot.pairs_2014 import Element
+from mobee.robot.robot import Body, Joint, Marker, Shape
+from mobee.robot.xml.motors import MotorDraft
+from mobee.robot.xml.node import Node
+
+
+@dataclass(slots=True)
+class Draft:
+    """What has been read so far."""
+
+    links: list[str] = field(default_factory=lambda: ["base"])
+    subtree: list[int] = field(default_factory=lambda: [-1])  # for each link the element whose noSelfCollision holds for it
+    joints: list[Joint] = field(default_factory=list)
+    drives: list[tuple[Node, str]] = field(default_factory=list)  # for each joint its element and the name of its motor
+    motors: dict[str, MotorDraft] = field(default_factory=dict)
+    parts: dict[str, list[Node]] = field(default_factory=dict)
+    hands: dict[int, str] = field(default_factory=dict)  # the elements with noSelfCollision, and what a reason calls them
+    elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
+    shapes: list[Shape] = field(default_factory=list)
+    hosts: list[int] = field(default_factory=list)  # for each shape its element
+    shape_names: dict[str, int] = field(default_factory=dict)  # and how many more were named after it
+    base_shapes: set[int] = field(default_factory=set)
+    markers: dict[str, Marker] = field(default_factory=dict)
+    bodies: list[Body] = field(default_factory=list)  # several a link, perhaps
+    constraints: list[tuple[str, Node]] = field(default_factory=list)
+    ignores: list[Node] = field(default_factory=list)
+    others: list[tuple[Node, Placed]] = field(default_factory=list)  # robots of other files, and where they were asked for
+    where: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def note(self, kind: str, name: str, node: Node) -> None:
+        """Remember where a thing was read first."""
+        self.where.setdefault((kind, name), f"{node.file}:{node.line}")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in the tree a child stands: two points, the link it is on, its part, motor, and the element whose noSelfCollision holds."""
+
+    point: Array  # (3,) m, where links and joints go on: the end of a link
+    start: Array  # (3,) m, where shapes and markers stand: the start of a link
+    link: int = 0
+    carrier: int = 0  # in a joint the link that carries it, else the same link: what has turns="false" is on it
+    part: str = ""
+    motor: str = ""
+    subtree: int = -1
+    base: bool = True
+    element: int = 0
+
+
+def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
+    """The place inside a link or joint that a reason calls `name`."""
+    index = len(draft.elements)
+    if node.flag("noSelfCollision") and place.subtree < 0:
+        draft.hands[index] = name
+        place = replace(place, subtree=index)
+    draft.elements.append(Element(place.element, node.tag, place.part, place.subtree, place.link))
+    return replace(place, element=index)

@@ -1,0 +1,130 @@
+"""Reads motors, the joints they drive, and linear constraints."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mobee.robot.robot import Clause, Joint, Motor, Part
+from mobee.robot.xml.node import Node
+
+NARROWEST = 1e-6  # deg between the limits of a motor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotorDraft:
+    """A motor as its element says, before its joints are known; angles still in [deg]."""
+
+    node: Node
+    name: str
+    part: str
+    index: int  # position within the part
+    low: float
+    high: float
+    home: float
+
+
+def read_motor(node: Node, part: str, count: int) -> MotorDraft:
+    """One <motor>; `count` motors came before it."""
+    low, high = node.number("minPos"), node.number("maxPos")
+    if low == high:
+        remedy = "Write a <link> instead of the joint if it shall not move, or another interval"
+        node.fail("minPos", f"equals maxPos {high:g}, so the motor cannot move", remedy)
+    if low > high:
+        node.fail("minPos", f"{low:g} is not below maxPos {high:g}", "Swap the two")
+    if high - low < NARROWEST:
+        node.fail("minPos", f"is less than {NARROWEST:g} deg below maxPos", "Write limits in degrees, or a <link> instead of the joint")
+    home = node.number("home", min(max(0.0, low), high))
+    if not low <= home <= high:
+        node.fail("home", f"{home:g} is outside of {low:g} .. {high:g}", "Choose a home between minPos and maxPos")
+    index = node.number("idx", float(count))
+    if not index.is_integer() or index < 0:
+        node.fail("idx", f"{index:g} is not a whole number from 0 on", "Count the motors of a part from 0")
+    return MotorDraft(node, node.optional("name") or f"{part}_{count}", part, int(index), low, high, home)
+
+
+def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:
+    """All motors, part by part in the order of the file, within a part by idx; raises RobotFileError on a double idx."""
+    ordered = []
+    for part in parts:
+        mine = sorted((motor for motor in motors.values() if motor.part == part), key=lambda motor: motor.index)
+        for one, other in zip(mine, mine[1:], strict=False):
+            if one.index == other.index:
+                other.node.fail("idx", f"{other.index} is taken by {one.name!r}", "Give every motor of a part its own idx")
+        ordered += mine
+    return ordered
+
+
+def finish_joints(
+    joints: Sequence[Joint], drives: Sequence[tuple[Node, str]], motors: Sequence[MotorDraft]
+) -> tuple[tuple[Joint, ...], tuple[Motor, ...]]:
+    """Joints with limits in SI units and motors with the affine map of thesis 2.3.1: motor interval onto joint interval."""
+    places = {motor.name: k for k, motor in enumerate(motors)}
+    driven: list[list[tuple[int, float, float]]] = [[] for _ in motors]
+    finished = []
+    for index, (joint, (node, name)) in enumerate(zip(joints, drives, strict=True)):
+        motor = motors[places[node.choice("motor", name, places, "motor")]]
+        low, high = node.number("minPos", motor.low), node.number("maxPos", motor.high)
+        if low == high:
+            node.fail(
+                "minPos", f"equals maxPos {high:g}, so the joint cannot move", 'Write type="fixed" without limits, or another interval'
+            )
+        span = np.deg2rad(motor.high - motor.low)
+        unit = np.deg2rad(1.0) if joint.kind == "revolute" else 1.0
+        scale = (high - low) * unit / span
+        driven[places[name]].append((index, float(scale), float(low * unit - scale * np.deg2rad(motor.low))))
+        finished.append(replace(joint, limits=np.array([min(low, high), max(low, high)]) * unit))
+    for motor, joints_of_motor in zip(motors, driven, strict=True):
+        if not joints_of_motor:
+            motor.node.fail("name", f"motor {motor.name!r} drives no joint", f'Write <joint motor="{motor.name}" ...>')
+    return tuple(finished), tuple(_motor(motor, tuple(mine)) for motor, mine in zip(motors, driven, strict=True))
+
+
+def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> Motor:
+    limits = np.deg2rad([draft.low, draft.high])
+    motor = Motor(draft.name, draft.part, limits, float(np.clip(np.deg2rad(draft.home), *limits)), joints)
+    node = draft.node
+    if node.flag("zoneEndsAtHome"):
+        motor = replace(motor, zone_ends_at_home=True)
+    if "velocity" in node.attributes:
+        motor = replace(motor, max_velocity=float(np.deg2rad(node.positive("velocity", unit="degrees per second"))))
+    if "acceleration" in node.attributes:
+        motor = replace(motor, max_acceleration=float(np.deg2rad(node.positive("acceleration", unit="degrees per second squared"))))
+    if "torque" in node.attributes:
+        motor = replace(motor, max_torque=node.positive("torque", unit="newton metres"))
+    return motor
+
+
+def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
+    """One <constraintList> as a clause; its rows are satisfied when a.q + b > 0, `negate` flips a row.
+
+    `q` of a row names motors of the part, or gives their numbers within it.
+    """
+    rows, offsets = [], []
+    for child in (child for child in node if child.tag == "constraint"):
+        factors, words = child.numbers("a"), child.words("q")
+        if len(factors) != len(words) or not words:
+            child.fail("q", f"names {len(words)} motors for {len(factors)} factors", "Give a and q the same number of entries")
+        row = np.zeros(len(motors))
+        for factor, word in zip(factors, words, strict=True):
+            row[motors.index(_motor_name(child, word, part))] += factor
+        if not row.any():
+            child.fail("a", "is zero", "Give at least one motor a factor")
+        sign = -1.0 if child.flag("negate") else 1.0
+        rows.append(sign * row)
+        offsets.append(sign * np.deg2rad(child.number("b")))
+    if not rows:
+        node.fail("constraint", "the list is empty", "Add a <constraint> or remove the list")
+    return Clause(part.name, np.array(rows), np.array(offsets))
+
+
+def _motor_name(node: Node, word: str, part: Part) -> str:
+    if re.fullmatch("-?[0-9]{1,9}", word):
+        number = int(word)
+        if not 0 <= number < len(part):
+            node.fail("q", f"part {part.name!r} has no motor {number}", f"Its motors are 0 to {len(part) - 1}: {', '.join(part.motors)}")
+        return part.motors[number]
+    return node.choice("q", word, part.motors, "motor")

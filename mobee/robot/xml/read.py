@@ -1,0 +1,299 @@
+"""Reads a robot from zero-position XML (thesis 2.3.1); the grammar is in robots/README.md."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from mobee.arrays import Ints
+from mobee.errors import InvalidValue
+from mobee.robot.bodies import one_a_link
+from mobee.robot.join import Placed, join_placed
+from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
+from mobee.robot.pairs_2014 import Rule, published_pairs, published_untested
+from mobee.robot.robot import Joint, LinkPair, Part, Robot
+from mobee.robot.xml.body import CONVEX_ATTRIBUTES, MASS_ATTRIBUTES, MOST_SHAPES, read_marker, read_mass, read_shape, read_skeleton
+from mobee.robot.xml.draft import Draft, Place, enter
+from mobee.robot.xml.include import INCLUDE_ATTRIBUTES, Trail, read_include
+from mobee.robot.xml.motors import finish_joints, order_motors, read_clauses, read_motor
+from mobee.robot.xml.node import Node, nearest, read_xml
+from mobee.robot.xml.pairs import IGNORE_ATTRIBUTES, without_ignored
+from mobee.robot.xml.versions import report, upgrade_robot
+from mobee.robot.xml.volume import PLACE, STEP, VOLUME_TAGS, direction, link_step
+
+MOST_JOINTS = 500  # pairs of links grow with the square
+MOST_ELEMENTS_2014 = 500  # and the descents of pairs_2014.py faster
+
+
+def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
+    """The robot of a draft whose file has been read to its end, joined with those of other files; raises RobotFileError."""
+    if not draft.parts and not draft.others:
+        root.fail("bodypart", "the robot has no body part", 'Put its motors and links inside <bodypart name="...">')
+    draft.note("robot", name, root)
+    draft.note("link", draft.links[0], root)
+    robot = _own_robot(root, draft, name)
+    if draft.others:
+        robot = _with_others(robot, draft)
+    return without_ignored(robot, draft.ignores)
+
+
+def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
+    motors = order_motors(draft.motors, draft.parts)
+    parts = {part: Part(part, (), 0) for part in draft.parts}
+    for part in draft.parts:
+        names = tuple(motor.name for motor in motors if motor.part == part)
+        if not names:
+            draft.parts[part][0].fail("motor", f"part {part!r} has no motor", "Add a <motor> or move its links into another part")
+        parts[part] = Part(part, names, next(k for k, motor in enumerate(motors) if motor.part == part))
+    joints, table = finish_joints(draft.joints, draft.drives, motors)
+    names = tuple(motor.name for motor in table)
+    field_pairs, solid_pairs, untested = _pairs(root, draft, joints)
+    return Robot(
+        name=name,
+        links=tuple(draft.links),
+        joints=joints,
+        motor_table=table,
+        parts=parts,
+        markers=draft.markers,
+        shapes=tuple(draft.shapes),
+        clauses=tuple(read_clauses(node, parts[part], names) for part, node in draft.constraints),
+        field_pairs=field_pairs,
+        solid_pairs=solid_pairs,
+        base_shapes=frozenset(draft.base_shapes),
+        untested=untested,
+        where=draft.where,
+        bodies=one_a_link(draft.bodies),
+    )
+
+
+def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, Ints, dict[LinkPair, str]]:
+    """Tested pairs of fields and of solids, and the reasons for the pairs of links that are never tested."""
+    given = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "listed", *get_args(Rule)), "rule")
+    if given == "listed":
+        return tested_pairs(draft.shapes, "field", {}, own=True), tested_pairs(draft.shapes, "solid", {}), {}
+    if given == "joined":
+        untested = merged(joined_links(joints), hand_links(draft.subtree, draft.hands))
+        return tested_pairs(draft.shapes, "field", untested), tested_pairs(draft.shapes, "solid", untested), untested
+    if len(draft.elements) > MOST_ELEMENTS_2014:
+        root.fail("adjacency", f"the rule of 2014 is for at most {MOST_ELEMENTS_2014} links and joints", 'Write adjacency="joined"')
+    rule: Rule = "published_2014" if given == "published_2014" else "recorded_2014"
+    field_pairs, solid_pairs = (published_pairs(draft.elements, draft.hosts, draft.shapes, role, rule) for role in ("field", "solid"))
+    tested = link_pairs(draft.shapes, field_pairs, solid_pairs)
+    reasons = published_untested(draft.elements, draft.hosts, draft.shapes, rule)
+    return field_pairs, solid_pairs, {pair: reason for pair, reason in reasons.items() if pair not in tested}
+
+
+def _with_others(robot: Robot, draft: Draft) -> Robot:
+    """The robot of this file, if it has a body, and those of other files."""
+    node, _ = draft.others[-1]
+    own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers or draft.bodies else []
+    placed = own + [other for _, other in draft.others]
+    if sum(len(one.robot.shapes) for one in placed) > MOST_SHAPES or sum(len(one.robot.joints) for one in placed) > MOST_JOINTS:
+        node.fail("file", f"more than {MOST_SHAPES} shapes or {MOST_JOINTS} joints in all", "Include fewer or simpler robots")
+    try:
+        joined = join_placed(placed, robot.name)
+    except InvalidValue as error:
+        node.fail("name", str(error), "Names begin with the name of their <robot>, where it has one")
+    return replace(joined, where={("robot", robot.name): robot.where[("robot", robot.name)], **joined.where})
+
+
+MOST = {"joint": MOST_JOINTS, "ignore": 20_000}  # of one tag, in a file; 1000 of the others. `write_xml` names every ignored pair
+ROOT = "zeropositionkinematictree"
+BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
+KNOWN = {
+    ROOT: frozenset({"version", "robotName", "adjacency"}),
+    "bodypart": frozenset({"name"}),
+    "link": frozenset({"name", *STEP, "length", "radius", "field", "noSelfCollision", "base"}),
+    "joint": frozenset(
+        {"name", "moves", "motor", "type", *STEP, "minPos", "maxPos", "length", "radius", "field", "noSelfCollision", "base"}
+    ),
+    "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque", "zoneEndsAtHome"}),
+    "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation", "turns"}),
+    "mass": MASS_ATTRIBUTES,
+    "constraintlist": frozenset[str](),
+    "constraint": frozenset({"a", "q", "b", "negate"}),
+    "robot": INCLUDE_ATTRIBUTES,
+    "ignore": IGNORE_ATTRIBUTES,
+} | {tag: known | {"name", "field", "base", "turns"} for tag, known in BODY_TAGS.items()}
+
+
+def read_robot(path: Path) -> Robot:
+    """The robot described by a zero-position XML file of any version (xml_versions.py).
+
+    Lengths in the file are in [m], angles in [deg]; everything in the Robot is in SI units, root frame, zero pose.
+    Raises RobotFileError with file, line, field and remedy; warns of what it ignores or repairs.
+    """
+    return _read(path, Trail())
+
+
+def _read(path: Path, trail: Trail) -> Robot:
+    root = read_xml(path, repair=True)
+    if root.tag != ROOT:
+        root.fail("root element", "this is not a robot", "The root of a robot file is <ZeroPositionKinematicTree robotName=...>")
+    _check_counts(root)
+    report(upgrade_robot(root))
+    root.check_attributes(KNOWN[ROOT])
+    draft, inside = Draft(), trail.into(path)
+    for node in root:
+        if node.tag == "robot":
+            node.check_attributes(KNOWN[node.tag])
+            _check_children(node)
+            draft.others.append((node, read_include(node, inside, _read)))
+    root.children = [node for node in root if node.tag != "robot"]
+    _read_tree(root, draft, Place(np.zeros(3), np.zeros(3)))
+    return finish_robot(root, draft, root.optional("robotName") or path.stem)
+
+
+def _check_counts(root: Node) -> None:
+    """Refuse what no robot has and what would keep the reader busy for minutes."""
+    counts: Counter[str] = Counter()
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        counts[node.tag] += 1
+        most = MOST.get(node.tag, 1000)
+        if counts[node.tag] > most and node.tag in KNOWN:
+            node.fail("size of the file", f"more than {most} of this tag", "Divide the robot, or leave out what does not matter")
+        waiting += reversed(node.children)
+
+
+def _read_tree(root: Node, draft: Draft, place: Place) -> None:
+    """Everything below the root, in the order of the file."""
+    waiting = [(child, place) for child in reversed(root.children)]
+    while waiting:
+        node, place = waiting.pop()
+        if node.tag not in KNOWN:
+            _warn_unknown(node)
+            continue
+        node.check_attributes(KNOWN[node.tag])
+        inside = READERS.get(node.tag, _misplaced)(node, draft, place)
+        if inside is not None:
+            waiting += [(child, inside) for child in reversed(node.children)]
+        elif node.tag != "constraintlist":  # its reader has looked at its rows
+            _check_children(node)
+
+
+def _check_children(node: Node, *valid: str) -> None:
+    """Refuse known tags in an element that holds only `valid` ones, and warn of unknown ones."""
+    for child in node:
+        if child.tag not in KNOWN:
+            _warn_unknown(child)
+        elif child.tag not in valid:
+            holds = f"only <{valid[0]}> stands" if valid else "nothing stands"
+            child.fail("position in the file", f"{holds} inside <{node.tag}>", f"Move it behind the <{node.tag}>")
+        else:
+            child.check_attributes(KNOWN[child.tag])
+            _check_children(child)
+
+
+def _warn_unknown(node: Node) -> None:
+    node.warn(f"unknown tag is ignored with all inside. {nearest(node.tag, KNOWN)}Valid: {', '.join(sorted(KNOWN))}")
+
+
+def _misplaced(node: Node, draft: Draft, place: Place) -> None:
+    remedy = f"Move it: <constraint> stands in <constraintList>, <robot> directly in the root, <{ROOT}> only once"
+    node.fail("position in the file", "this tag cannot stand here", remedy)
+
+
+def _read_part(node: Node, draft: Draft, place: Place) -> Place:
+    name = node.text("name")
+    draft.parts.setdefault(name, []).append(node)
+    draft.note("part", name, node)
+    return replace(place, part=name)
+
+
+def _read_motor(node: Node, draft: Draft, place: Place) -> Place:
+    if not place.part:
+        node.fail("position in the file", "a motor outside of every part", "Move it into a <bodypart>")
+    if node.optional("name") in draft.motors:
+        name = node.text("name")
+        remedy = f'rename one, or write <joint motor="{name}"> without a second <motor> where that one is meant'
+        node.fail("name", f"a second motor {name!r}", f"The first is in line {draft.motors[name].node.line}: {remedy}")
+    motor = read_motor(node, place.part, len(draft.motors))
+    draft.motors[motor.name] = motor
+    draft.note("motor", motor.name, node)
+    return replace(place, motor=motor.name)
+
+
+def _read_link(node: Node, draft: Draft, place: Place) -> Place:
+    here = enter(
+        node,
+        draft,
+        replace(place, start=place.point, carrier=place.link, base=node.flag("base", default=place.base)),
+        f"the link in line {node.line}",
+    )
+    step, length = link_step(node)
+    if place.link == 0 and "name" in node.attributes:
+        _name_base(node, draft)
+    read_skeleton(node, draft, here, place.point + step / 2, step, length)
+    return replace(here, point=place.point + step)
+
+
+def _name_base(node: Node, draft: Draft) -> None:
+    name = node.text("name")
+    if name in draft.links[1:]:
+        node.fail("name", f"a second link {name!r}", "Give the base a name of its own")
+    draft.links[0] = name
+    draft.note("link", name, node)
+
+
+def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
+    index = len(draft.joints)
+    axis = direction(node, STEP)
+    length = node.positive("length", float(np.linalg.norm(node.vector(STEP))))
+    kind = node.choice("type", node.attributes.get("type", "revolute"), ("revolute", "prismatic", "fixed"), "type of joint")
+    if kind == "fixed":
+        place = replace(place, start=place.point, carrier=place.link, base=node.flag("base"))
+        here = enter(node, draft, place, f"the joint in line {node.line}")
+        read_skeleton(node, draft, here, place.point, axis, length)
+        return here
+    motor = node.optional("motor") or place.motor or node.missing("motor")
+    name = node.optional("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
+    link = node.optional("moves") or name
+    if link in draft.links or any(name == joint.name for joint in draft.joints):
+        node.fail("name", f"a second joint {name!r} or link {link!r}", "Give every joint its own name and every link it moves another")
+    draft.joints.append(Joint(name, place.link, "revolute" if kind == "revolute" else "prismatic", axis, place.point, np.zeros(2)))
+    draft.drives.append((node, motor))
+    draft.links.append(link)
+    draft.note("joint", name, node)
+    draft.note("link", link, node)
+    here = enter(
+        node,
+        draft,
+        replace(place, start=place.point, link=index + 1, carrier=place.link, motor=motor, base=node.flag("base")),
+        f"joint {name}",
+    )
+    draft.subtree.append(here.subtree)
+    read_skeleton(node, draft, here, place.point, axis, length)
+    return here
+
+
+def _read_constraints(node: Node, draft: Draft, place: Place) -> None:
+    if not place.part:
+        node.fail("position in the file", "constraints outside of every part", "Move them into the <bodypart> whose motors they name")
+    _check_children(node, "constraint")
+    draft.note("clause", str(len(draft.constraints)), node)
+    draft.constraints.append((place.part, node))
+
+
+def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
+    draft.ignores.append(node)
+
+
+# What reads a tag, and the place for what stands inside; None where nothing does, or where it has been read already.
+READERS: dict[str, Callable[[Node, Draft, Place], Place | None]] = {
+    "bodypart": _read_part,
+    "motor": _read_motor,
+    "link": _read_link,
+    "joint": _read_joint,
+    "marker": read_marker,
+    "mass": read_mass,
+    "constraintlist": _read_constraints,
+    "ignore": _read_ignore,
+    **dict.fromkeys(BODY_TAGS, read_shape),
+}

@@ -1,0 +1,188 @@
+"""Versions of the grammar: rewrites older files into today's form before they are read.
+
+| version attribute of the root | form |
+| --- | --- |
+| 2.0 | today's (robots/README.md) |
+| 0.1 | MoBeE 0.1 |
+| 1.0, or none | the programs of 2010 to 2014, or MoBeE 0.1 where a tag or an attribute shows it, for it wrote 1.0 too |
+
+MoBeE 0.1 differs from today in three rules: what stands inside a <link> stood relative to the link's end, a box was turned the
+shortest way to its height axis, and a marker without a normal had +z. What the older programs read differently: xml_original.py.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import OlderVersion
+from mobee.robot.numbers import degrees, number, numbers
+from mobee.robot.xml.node import VERSION, Node, Remark, descendants, shown
+from mobee.robot.xml.original import find_evidence, rewrite_original
+from mobee.robot.xml.original_world import rewrite_world_list
+from mobee.robot.xml.volume import AXIS, PLACE, VOLUME_TAGS, Y, align, direction, height_along, height_and_angle, link_step, turn_about
+
+Version = Literal["2.0", "1.0", "0.1"]
+WORLD_TAGS = ("world", "worldlist")
+NORMAL = ("nx", "ny", "nz")
+ATTACHED = frozenset({*VOLUME_TAGS, "convex", "marker", "mass"})
+CONVERT = "`mobee convert OLD.xml NEW.xml` writes today's form"
+
+# What only MoBeE 0.1 read, by tag. A tag without attributes is new itself.
+_OF_0_1: dict[str, frozenset[str]] = {
+    "zeropositionkinematictree": frozenset({"adjacency"}),
+    "link": frozenset({"name", "base"}),
+    "joint": frozenset({"name", "moves", "motor", "base"}),
+    "motor": frozenset({"velocity", "acceleration", "torque"}),
+    "marker": frozenset({*PLACE, "rotation"}),
+    "sphere": frozenset({"name", "base"}),
+    "cylinder": frozenset({"name", "base"}),
+    "box": frozenset({"name", "base"}),
+}
+_TAGS_OF_0_1 = frozenset({"capsule", "convex", "mass", "ignore", "robot"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """One thing that MoBeE 0.1 and today's grammar read differently: where, in words, and today's attributes for the meaning of 0.1."""
+
+    node: Node
+    rule: str
+    attributes: dict[str, str]
+
+
+def upgrade_robot(root: Node) -> list[Remark]:
+    """Rewrite a robot's elements into today's grammar, in place, and return how they were understood.
+
+    Raises RobotFileError for an unknown version, and for a fault of form in a file that is not of 2010 to 2014.
+    """
+    version, remarks, is_certain = _version(root)
+    if version == "1.0":
+        remarks = rewrite_original(root) + remarks
+        remarks += [] if is_certain else _ambiguous(root)
+    else:
+        _refuse_repairs(root)
+        if version == "0.1":
+            remarks += _rewrite_0_1(root)
+    root.attributes["version"] = VERSION
+    return remarks
+
+
+def upgrade_world(root: Node) -> list[Remark]:
+    """Rewrite a world's elements into today's grammar, in place, and return how they were understood; errors as upgrade_robot."""
+    if root.tag == "worldlist":
+        remarks = rewrite_world_list(root)
+    else:
+        given = root.optional("version")
+        _refuse_repairs(root)
+        root.choice("version", given or "1.0", (VERSION, "1.0", "0.1"), "version")
+        remarks = [] if given == VERSION else _rewrite_0_1(root)
+    root.attributes["version"] = VERSION
+    return remarks
+
+
+def _version(root: Node) -> tuple[Version, list[Remark], bool]:
+    """Which version a robot file is of, the remark that says why, and whether it can be of no other."""
+    given = root.optional("version")
+    if given in (VERSION, "0.1"):
+        return ("2.0" if given == VERSION else "0.1"), [], True
+    if given not in ("", "1.0"):
+        root.fail(
+            "version", f"{shown(given)!r} is not known", f'Write version="{VERSION}" for today\'s grammar. Valid: 0.1, 1.0, {VERSION}'
+        )
+    original = find_evidence(root)
+    if original is not None and original.certain:
+        return "1.0", [original.remark()], True
+    of_0_1 = next(_extensions(root), None)
+    if of_0_1 is not None:
+        return "0.1", [Remark(root, f"read as MoBeE 0.1 wrote it, for {of_0_1} is of that version", CONVERT, "note")], True
+    return "1.0", [] if original is None else [original.remark()], False
+
+
+def _extensions(root: Node) -> Iterator[str]:
+    """What in a file without a clear version MoBeE 0.1 brought: "<joint motor=> in line 7"."""
+    for node in descendants(root):
+        if node.tag in _TAGS_OF_0_1:
+            yield f"<{node.tag}> in line {node.line}"
+        for name in sorted(_OF_0_1.get(node.tag, frozenset()) & node.attributes.keys()):
+            yield f"<{node.tag} {name}=> in line {node.line}"
+        if node.tag == "joint" and not {"minPos", "maxPos"} & node.attributes.keys():
+            yield f"a <joint> without limits in line {node.line}"
+        if node.tag == "constraint" and re.search("[a-z_]", node.attributes.get("q", ""), re.IGNORECASE):
+            yield f"a <constraint> that names motors in line {node.line}"
+
+
+def _refuse_repairs(root: Node) -> None:
+    """Raise for the first fault of form: only the old programs let them pass."""
+    if root.repairs:
+        raise root.repairs[0].error
+
+
+def _rewrite_0_1(root: Node) -> list[Remark]:
+    """Write the meaning of MoBeE 0.1 in today's words; one warning for each rule that made a difference."""
+    if root.attributes.get("adjacency") == "published_2014":
+        root.attributes["adjacency"] = "recorded_2014"  # what MoBeE 0.1 took for it
+    rules: dict[str, list[_Change]] = {}
+    for change in list(_changes(root)):
+        rules.setdefault(change.rule, []).append(change)
+        for name in AXIS if "angle" in change.attributes else ():
+            change.node.attributes.pop(name, None)
+        change.node.attributes.update(change.attributes)
+    return [Remark(mine[0].node, f"read as MoBeE 0.1 read it: {rule} ({_times(mine)})", CONVERT) for rule, mine in rules.items()]
+
+
+def _ambiguous(root: Node) -> list[Remark]:
+    """The warnings of a file that MoBeE 0.1 read too, but otherwise."""
+    rules: dict[str, list[_Change]] = {}
+    for change in _changes(root):
+        rules.setdefault(change.rule, []).append(change)
+    remedy = f'Write version="{VERSION}" into the root if this is meant, version="0.1" if not'
+    return [
+        Remark(mine[0].node, f"read as the programs of 2010 to 2014 read it. MoBeE 0.1 differed: {rule} ({_times(mine)})", remedy)
+        for rule, mine in rules.items()
+    ]
+
+
+def _times(changes: list[_Change]) -> str:
+    return "here" if len(changes) == 1 else f"{len(changes)} times, first here"
+
+
+def _changes(root: Node) -> Iterator[_Change]:
+    """Everything in a tree that MoBeE 0.1 and today's grammar read differently; a list of points must be complete."""
+    waiting: list[tuple[Node, Array]] = [(root, np.zeros(3))]
+    while waiting:
+        node, step = waiting.pop()
+        if node.tag in ATTACHED and step.any():
+            place = node.vector(PLACE) + step
+            yield _Change(node, "what stands inside a <link> stands at its end", dict(zip(PLACE, map(number, place), strict=True)))
+        if node.tag in ("box", "convex"):
+            yield from _turned(node)
+        if node.tag == "marker" and not {*NORMAL, "rotation"} & node.attributes.keys():
+            yield _Change(node, "a marker without a normal has +z", {"nz": "1"})
+        inside = link_step(node)[0] if node.tag == "link" else np.zeros(3) if node.tag == "joint" else step
+        waiting += [(child, inside) for child in reversed(node.children)]
+
+
+def _turned(node: Node) -> Iterator[_Change]:
+    axis, angle = direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0))
+    rotation = turn_about(axis, angle) @ align(Y, axis)
+    if np.abs(rotation - height_along(axis, angle)).max() <= 1e-12:
+        return
+    if node.tag == "box":
+        axis, angle = height_and_angle(rotation)
+        texts = dict(zip(AXIS, map(number, axis), strict=True)) | {"angle": degrees(angle)}
+    else:  # a hull is not the same when it is turned by 180 deg: its points are written as they stand
+        texts = {"points": numbers((np.array(node.numbers("points")).reshape(-1, 3) @ rotation.T).reshape(-1)), "angle": "0"}
+    yield _Change(node, f"a <{node.tag}> turns the shortest way to its height axis", texts)
+
+
+def report(remarks: list[Remark]) -> None:
+    """Warn, with OlderVersion, of everything in a file that was not read as it stands there."""
+    for remark in remarks:
+        if remark.severity == "warning":
+            remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)

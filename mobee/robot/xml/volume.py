@@ -1,0 +1,127 @@
+"""Reads the tags sphere, capsule, cylinder and box, of robots and worlds (thesis 2.3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.robot.robot import ShapeKind
+from mobee.robot.xml.node import Node
+
+PLACE = ("px", "py", "pz")
+AXIS = ("hx", "hy", "hz")
+STEP = ("x", "y", "z")
+X = np.array([1.0, 0.0, 0.0])
+Y = np.array([0.0, 1.0, 0.0])
+Z = np.array([0.0, 0.0, 1.0])
+UPRIGHT = 1e-6  # a unit vector with a smaller part across y counts as parallel to y, as in the program of 2014
+HALFWAY = -0.5  # cosine; beyond it a box is written with its axis the other way round, for near -y the rotation is ill-defined
+VOLUME_TAGS: dict[str, frozenset[str]] = {
+    "sphere": frozenset({"radius", *PLACE}),
+    "capsule": frozenset({"radius", "height", *PLACE, *AXIS}),
+    "cylinder": frozenset({"radius", "height", *PLACE, *AXIS}),
+    "box": frozenset({"width", "height", "depth", "angle", *PLACE, *AXIS}),
+}
+KINDS: dict[str, ShapeKind] = {"sphere": "sphere", "capsule": "capsule", "cylinder": "cylinder", "box": "box"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Volume:
+    """Kind, size and vertices as in mobee.robot.robot.Shape, centre (3,) m and orientation (3, 3), relative to its parent point."""
+
+    kind: ShapeKind
+    size: tuple[float, ...]
+    centre: Array
+    rotation: Array
+    vertices: Array | None = None
+
+
+def read_volume(node: Node) -> Volume:
+    """The volume of a <sphere>, <capsule>, <cylinder> or <box>; raises RobotFileError."""
+    centre = node.vector(PLACE)
+    kind = KINDS[node.tag]
+    if kind == "sphere":
+        return Volume(kind, (node.positive("radius"),), centre, np.eye(3))
+    if kind == "box":
+        size = (node.positive("width"), node.positive("height"), node.positive("depth"))
+        return Volume(kind, size, centre, box_rotation(node))
+    axis = direction(node, AXIS, (0.0, 1.0, 0.0))
+    return Volume(kind, (node.positive("radius"), node.positive("height")), centre, align(Z, axis))
+
+
+def box_rotation(node: Node) -> Array:
+    """The orientation (3, 3) of a box: its height along (hx, hy, hz), y when left out, then turned by `angle` [deg] about it."""
+    return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
+
+
+def height_along(axis: Array, angle: float) -> Array:
+    """The orientation (3, 3) of a box whose height lies along a unit vector, as the program of 2014 turned it.
+
+    The box turns about y by the angle between x and the axis seen along y (0 to 180 deg), then about the common normal of y and the
+    axis until its height lies along the axis, then by `angle` [rad] about the axis. Along -y it turns half a turn about x.
+    """
+    sideways = float(np.hypot(axis[0], axis[2]))
+    if sideways <= UPRIGHT:
+        return turn_about(axis, angle) @ align(Y, axis)
+    first = turn_about(Y, float(np.arctan2(abs(axis[2]), axis[0])))
+    tilt = turn_about(np.cross(Y, axis) / sideways, float(np.arctan2(sideways, axis[1])))
+    return turn_about(axis, angle) @ tilt @ first
+
+
+def height_and_angle(rotation: Array) -> tuple[Array, float]:
+    """The unit vector (3,) and the angle [rad] from which `height_along` makes a box with the orientation `rotation` (3, 3)."""
+    if rotation[1, 1] < HALFWAY:
+        rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
+    axis: Array = rotation[:, 1]
+    return axis, angle_about(axis, rotation)
+
+
+def angle_about(axis: Array, rotation: Array) -> float:
+    """The angle [rad] about a unit vector (3,) for which `height_along` comes nearest to `rotation` (3, 3)."""
+    rest = height_along(axis, 0.0).T @ rotation
+    return float(np.arctan2(rest[0, 2] - rest[2, 0], rest[0, 0] + rest[2, 2]))
+
+
+def link_step(node: Node) -> tuple[Array, float]:
+    """The step (3,) m of a <link> and its length: (x, y, z), or with `length` along it."""
+    step = node.vector(STEP)
+    if "length" in node.attributes:
+        length = node.positive("length")
+        return direction(node, STEP) * length, length
+    return step, float(np.linalg.norm(step))
+
+
+def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
+    """A unit vector along three attributes; raises RobotFileError when it has no length."""
+    vector = node.vector(names, default)
+    length = float(np.linalg.norm(vector))
+    if length < 1e-9:
+        node.fail(" ".join(names), "the direction has no length", f"Give at least one of {', '.join(names)} a value other than 0")
+    return vector / length
+
+
+def align(source: Array, target: Array) -> Array:
+    """The smallest rotation (3, 3) that takes one unit vector to another; half a turn about x (or z) when they are opposite."""
+    cosine = float(source @ target)
+    if cosine < -0.9:  # the division below would lose all but the first digits
+        axis = np.cross(source, target)
+        sine = float(np.linalg.norm(axis))
+        if sine < 1e-12:
+            return turn_about(np.array([1.0, 0.0, 0.0]) if abs(source[0]) < 0.5 else Z, np.pi)
+        return turn_about(axis / sine, np.arctan2(sine, cosine))
+    cross = skew(np.cross(source, target))
+    return np.eye(3) + cross + cross @ cross / (1 + cosine)
+
+
+def turn_about(axis: Array, angle: float) -> Array:
+    """The rotation (3, 3) about a unit axis by an angle in [rad]."""
+    cross = skew(axis)
+    turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return turn
+
+
+def skew(v: Array) -> Array:
+    """The matrix (3, 3) of the cross product with v."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

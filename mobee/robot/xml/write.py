@@ -1,0 +1,162 @@
+"""Writes a robot as zero-position XML that reads back as the same robot."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.robot.bodies import to_six
+from mobee.robot.drives import Drive, drives_of
+from mobee.robot.numbers import degrees, number, numbers
+from mobee.robot.robot import Body, Clause, Joint, Motor, Robot, Shape
+from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
+from mobee.robot.xml.pairs import ignore_elements
+from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world
+from mobee.robot.xml.volume import height_and_angle
+
+DIGITS = 1e-14  # m; less is the rounding of a sum
+
+
+def write_xml(robot: Robot, path: str | Path) -> Path:
+    """Write a robot to a zero-position XML file (robots/README.md) and return its path.
+
+    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses and clauses. Shapes may come in another order, and a
+    convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
+    """
+    drives = drives_of(robot)
+    root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName=robot.name, adjacency="listed")
+    for part in robot.parts.values():
+        element = ET.SubElement(root, "bodypart", name=part.name)
+        for motor in robot.motor_table[part.slice]:
+            element.append(_motor(motor))
+        for clause in robot.clauses:
+            if clause.part == part.name:
+                element.append(_clause(robot, clause))
+    base = ET.SubElement(root, "link", name=robot.links[0])
+    _write_link(robot, drives, base, 0, np.zeros(3))
+    root.extend(ignore_elements(robot))
+    return write_tree(root, Path(path))
+
+
+def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
+    """Write a robot or world file of an older version in today's form, element by element, and return how it was understood.
+
+    Comments are left out, and files that it includes stay as they are. Returns None, and writes nothing, for a robot in today's form.
+    Raises RobotFileError.
+    """
+    root = read_xml(source, repair=True)
+    if root.tag in WORLD_TAGS:
+        remarks = upgrade_world(root)
+    elif root.optional("version") == VERSION:
+        return None
+    else:
+        remarks = upgrade_robot(root)
+    for node in root:
+        if node.tag == "robot" and (source.parent / node.text("file")).is_file():  # no shipped name
+            node.attributes["file"] = Path(os.path.relpath(source.parent / node.text("file"), target.parent)).as_posix()
+    write_tree(tree_of(root), target, f"Written by mobee convert from {source.name}.")
+    return remarks
+
+
+def _motor(motor: Motor) -> ET.Element:
+    low, high = motor.limits
+    values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
+    values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
+    angles = {name: degrees(value) for name, value in values.items()}
+    zone = {"zoneEndsAtHome": "true"} if motor.zone_ends_at_home else {}
+    return ET.Element("motor", {"name": motor.name} | angles | {"torque": number(motor.max_torque)} | zone)
+
+
+def _clause(robot: Robot, clause: Clause) -> ET.Element:
+    element = ET.Element("constraintList")
+    for row, offset in zip(clause.a, clause.b, strict=True):
+        used = np.flatnonzero(row)
+        names = " ".join(robot.motors[k] for k in used)
+        ET.SubElement(element, "constraint", a=numbers(row[used]), q=names, b=degrees(offset))
+    return element
+
+
+def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array) -> None:
+    """Everything on a link and beyond it; the elements stand in the order of the tree, whatever order they are made in."""
+    waiting = [(into, link, point, 2)]
+    while waiting:
+        element, here, origin, depth = waiting.pop()
+        if depth > DEEPEST - 4:
+            raise InvalidValue(f"link {robot.links[here]!r} is too deep in the tree: a file holds {DEEPEST} elements inside each other.")
+        _write_body(robot, element, here, origin)
+        for index, joint in enumerate(robot.joints):
+            if joint.parent != here:
+                continue
+            step = joint.point - origin
+            if np.abs(step).max() <= DIGITS:
+                waiting.append((_joint(robot, drives[index], element, index), index + 1, origin, depth + 1))
+            else:
+                place = ET.SubElement(element, "link", _vector("xyz", step))
+                waiting.append((_joint(robot, drives[index], place, index), index + 1, joint.point, depth + 2))
+
+
+def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Element:
+    joint: Joint = robot.joints[index]
+    motor = robot.motor_table[drive.motor]
+    ends = drive.scale * motor.limits + drive.offset
+    text = degrees if joint.kind == "revolute" else number
+    names = {"name": joint.name, "moves": robot.links[index + 1], "motor": motor.name}
+    kind = {"type": "prismatic"} if joint.kind == "prismatic" else {}
+    return ET.SubElement(into, "joint", names | kind | _vector("xyz", joint.axis) | {"minPos": text(ends[0]), "maxPos": text(ends[1])})
+
+
+def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> None:
+    """The mass, the shapes and the markers of a link; the shapes of each part stand in a <bodypart> of that name."""
+    element.extend(_mass(body, origin) for body in robot.bodies if body.link == link)
+    parts: dict[str, ET.Element] = {}
+    for index, shape in enumerate(robot.shapes):
+        if shape.link != link:
+            continue
+        if shape.part not in robot.parts:
+            raise InvalidValue(f"shape {shape.name!r} is of part {shape.part!r}, which the robot does not have.")
+        if shape.part not in parts:
+            parts[shape.part] = ET.SubElement(element, "bodypart", name=shape.part)
+        written = ET.SubElement(parts[shape.part], shape.kind, {"name": shape.name} | _volume(shape, origin))
+        if shape.role == "field":
+            written.set("field", "true")
+        if (index in robot.base_shapes) != (link == 0):
+            written.set("base", "true" if link else "false")
+    for marker in robot.markers.values():
+        if marker.link == link:
+            place = _vector(("px", "py", "pz"), marker.position - origin) | _vector(("nx", "ny", "nz"), marker.normal)
+            ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": numbers(marker.rotation.reshape(9))})
+
+
+def _mass(body: Body, origin: Array) -> ET.Element:
+    inertia = {} if body.inertia is None else {"inertia": numbers(to_six(body.inertia))}
+    return ET.Element("mass", {"value": number(body.mass)} | _vector(("px", "py", "pz"), body.centre - origin) | inertia)
+
+
+def _volume(shape: Shape, origin: Array) -> dict[str, str]:
+    place = _vector(("px", "py", "pz"), shape.position - origin)
+    match shape.kind:
+        case "sphere":
+            return {"radius": number(shape.size[0])} | place
+        case "capsule" | "cylinder":
+            size = {"radius": number(shape.size[0]), "height": number(shape.size[1])}
+            return size | place | _vector(("hx", "hy", "hz"), shape.rotation[:, 2])
+        case "box":
+            width, height, depth = map(number, shape.size)
+            return {"width": width, "height": height, "depth": depth} | place | _turn(shape.rotation)
+    if shape.vertices is None:
+        raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
+    return {"points": numbers((shape.vertices @ shape.rotation.T).reshape(-1))} | place
+
+
+def _turn(rotation: Array) -> dict[str, str]:
+    axis, angle = height_and_angle(rotation)
+    return _vector(("hx", "hy", "hz"), axis) | {"angle": degrees(angle)}
+
+
+def _vector(names: tuple[str, str, str] | str, vector: Array) -> dict[str, str]:
+    return {name: number(value) for name, value in zip(names, vector, strict=True)}

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.mobee.check.arm import arm, named
+
+
+def clauses(folder: Path, *lists: str) -> list[str]:
+    """What is said of constraint lists; pan is 0 within -90..90 at home, bend 30 within 10..100."""
+    text = "".join(f"<constraintList>{rows}</constraintList>" for rows in lists)
+    findings = named(arm(folder, ("</bodypart>", f"{text}</bodypart>")), "constraint")
+    return [f"{finding.severity}: {finding.what}" for finding in findings]
+
+
+def row(a: str, b: float, q: str = "pan") -> str:
+    return f'<constraint a="{a}" q="{q}" b="{b}"/>'
+
+
+def test_constraints_that_can_be_satisfied_and_can_be_violated_are_none(tmp_path: Path) -> None:
+    assert clauses(tmp_path, row("1", 45), row("-1 1", 20, "pan bend"), row("1", -50) + row("-1", 50)) == []
+
+
+def test_a_constraint_beyond_the_limits_is_an_error(tmp_path: Path) -> None:
+    (said,) = clauses(tmp_path, row("1", -100))
+    assert said == "error: the constraint on pan cannot be satisfied within the limits: a.q + b reaches -10 deg at most"
+
+
+def test_home_in_violation_is_found(tmp_path: Path) -> None:
+    (said,) = clauses(tmp_path, row("1", -45))
+    assert said == "warning: home violates the constraint on pan: a.q + b is -45 deg there"
+
+
+@pytest.mark.parametrize(("b", "pushes"), [(10, True), (15, False)])
+def test_a_home_so_near_to_a_boundary_that_it_pushes_is_noted(tmp_path: Path, b: float, pushes: bool) -> None:
+    said = clauses(tmp_path, row("1", b))
+    assert said == (["note: home lies near the boundary of the constraint on pan: a.q + b is 10 deg there"] if pushes else [])
+
+
+def test_a_constraint_that_is_always_satisfied_is_noted(tmp_path: Path) -> None:
+    (said,) = clauses(tmp_path, row("1 1", 85, "pan bend"))
+    assert said == "note: the constraint on pan, bend is satisfied in every pose within the limits: a.q + b is never below 5 deg"
+
+
+def test_a_row_that_never_is_satisfied_is_noted(tmp_path: Path) -> None:
+    (said,) = clauses(tmp_path, row("1", 45) + row("1", -95))
+    assert said == "note: row 2 of the constraint on pan is satisfied in no pose within the limits: a.q + b stays below -5 deg"
+
+
+def test_constraints_that_contradict_each_other_are_named_alone(tmp_path: Path) -> None:
+    said = clauses(tmp_path, row("1", 45), row("1 -1", -20, "pan bend"), row("-1 1", 10, "pan bend"))
+    (error,) = [one for one in said if one.startswith("error")]
+    assert error.startswith("error: the constraint on pan, bend contradicts ")
+    assert error.endswith("toy.xml:18: no pose within the limits was found that satisfies them together")
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1.0])
+def test_a_narrow_corner_that_no_sample_hits_is_found(tmp_path: Path, gap: float) -> None:
+    """pan within `gap` of 80 and bend within `gap` of 90: thousandths of the range."""
+    corner = (row("1", -80), row("-1", 80 + gap), row("1", -90, "bend"), row("-1", 90 + gap, "bend"))
+    assert not any("contradicts" in said for said in clauses(tmp_path, *corner))

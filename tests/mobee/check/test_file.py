@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mobee.check import check_file
+from mobee.errors import RobotFileError, UnknownName
+from mobee.model import World
+from mobee.robot.robot import Robot
+from tests.mobee.check.arm import ARM
+from tests.mobee.robot.robot_files import robot_file
+
+
+def test_what_a_reader_warns_of_is_a_finding_with_its_line(tmp_path: Path) -> None:
+    path = robot_file(tmp_path, *ARM.replace("<marker", '<jont z="1"/><marker').splitlines())
+    checked = check_file(path)
+    (finding,) = checked.findings
+    assert isinstance(checked.content, Robot)
+    assert (finding.severity, finding.check, finding.where) == ("warning", "reader", f"{path}:10")
+    assert finding.what == "<jont>: unknown tag is ignored with all inside"
+    assert finding.remedy.startswith("Did you mean 'joint'? Valid: bodypart")
+
+
+def test_a_world_is_told_from_a_robot(tmp_path: Path) -> None:
+    path = tmp_path / "desk.xml"
+    path.write_text('<World name="desk">\n <box name="desk" width="600" height="0.6" depth="0.1"/>\n</World>\n')
+    checked = check_file(path)
+    assert isinstance(checked.content, World)
+    assert [finding.where for finding in checked.findings] == [f"{path}:2"]
+    assert isinstance(check_file("table").content, World)
+
+
+def test_what_cannot_be_read_is_the_readers_error(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match=r"toy\.xml:2: <bodypart> name: is required"):
+        check_file(robot_file(tmp_path, "<bodypart/>"))
+    with pytest.raises(UnknownName, match="icub"):
+        check_file("icubb")
+
+
+def test_a_misspelt_world_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot or world 'tabel'. Did you mean 'table'\?"):
+        check_file("tabel")
+
+
+def test_a_folder_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match="is a folder"):
+        check_file(tmp_path)

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.model.world_object import Geometry
+
+HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+
+
+@pytest.fixture
+def world():
+    made = mobee.World()
+    made.add("cup", mobee.cylinder(0.03, 0.1), position=(0.1, 0.2, 0.3), color=(1.0, 0.0, 0.0))
+    return made
+
+
+def test_objects_are_listed_in_the_order_in_which_they_came(world):
+    world.add("ball", mobee.sphere(0.03))
+    world.move("cup", position=(0.0, 0.0, 0.0))
+    assert list(world.objects) == ["cup", "ball"]
+    assert world.objects["cup"].color == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_a_snapshot_never_changes(world):
+    before, version = world.objects, world.version
+    world.move("cup", position=(1.0, 1.0, 1.0), rotation=HALF_TURN)
+    world.add("ball", mobee.sphere(0.03))
+    world.remove("cup")
+    assert list(before) == ["cup"]
+    assert np.array_equal(before["cup"].position, [0.1, 0.2, 0.3])
+    assert world.version == version + 3
+    with pytest.raises(TypeError):
+        world.objects["cup"] = before["cup"]
+
+
+def test_the_callers_array_is_not_kept(world):
+    place = np.array([1.0, 2.0, 3.0])
+    world.move("cup", position=place)
+    place[:] = 0.0
+    assert np.array_equal(world.objects["cup"].position, [1.0, 2.0, 3.0])
+
+
+def test_move_leaves_what_is_not_given(world):
+    world.move("cup", rotation=HALF_TURN)
+    assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
+    assert np.array_equal(world.objects["cup"].rotation, HALF_TURN)
+
+
+def test_roles_change(world):
+    world.set_role("cup", "target")
+    assert world.objects["cup"].role == "target"
+
+
+def test_names_are_unique_and_errors_name_the_nearest(world):
+    with pytest.raises(mobee.InvalidValue, match="'cup' exists already"):
+        world.add("cup", mobee.sphere(0.1))
+    for edit in (world.remove, world.move, world.detach, lambda name: world.set_role(name, "ghost")):
+        with pytest.raises(mobee.UnknownName, match="Did you mean 'cup'"):
+            edit("cap")
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"position": (0.0, 0.0)}, "three finite numbers"),
+        ({"position": (0.0, 0.0, float("nan"))}, "three finite numbers"),
+        ({"position": "here"}, "three finite numbers"),
+        ({"position": np.zeros(3, dtype=complex)}, "three finite numbers"),
+        ({"position": [[0.0, 0.0], [0.0]]}, "three finite numbers"),
+        ({"rotation": 2 * np.eye(3)}, "rotation matrix"),
+        ({"rotation": np.full((3, 3), np.nan)}, "rotation matrix"),
+        ({"rotation": "upright"}, "rotation matrix"),
+        ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation matrix"),
+        ({"role": "enemy"}, "obstacle, target, ghost"),
+        ({"color": (255, 0, 0)}, "each 0 to 1"),
+    ],
+)
+def test_what_is_no_pose_role_or_color_is_refused(world, given, complaint):
+    with pytest.raises(mobee.InvalidValue, match=complaint):
+        world.add("thing", mobee.sphere(0.1), **given)
+    assert list(world.objects) == ["cup"]
+
+
+@pytest.mark.parametrize("size", [(float("nan"),), (float("inf"),), (0.0,), (-0.1,), (), (0.1, 0.1), (1e160,), (1e-10,), ("1",)])
+def test_a_volume_without_a_finite_size_is_refused(world, size):
+    with pytest.raises(mobee.InvalidValue, match="it must be 1 lengths of 1e-09 to 100000 m"):
+        world.add("thing", Geometry("sphere", size))
+    assert list(world.objects) == ["cup"]
+
+
+def test_attaching_needs_to_know_where_the_link_is(world):
+    with pytest.raises(mobee.InvalidValue, match="evaluate a pose first"):
+        world.attach("cup", "hand")
+
+
+def test_an_attached_object_moves_only_with_its_link(world):
+    world.attach("cup", "hand", ((0.0, 0.0, 0.1), np.eye(3)))
+    assert world.objects["cup"].link == "hand"
+    with pytest.raises(mobee.InvalidValue, match="detach it first"):
+        world.move("cup", position=(0.0, 0.0, 0.0))
+
+
+def test_what_is_not_attached_cannot_be_detached(world):
+    with pytest.raises(mobee.InvalidValue, match="not attached"):
+        world.detach("cup")
+
+
+@pytest.mark.parametrize("name", [3, "", None])
+def test_a_name_is_text_that_is_not_empty(world, name):
+    with pytest.raises(mobee.InvalidValue, match=f"{name!r}: its name must be text"):
+        world.add(name, mobee.sphere(0.1))
+    assert list(world.objects) == ["cup"]
+    with pytest.raises(mobee.UnknownName, match="Valid: cup"):
+        world.remove(name)
+
+
+@pytest.mark.parametrize("shape", [0.1, "sphere", mobee.sphere])
+def test_what_is_no_shape_is_refused(world, shape):
+    with pytest.raises(mobee.InvalidValue, match="must be a Geometry, as sphere"):
+        world.add("lamp", shape)
+
+
+def test_a_place_that_is_refused_leaves_the_object_where_it_was(world):
+    with pytest.raises(mobee.InvalidValue, match="three finite numbers"):
+        world.move("cup", position=(float("inf"), 0.0, 0.0))
+    with pytest.raises(mobee.InvalidValue, match="three finite numbers"):
+        world.attach("cup", "hand", ((0.0, 0.0, float("nan")), np.eye(3)))
+    assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mobee
+from mobee.arrays import real_array
+from mobee.model.masses import gravity_torque, potential_energy
+from mobee.roadmap.playback import timed
+
+
+def test_numbers_are_copied_as_floats() -> None:
+    given = np.arange(6.0).reshape(2, 3).T
+    value = real_array("q", given)
+    value[0, 0] = 9.0
+    assert (given[0, 0], value.flags.c_contiguous, value.shape) == (0.0, True, (3, 2))
+    assert real_array("q", [1, True, np.float32(0.5)]).tolist() == [1.0, 1.0, 0.5]
+
+
+@pytest.mark.parametrize("given", ["home", [[1.0], [1.0, 2.0]], object(), [1.0, "a"], ["1", "2"], np.full((9, 1), "1")])
+def test_what_is_no_array_of_numbers_is_refused(given: object) -> None:
+    with pytest.raises(mobee.InvalidValue, match=r"^q is .*; it must be an array of numbers\.$"):
+        real_array("q", given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [1j, [0.0, 1j], np.zeros(2, dtype=np.complex64), [np.complex128(1.0)]])
+def test_complex_numbers_are_refused_even_without_an_imaginary_part(given: object) -> None:
+    with pytest.raises(mobee.InvalidValue, match="q is complex, .* first; it must be real numbers"):
+        real_array("q", given)  # type: ignore[arg-type]
+
+
+def test_a_complex_q_is_refused_wherever_a_pose_is_taken() -> None:
+    robot = mobee.load_robot("icub")
+    model = mobee.Model(robot)
+    q = robot.home + 0j
+    controller, plant, space = mobee.Controller(model), mobee.OfflinePlant(model, seed=0), mobee.Lattice(robot, joints=robot.motors[:2])
+    part, arm = "left_arm", robot.part("left_arm").slice
+    ask = (
+        lambda: model.evaluate(q),
+        lambda: model.jacobian(q, "left_palm"),
+        lambda: model.track().evaluate(q),
+        lambda: controller.step(q, 0.01),
+        lambda: controller.reset(q),
+        lambda: controller.set_attractor(part, q[arm]),
+        lambda: setattr(controller, "attractor", q),
+        lambda: plant.act(part, q[arm]),
+        lambda: space.state_of(q),
+        lambda: gravity_torque(robot, q),
+        lambda: potential_energy(robot, q),
+        lambda: mobee.solve_ik(model, [mobee.costs.home()], start=q),
+        lambda: mobee.reach_path(model, "left_palm", np.zeros(3), start=q),
+        lambda: timed(robot, np.array([q, q]), mobee.Gains.default()),
+    )
+    for one in ask:
+        with pytest.raises(mobee.InvalidValue, match="is complex"):
+            one()
