@@ -20,7 +20,6 @@ from mobee.robot.robot import Robot
 if TYPE_CHECKING:
     from mobee.model.engine import Engine as NativeEngine
     from mobee.model.track import Track
-    from mobee.robot.robot import Robot
 
 _FLOAT = np.dtype(np.float64)
 

@@ -1,41 +1,17 @@
-"""Starts a service with its robot, formats its log, and ends it with one line on bad input."""
+"""Starts a service with its robot, and ends it with one line on bad input."""
 
 from __future__ import annotations
 
-import logging
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from mobee.errors import InvalidValue, MobeeError, RobotFileError, UnknownName
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 from services.common.session import BusUnreachable
-
-
-class _ToFile(logging.FileHandler):
-    """A file of log lines."""
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        """A line that the disk has no room for is lost: told without logging's traceback, which would cover the screen."""
-        if not isinstance(sys.exc_info()[1], OSError):
-            super().handleError(record)
-
-
-def set_up(who: str, file: Path | None = None) -> logging.Logger:
-    """The service's logger; `file` instead of standard error."""
-    logging.basicConfig(
-        handlers=[logging.StreamHandler(sys.stderr) if file is None else _ToFile(file)],
-        level=logging.INFO,
-        format=f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s",
-        datefmt="%H:%M:%S",
-        force=True,
-    )
-    return logging.getLogger(who)
-
 
 HELD = "MOBEE_HELD"  # set: standard input is a pipe that the launcher closes when the service may join the others
 

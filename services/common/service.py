@@ -20,8 +20,7 @@ from bus_schema import VERSION, keys
 from bus_schema.rpc import Config, Done, Empty, Reply, Request, Stat
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
-from services.common import entry as log
-from services.common import rpc
+from services.common import log, rpc
 from services.common.bus import Bus
 from services.common.config import ServiceConfig
 from services.common.entry import wait_until_released

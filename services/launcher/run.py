@@ -16,7 +16,7 @@ from types import FrameType
 from bus_schema import keys
 from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
-from services.common import entry as log
+from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service

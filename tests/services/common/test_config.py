@@ -49,10 +49,10 @@ def test_the_file_may_be_given_with_an_equals_sign_and_the_help_speaks_of_it(tmp
 
 
 def test_an_unknown_field_is_told_with_file_line_and_nearest_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = write(tmp_path, "# settings\nseed = 1\ndawdel = 2.0\n")
+    file = write(tmp_path, "# settings\nseed = 1\ninject_test_dealy = 2.0\n")
     text = line(["--config", file], capsys)
     assert f"{file}:3: " in text
-    assert "'dawdel'" in text
+    assert "'inject_test_dealy'" in text
     assert "Did you mean 'inject_test_delay'?" in text
 
 
