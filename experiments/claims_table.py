@@ -27,7 +27,7 @@ _HEAD = f"""\
 What was published, what this project measured, and whether it holds. `mobee experiment claims --write` writes this page from
 the runs with the most seeds, of those the newest; do not edit it.
 
-An experiment is one package or module here: its docstring states claim, source, published number and run time.
+An experiment is one module in `claims/`, by chapter of the thesis: its docstring states claim, source, published number and run time.
 `mobee experiment list` names them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
 `mobee experiment run chapter7` does all that the table below needs. Numbers are interquartile means with 95 % bootstrap
 intervals, unless they say otherwise; how many runs they rest on is in the last column.

@@ -261,3 +261,17 @@ def test_versions_agree() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["version"] == PROJECT["version"]
     assert citation["license"] == PROJECT["license"]
+
+
+RETIRED = r"goes without saying|\bovertures?\b|\blimps?\b|\bdawdl|\bfor ever\b|\boutset\b|told_world|world_told"
+"""Words that stood for: is redundant, start-up status, is degraded, inject a delay, indefinitely, search schedule, world from JSON."""
+
+HISTORY = {"CHANGELOG.md", "docs/decisions.md"}  # these say what was, in the words of their time
+
+
+def test_words_that_were_retired_stay_away() -> None:
+    used = []
+    for path in tracked_files():
+        if path.suffix in {".py", ".md", ".hpp", ".cpp", ".toml"} and str(path.relative_to(ROOT)) not in {*HISTORY, "tests/test_house.py"}:
+            used += [f"{path.relative_to(ROOT)}: {word}" for word in re.findall(RETIRED, path.read_text(), re.IGNORECASE)]
+    assert used == []

@@ -80,7 +80,7 @@ def _digest(parts: Iterable[bytes]) -> str:
     return whole.hexdigest()[:_DIGITS]
 
 
-def world_told(world: World) -> list[dict[str, Any]]:
+def world_as_json(world: World) -> list[dict[str, Any]]:
     """Its objects, in the order in which they were added."""
     return [
         {
@@ -97,7 +97,7 @@ def world_told(world: World) -> list[dict[str, Any]]:
     ]
 
 
-def told_world(objects: Sequence[dict[str, Any]]) -> World:
+def world_from_json(objects: Sequence[dict[str, Any]]) -> World:
     """A new world of them; raises KeyError and InvalidValue for what is none."""
     world = World()
     for one in objects:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.model import Model
-from mobee.roadmap.archive import read, robot_digest, told_world, world_digest, world_told, write
+from mobee.roadmap.archive import read, robot_digest, world_as_json, world_digest, world_from_json, write
 from mobee.roadmap.graph import Graph, free_way, graph
 from mobee.roadmap.ik.problem import chosen
 from mobee.robot.load import load_robot, shipped_robots
@@ -108,7 +108,7 @@ class Roadmap:
         write(
             path,
             {"q": self.q, "y": self.y, "edges": self.edges, "spacing": self.spacing},
-            {"settings": self.settings | digests(model), "world": world_told(model.world), "reaching": model.reaching},
+            {"settings": self.settings | digests(model), "world": world_as_json(model.world), "reaching": model.reaching},
         )
 
     def told(self, y: Array) -> str:
@@ -199,7 +199,7 @@ def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str,
             f"{path}: made for the robot {name!r}, which does not come with mobee: name its file, as robot=load_robot(FILE), or on the "
             "command line as --robot FILE."
         )
-    model = Model(load_robot(name) if robot is None else robot, told_world(made_in))
+    model = Model(load_robot(name) if robot is None else robot, world_from_json(made_in))
     model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
     return model
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.model.model import Model
-from mobee.roadmap.archive import read, world_told, write
+from mobee.roadmap.archive import read, world_as_json, write
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.graph import nearest, nearest_before, short
 from mobee.roadmap.ik.problem import Problem
@@ -174,7 +174,7 @@ class Draft:
 
     def _write(self, file: Path, roadmap: Roadmap, own: dict[str, NDArray[Any]], notes: dict[str, Any]) -> None:
         arrays = {"q": roadmap.q, "y": roadmap.y, "edges": roadmap.edges, "spacing": roadmap.spacing}
-        whole = {"settings": roadmap.settings, "world": world_told(self._model.world), "reaching": self._model.reaching}
+        whole = {"settings": roadmap.settings, "world": world_as_json(self._model.world), "reaching": self._model.reaching}
         write(file, arrays | own, whole | notes)
 
     def _require_same(self, settings: dict[str, Any]) -> None:

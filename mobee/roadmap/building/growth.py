@@ -13,7 +13,7 @@ from mobee.errors import MobeeError
 from mobee.roadmap.building.chart import FIRST, NEAREST, OTHERS, Chart, Flags, Rows
 from mobee.roadmap.building.front import Front
 from mobee.roadmap.building.judge import Judge
-from mobee.roadmap.building.search_schedule import IDLE, Outset
+from mobee.roadmap.building.search_schedule import IDLE, SearchSchedule
 from mobee.roadmap.evolution.nes import default_population
 
 REPELLED = 0.25  # spacings: what eq. 3.6 counts beside a term at its tolerance
@@ -34,7 +34,7 @@ class Growth:
         self._frontier = how.frontier
         self.chart = Chart(judge.low, judge.high)
         self._postures = Rows(start.shape)  # the free motors in fractions of their ranges
-        self.outset = Outset(self.chart, self._postures, start, how, how.population or default_population(len(start)), rng)
+        self.schedule = SearchSchedule(self.chart, self._postures, start, how, how.population or default_population(len(start)), rng)
         self._best, self._best_cost = start, np.inf  # of the search for the first pose
 
     @property
@@ -45,7 +45,7 @@ class Growth:
     @property
     def open(self) -> int:
         """How many vertices may still be searched from."""
-        return int(self.outset.may_grow().sum())
+        return int(self.schedule.may_grow().sum())
 
     def result(self) -> tuple[Array, Array]:
         """Poses (V, n) rad and their task coordinates (V, m)."""
@@ -63,13 +63,13 @@ class Growth:
         Raises:
             MobeeError: no first pose was found.
         """
-        self.outset.refill()
-        which = np.flatnonzero(self.outset.vertex != IDLE)
+        self.schedule.refill()
+        which = np.flatnonzero(self.schedule.vertex != IDLE)
         if not len(which):
-            if self.outset.exhausted:
+            if self.schedule.exhausted:
                 raise MobeeError(self._nothing())
             return False
-        searches = self.outset.searches
+        searches = self.schedule.searches
         z = self.rng.standard_normal((len(which), searches.population, len(self._low)))
         samples = searches.ask(which, z)
         inside = np.minimum(np.maximum(samples, 0.0), 1.0)
@@ -82,23 +82,23 @@ class Growth:
             self._best, self._best_cost = inside.reshape(-1, inside.shape[-1])[cost.argmin()], float(cost.min())
         searches.tell(which, z, cost + BEYOND * ((samples - inside) ** 2).sum(axis=2))
         for k in np.flatnonzero(good.any(axis=1)):
-            if self.outset.vertex[which[k]] != IDLE:
+            if self.schedule.vertex[which[k]] != IDLE:
                 self._commit(int(which[k]), inside[k], places[k], np.where(good[k], cost[k], np.inf))
-        self.outset.give_up()
+        self.schedule.give_up()
         return True
 
     def state(self) -> dict[str, NDArray[Any]]:
         """All that `restore` needs, but for the generator; with the vertices' poses "q" and task coordinates "y"."""
         q, y = self.result()
         known = {"q": q, "y": y, "postures": self._postures.all, "places": self.chart.places, "weights": self.chart.weights}
-        return self.outset.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}
+        return self.schedule.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on where `state` was taken, by a growth of the same settings."""
         for posture, place in zip(state["postures"], state["places"], strict=True):
             self._add(posture, place)
         self.chart.weights[:] = state["weights"]
-        self.outset.restore(state)
+        self.schedule.restore(state)
         self._best, self._best_cost = state["best"], float(state["best_cost"])
 
     def _add(self, posture: Array, place: Array) -> Array | None:
@@ -112,11 +112,11 @@ class Growth:
     def _spread(self, which: Ints, places: Array) -> tuple[Array, Flags]:
         """Eq. 3.6 and the aims at places (k, population, m), and which of them keep their distance to what is near, (k, population)."""
         n = min(self.chart.dimensions, len(self.chart))
-        apart = ((places[:, :, None] - self.outset.near[which, None]) ** 2).sum(axis=-1)
+        apart = ((places[:, :, None] - self.schedule.near[which, None]) ** 2).sum(axis=-1)
         nearest = np.sqrt(np.sort(np.partition(apart, n - 1, axis=-1)[..., :n], axis=-1))
         cost: Array = (((nearest - 1.0) / REPELLED) ** 2).sum(axis=-1)
         if self._frontier:
-            cost += ((places - self.outset.aim[which, None]) ** 2).sum(axis=-1) / AIMED**2
+            cost += ((places - self.schedule.aim[which, None]) ** 2).sum(axis=-1) / AIMED**2
         good: Flags = (nearest[..., 0] >= NEAREST) & (nearest[..., 0] <= FIRST) & (nearest[..., -1] <= OTHERS)
         return cost, good
 
@@ -126,7 +126,7 @@ class Growth:
             if not np.isfinite(cost[k]):
                 return
             if self.chart.accepts(places[k]):
-                self.outset.found(number, places[k], self._add(postures[k], places[k]))
+                self.schedule.found(number, places[k], self._add(postures[k], places[k]))
                 return
 
     def _nothing(self) -> str:

@@ -26,7 +26,7 @@ NEAR = {1: 16, 2: 48, 3: 96}  # vertices that a search knows of, in so many dime
 IDLE, FIRST = -1, -2  # instead of a vertex that a search began at
 
 
-class Outset:
+class SearchSchedule:
     """The searches that go on, L at once.
 
     `vertex` (L,): where each began, IDLE, or FIRST for the first pose.  `aim` (L, m): what it aims at, in spacings; NaN: at nothing.

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.building import build, draft
-from mobee.roadmap.building import search_schedule as outset
+from mobee.roadmap.building import build, draft, search_schedule
 from mobee.roadmap.building.draft import Progress
 
 MOTORS = ["torso", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow", "r_wrist_prosup", "r_wrist_pitch", "r_wrist_yaw"]
@@ -215,8 +214,8 @@ def test_what_cannot_be_built_is_said(others: dict[str, object], message: str, m
 
 
 def test_a_task_out_of_reach_is_said(model: mobee.Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outset, "FIRST_MOST", 2)
-    monkeypatch.setattr(outset, "FIRST_PATIENCE", 1)
+    monkeypatch.setattr(search_schedule, "FIRST_MOST", 2)
+    monkeypatch.setattr(search_schedule, "FIRST_PATIENCE", 1)
     far = mobee.tasks.place("right_palm", "xy", [(2.0, 2.1), (0.0, 0.1)])
     with pytest.raises(mobee.MobeeError, match=r"no pose was found .* right_palm x is .*, outside 2 \.\. 2\.1"):
         _build(model, task=far, front=QUICK)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from mobee import MobeeError
-from mobee.roadmap.building import search_schedule as outset
+from mobee.roadmap.building import search_schedule
 from mobee.roadmap.building.chart import NEAREST
 from mobee.roadmap.building.front import Front
 from mobee.roadmap.building.growth import Growth
@@ -72,7 +72,7 @@ def test_without_the_test_of_the_frontier_it_ends_too_and_takes_longer() -> None
 def test_one_unlucky_search_ends_a_vertex_of_delta_1(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reading 8: so the map stops early where searches are short."""
     for name, value in (("LEAST", 1), ("FIRST_PATIENCE", 5)):
-        monkeypatch.setattr(outset, name, value)
+        monkeypatch.setattr(search_schedule, name, value)
     hurried = {"frontier": False, "patience": 1.0}
     hasty, patient = ([_grown(0.08, seed, delta=delta, **hurried).vertices for seed in range(3)] for delta in (1.0, 0.25))
     assert sum(hasty) < 0.6 * sum(patient)
@@ -84,9 +84,9 @@ def test_it_begins_at_the_heaviest_vertex_and_at_the_oldest_of_equal_ones() -> N
     growth.begin_from(q, growth.judge.look(q).place * growth.judge.spacing)
     for weights, first in (([1.0, 1.0, 1.0], 0), ([0.5, 1.0, 1.0], 1), ([0.5, 0.5, 1.0], 2), ([0.5, 0.5, 0.5], 0)):
         growth.chart.weights[:] = weights
-        growth.outset.vertex[:] = outset.IDLE
-        growth.outset.refill()
-        assert growth.outset.vertex[0] == first
+        growth.schedule.vertex[:] = search_schedule.IDLE
+        growth.schedule.refill()
+        assert growth.schedule.vertex[0] == first
 
 
 def test_it_goes_on_from_given_vertices_and_keeps_them() -> None:
@@ -101,7 +101,7 @@ def test_it_goes_on_from_given_vertices_and_keeps_them() -> None:
 
 
 def test_nothing_to_be_found_is_said_and_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outset, "FIRST_MOST", 5)
+    monkeypatch.setattr(search_schedule, "FIRST_MOST", 5)
     judge = Level(0.05, low=(1.5, 1.5), high=(2.0, 2.0))
     growth = Growth(judge, Front(), np.random.default_rng(0))
     with pytest.raises(MobeeError, match=r"no pose was found .* misses level\. Loosen"):
