@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--agent", metavar="PART", help="whose plan it is, where the run had several agents")
     parser.add_argument("--to", nargs="+", required=True, metavar="PLACE", help="where to: a state, or angles in rad")
     parser.add_argument("--from", nargs="+", dest="start", metavar="PLACE", help="where from (default: where the agent was last)")
-    text = f"0 to 1, a factor a step: the smaller, the more a short way is preferred over a reliable one (default: {DISCOUNT})"
+    text = f"0 to 1, a factor a step: the smaller, the more a short path is preferred over a reliable one (default: {DISCOUNT})"
     parser.add_argument("--discount", type=float, default=DISCOUNT, metavar="X", help=text)
     add_robot(parser, "default: that of the run, which knows it if `mobee launch` made it or if it comes with mobee")
     parser.add_argument("--json", action="store_true", help="print as JSON, with the pose of every state")

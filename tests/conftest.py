@@ -49,7 +49,7 @@ def free_port() -> int:
 
 
 # Files that take long, longest first: whole systems, then those that start many processes.
-LONG = ("tests/system/", "tests/mobee/model/test_load.py", "tests/examples/", "tests/services/", "tests/mobee_cli/", "tests/experiments/")
+LONG = ("tests/system/", "tests/examples/", "tests/services/", "tests/mobee_cli/", "tests/experiments/")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

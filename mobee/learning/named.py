@@ -28,7 +28,7 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
         require_name(kind, given, table)
         if given in table:
             return given, table[given]
-        name, found = given, _imported(kind, given)
+        name, found = given, imported(kind, given)
     else:
         name, found = f"{getattr(given, '__module__', '?')}:{getattr(given, '__qualname__', type(given).__qualname__)}", given
     if not callable(found):
@@ -42,7 +42,8 @@ def require_name(kind: str, given: str, table: Mapping[str, object]) -> None:
         raise UnknownName(kind, given, (*table, "module:name of your own"))
 
 
-def _imported(kind: str, path: str) -> Any:
+def imported(kind: str, path: str) -> Any:
+    """What `module:name` stands for; raises InvalidValue if it cannot be imported."""
     module, _, name = path.partition(":")
     try:
         return getattr(importlib.import_module(module), name)

@@ -94,7 +94,7 @@ class Planner:
         space: states and actions.
         beliefs: where actions lead, e.g. `model.debiased()`: with the imagined outcomes even sound actions look unreliable.
         targets: one or more states.
-        discount: in [0, 1), a factor a step; the smaller it is, the more a short way is preferred over a reliable one.
+        discount: in [0, 1), a factor a step; the smaller it is, the more a short path is preferred over a reliable one.
 
     Raises:
         InvalidValue: no such state.

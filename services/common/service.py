@@ -28,7 +28,7 @@ from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
 from services.common.rpc import Answering
 from services.common.rpc import CallRefused as CallRefused
-from services.common.session import LEASE, SHORT_WAY, open_client, spare_threads
+from services.common.session import LEASE, LOCAL_ENDPOINT, open_client, spare_threads
 
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
@@ -65,7 +65,7 @@ class Service(Listener):
         lease = config.patience if config.mode == "lock" else LEASE
         if session is None:
             wait_until_released()
-        session = session or open_client(os.environ.get(SHORT_WAY) or config.endpoint, namespace=config.namespace, lease=lease)
+        session = session or open_client(os.environ.get(LOCAL_ENDPOINT) or config.endpoint, namespace=config.namespace, lease=lease)
         with ExitStack() as failed:
             failed.enter_context(session)  # closed: an open callback would keep the interpreter from exiting
             self._begin(session, robot, inbox or Inbox(), prompt)

@@ -15,7 +15,7 @@ import zenoh
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
-SHORT_WAY = "MOBEE_SHORT_WAY"  # environment of a service: where it finds the router that is known by its endpoint
+LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: where a service connects to the router, instead of its endpoint
 _LONGEST_PATH = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
 
 _COMMON = {
@@ -50,8 +50,8 @@ def spare_threads() -> None:
 
 
 @contextmanager
-def short_way() -> Iterator[str]:
-    """An address in the file system for a router's own processes, beside the one that it is known by; empty where there can be none.
+def local_endpoint() -> Iterator[str]:
+    """A second address of a router, a socket in the file system, for the processes that it starts; empty where there can be none.
 
     A socket in a folder that nobody else may enter: what the kernel does for TCP even on the loopback interface is left out.
     """
@@ -84,9 +84,9 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
             time.sleep(0.1)
 
 
-def open_router(endpoint: str, lease: float = LEASE, short_way: str = "") -> zenoh.Session:
-    """The router every service connects to, listening at `endpoint`, and at a short way to it; raises BusUnreachable when that is taken."""
-    settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint, *filter(None, [short_way])]}
+def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -> zenoh.Session:
+    """The router every service connects to, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable."""
+    settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint, *filter(None, [local_endpoint])]}
     try:
         return zenoh.open(_config(NAMESPACE, lease, settings))
     except zenoh.ZError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from bus_schema.messages import ContactItem
 from mobee.arrays import Array
 from mobee.control.terms import Term, valid_terms
-from mobee.errors import InvalidValue
+from mobee.learning.named import imported
 from mobee.model.contact import KINDS, ContactTable
 from mobee.model.hands import Hands
 from mobee.model.pose import Pose
@@ -23,14 +22,8 @@ def load_terms(names: Sequence[str]) -> tuple[Term, ...]:
 
 
 def _term(path: str) -> Term:
-    module, _, name = path.partition(":")
-    try:
-        found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InvalidValue(
-            f"term {path!r}: {error}. It must be module:name of a Term or its function, installed or in the folder of the launch."
-        ) from None
-    return found if isinstance(found, Term) else Term(name, found)
+    found = imported("term", path)
+    return found if isinstance(found, Term) else Term(path.partition(":")[2], found)
 
 
 class ToldContacts:

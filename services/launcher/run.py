@@ -20,7 +20,7 @@ from services.common import log
 from services.common.config import ConfigError, ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, LEASE, SHORT_WAY, BusUnreachable, open_router, short_way, spare_threads
+from services.common.session import DEFAULT_ENDPOINT, LEASE, LOCAL_ENDPOINT, BusUnreachable, local_endpoint, open_router, spare_threads
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
@@ -68,7 +68,7 @@ def launch(options: Options) -> int:
 
 
 def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
-    started, way = time.monotonic(), ""
+    started, local = time.monotonic(), ""
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
@@ -84,8 +84,8 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         lease = LEASE
         if scenario.is_locked:
             spare_threads()
-            way, lease = open_meanwhile.enter_context(short_way()), max(part.config.patience for part in scenario.parts)
-        session = open_meanwhile.enter_context(open_router(endpoint, lease, way))
+            local, lease = open_meanwhile.enter_context(local_endpoint()), max(part.config.patience for part in scenario.parts)
+        session = open_meanwhile.enter_context(open_router(endpoint, lease, local))
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
     except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
@@ -101,7 +101,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
             f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
         )
     with service:
-        return _Run(service, scenario, directory, options, way).execute(started)
+        return _Run(service, scenario, directory, options, local).execute(started)
 
 
 def _refuse(text: str, code: int) -> int:
@@ -112,11 +112,11 @@ def _refuse(text: str, code: int) -> int:
 class _Run:
     """The state of one run, in the launcher's main thread."""
 
-    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, way: str) -> None:
-        """`way`: where the services find the router, if not at its endpoint."""
+    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, local: str) -> None:
+        """`local`: the address at which the services connect to the router, if not its endpoint."""
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
-        self._supervisor = Supervisor(service, _programs(scenario, directory, way), self._tell)
+        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._tell)
         self._children = self._supervisor.children.values()
         self._stop_asked, self._starting = False, True
 
@@ -240,7 +240,7 @@ def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None
     waiting.discard(who)
 
 
-def _programs(scenario: Scenario, directory: Path, way: str) -> list[Program]:
+def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
     return [
         Program(
             who=part.who,
@@ -251,7 +251,7 @@ def _programs(scenario: Scenario, directory: Path, way: str) -> list[Program]:
             nice=part.entry.nice,
             vital=part.entry.vital,
             patience=part.config.patience if scenario.is_locked else 0.0,
-            environment={SHORT_WAY: way} if way else {},
+            environment={LOCAL_ENDPOINT: local} if local else {},
         )
         for part in scenario.parts
     ]

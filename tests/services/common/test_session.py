@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from services.common.session import open_client, open_router, short_way
+from services.common.session import local_endpoint, open_client, open_router
 from tests.services.harness import free_endpoint, wait_for
 
 
-def test_a_router_is_found_by_its_short_way_and_by_its_endpoint() -> None:
+def test_a_router_is_found_by_its_local_endpoint_and_by_its_endpoint() -> None:
     endpoint, heard = free_endpoint(), []
-    with short_way() as way, open_router(endpoint, short_way=way), open_client(way) as near, open_client(endpoint) as far:
+    with local_endpoint() as local, open_router(endpoint, local_endpoint=local), open_client(local) as near, open_client(endpoint) as far:
         far.declare_subscriber("what", lambda sample: heard.append(sample.payload.to_string()))
         publisher = near.declare_publisher("what")
         wait_for(lambda: publisher.matching_status.matching, "the subscriber")
@@ -21,18 +21,18 @@ def test_a_router_is_found_by_its_short_way_and_by_its_endpoint() -> None:
         wait_for(lambda: heard == ["this"], "the message")
 
 
-def test_nobody_else_may_use_the_short_way_and_nothing_of_it_is_left() -> None:
-    with short_way() as way:
-        folder = Path(way.removeprefix("unixsock-stream/")).parent
-        with open_router(free_endpoint(), short_way=way):
+def test_nobody_else_may_use_the_local_endpoint_and_nothing_of_it_is_left() -> None:
+    with local_endpoint() as local:
+        folder = Path(local.removeprefix("unixsock-stream/")).parent
+        with open_router(free_endpoint(), local_endpoint=local):
             assert folder.stat().st_mode & 0o077 == 0
             assert os.listdir(folder)
     assert not folder.exists()
 
 
-def test_there_is_no_short_way_where_its_name_would_be_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_there_is_no_local_endpoint_where_its_name_would_be_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     deep = tmp_path / ("deep" * 25)
     deep.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(deep))
-    with short_way() as way:
-        assert way == ""
+    with local_endpoint() as local:
+        assert local == ""
