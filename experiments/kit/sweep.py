@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,11 @@ class Condition(NamedTuple):
 
 Trial = Callable[[dict[str, Any], int], dict[str, Any]]
 Cells = Mapping[str, CellResult]
+
+
+def grid(**settings: Sequence[Any]) -> list[Condition]:
+    """Every combination of the settings; the last one varies fastest."""
+    return [Condition("-".join(map(str, values)), dict(zip(settings, values, strict=True))) for values in product(*settings.values())]
 
 
 def no_options(parser: argparse.ArgumentParser) -> None:
