@@ -71,8 +71,7 @@ class BusFollower(BusPlant):
                 break
             self._until(parts, run, self._reached(begun + (row + 1) * period), STALLED, "the robot's clock stands still")
             row, before = min(max(row + 1, int((self._now - begun) / period)), last), here
-        rests = [lambda part=part, one=one: self._is_over(part, *one) for part, one in asked.items()]
-        self._until(parts, run, lambda: all(rest() for rest in rests), RESTING, "it does not come to rest")
+        self._until(parts, run, lambda: all(self._is_over(part, *one) for part, one in asked.items()), RESTING, "it does not come to rest")
         return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -147,7 +148,7 @@ class BusPlant:
         self._tick = turn.dt * 1e-9
         self._to_answer = turn.k
 
-    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
+    def _ask(self, part: str, verb: str, request: type[Request], **fields: Any) -> int:
         """Start the action; returns the tick at which it began."""
         try:
             reply = self._service.call(keys.goal(part, verb), request, Started, tries=TRIES, epoch=self._epochs[part], **fields)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +32,7 @@ class ReachClient:
         self._is_there = False  # in the world of the model that runs now
         self._reaches: dict[str, Reach] = {}
         for part in parts:
-            service.on_newest(keys.reach(part), Reach, lambda reach, part=part: self._reaches.__setitem__(part, reach), part=part)
+            service.on_newest(keys.reach(part), Reach, partial(self._note_reach, part), part=part)
         service.on_alive(self._note_alive)
 
     def present(self, target: ReachTarget | None) -> None:
@@ -114,13 +116,16 @@ class ReachClient:
             raise UnknownName("object of the model's world", name, objects)
         return objects[name]
 
-    def _call(self, verb: str, request: type[AddObject] | type[OneName], **fields: object) -> None:
+    def _call(self, verb: str, request: type[AddObject] | type[OneName], **fields: Any) -> None:
         try:
             self._service.call(keys.world_rpc(verb), request, Done, tries=TRIES, **fields)
         except CallFailed as error:
             if error.code == "no_answer":
                 raise ActionInterrupted(f"the model does not answer: {error}") from None
             raise InvalidValue(str(error)) from None
+
+    def _note_reach(self, part: str, reach: Reach) -> None:
+        self._reaches[part] = reach
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         if who == "model":

@@ -14,6 +14,7 @@ from bus_schema.messages import EStop, Mode, Targets
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
+from mobee._core.tables import Table
 from mobee.arrays import Array
 from mobee.control import Command, Forces
 from mobee.control.checked import LARGEST_FORCE
@@ -60,7 +61,7 @@ class ControllerNode:
         self._tick: Tick | None = None  # that still waits for its forces
         self._patience: Timer | None = None  # how long, in free mode
         self._last_k = -1
-        self._last: tuple[Tick, dict[str, Order], Array] | None = None  # step that commanded: its orders, and the law's state before
+        self._last: tuple[Tick, dict[str, Order], Table] | None = None  # step that commanded: its orders, and the law's state before
         self._telling = Telling(service.bus, robot, self._law, self._actions)
         self._commanding = Commanding(service, config.ttl, self._actions, self._drives)
         self._mark()

@@ -177,5 +177,13 @@ class ModelNode:
 
 
 def _item(c: Contact) -> ContactItem:
-    shapes = {"first": c.first, "second": c.second, "first_link": c.first_link, "second_link": c.second_link}
-    return ContactItem(**shapes, kind=c.kind, depth=float(c.depth), point=c.point.tolist(), normal=c.normal.tolist())
+    return ContactItem(
+        first=c.first,
+        second=c.second,
+        kind=c.kind,
+        depth=float(c.depth),
+        point=c.point.tolist(),
+        normal=c.normal.tolist(),
+        first_link=c.first_link,
+        second_link=c.second_link,
+    )

@@ -129,7 +129,7 @@ class WorldDesk:
         objects = [
             ObjectState(
                 name=o.name,
-                geometry=Geometry(kind=o.kind, size=list(o.size)),
+                geometry=_geometry(o),
                 position=here.position.tolist(),
                 quaternion=from_matrix(here.rotation).tolist(),
                 role=o.role,
@@ -151,6 +151,12 @@ def _shape(given: Geometry) -> geometry.Geometry:
     if len(given.size) != expected:
         raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
     return geometry.Geometry(given.kind, tuple(given.size))
+
+
+def _geometry(thing: Thing) -> Geometry:
+    if thing.kind == "convex":  # of links only: World.add takes none
+        raise InvalidValue(f"{thing.name!r} is a convex volume, for which the bus has no message")
+    return Geometry(kind=thing.kind, size=list(thing.size))
 
 
 def _rotation(quaternion: list[float]) -> Array:

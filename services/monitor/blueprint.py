@@ -26,7 +26,7 @@ def extent_of(robot: Robot) -> tuple[Array, float]:
     places = [shape.position for shape in robot.shapes] + [joint.point for joint in robot.joints]
     points = np.array([transforms[link, :3, :3] @ place + transforms[link, :3, 3] for link, place in zip(links, places, strict=True)])
     low, high = points.min(axis=0), points.max(axis=0)
-    return (low + high) / 2.0, float(max(np.linalg.norm(high - low), SMALLEST))
+    return (low + high) / 2.0, max(float(np.linalg.norm(high - low)), SMALLEST)
 
 
 def eye_of(robot: Robot) -> tuple[Array, Array]:

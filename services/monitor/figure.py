@@ -22,25 +22,30 @@ def drawn(
 ) -> rr.AsComponents:
     """The volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
     w, x, y, z = from_matrix(rotation)
-    common = {"quaternions": [rr.Quaternion(xyzw=[x, y, z, w])], "colors": [color], "fill_mode": "solid"}
+    turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
     if kind == "convex":
         return _mesh(position + (np.empty((0, 3)) if vertices is None else vertices) @ rotation.T, color)
     if kind == "box":
-        return rr.Boxes3D(sizes=[size], centers=[position], **common)
+        return rr.Boxes3D(sizes=[size], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
     if kind == "sphere":
-        return rr.Ellipsoids3D(radii=[size[0]], centers=[position], **common)
+        return rr.Ellipsoids3D(radii=[size[0]], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
     if kind == "capsule":  # drawn from one end
-        start = position - rotation[:, 2] * size[1] / 2.0
-        return rr.Capsules3D(radii=[size[0]], lengths=[size[1]], translations=[start], **common)
-    return rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[position], **common)
+        start, (radius, length) = position - rotation[:, 2] * size[1] / 2.0, size
+        return rr.Capsules3D(radii=[radius], lengths=[length], translations=[start], quaternions=turns, colors=colors, fill_mode=fill)
+    return rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
 
 
 def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
     """What changes the colour of a volume that is drawn already."""
     if kind == "convex":
         return rr.Mesh3D.from_fields(albedo_factor=color)
-    archetypes = {"box": rr.Boxes3D, "sphere": rr.Ellipsoids3D, "capsule": rr.Capsules3D, "cylinder": rr.Cylinders3D}
-    return archetypes[kind].from_fields(colors=[color])
+    if kind == "box":
+        return rr.Boxes3D.from_fields(colors=[color])
+    if kind == "sphere":
+        return rr.Ellipsoids3D.from_fields(colors=[color])
+    if kind == "capsule":
+        return rr.Capsules3D.from_fields(colors=[color])
+    return rr.Cylinders3D.from_fields(colors=[color])
 
 
 def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:

@@ -16,6 +16,7 @@ from mobee.learning.record import space_from
 from mobee.learning.space import Space
 from mobee.robot.robot import Robot
 from services.monitor import palette
+from services.monitor.palette import Rgba
 
 SOUND = (92, 98, 110, 110)  # an action that has always reached its goal
 THIN, THICK = 0.012, 0.06  # widths of arrows, in steps of the lattice
@@ -114,7 +115,7 @@ class Learning:
         states, ends = (np.array([one[k] for one in found], dtype=np.intp) for k in (0, 2))
         self._arrows(path, drawn, states, ends, widths, colors)
 
-    def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: object, colors: object) -> None:
+    def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: float | list[float], colors: Rgba | list[Rgba]) -> None:
         """Arrows between states; one that stays is a dot beside its state."""
         start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
         length = np.linalg.norm(way, axis=1, keepdims=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -38,8 +39,8 @@ class Passage:
         self._tick = twin.bus.publisher(keys.TICK, Tick, twin.bus.control)
         twin.on_newest(keys.COMMANDS, Commands, self._down_all)
         for part in robot.parts:
-            twin.on_newest(keys.command(part), Command, lambda command, part=part: self._down(part, command), part=part)
-            service.on_newest(keys.state(part), State, lambda state, part=part: self._up(part, state), part=part)
+            twin.on_newest(keys.command(part), Command, partial(self._down, part), part=part)
+            service.on_newest(keys.state(part), State, partial(self._up, part), part=part)
 
     def note(self, tick: Tick) -> None:
         """A tick begins, with the body as it is."""

@@ -46,7 +46,7 @@ class RendererNode:
     def _tick(self, clock: Clock) -> None:
         if clock.t < self._due:
             return
-        if not any(stream.heard for stream in (*self._images.values(), *self._cameras.values())):
+        if not any(self._images[eye].heard or self._cameras[eye].heard for eye in keys.EYES):
             self._due = clock.t + self._period
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
@@ -68,10 +68,11 @@ class RendererNode:
             picture = self._scene.draw(eye)
             self._frame_time.add(1e3 * (time.perf_counter() - start))
             self._frame_work.add(1e3 * (time.thread_time() - work))
-            stamp = {"k": head.k, "t": head.t, "eye": eye, "k_capture": head.k}
-            self._cameras[eye].put(**stamp, intrinsics=intrinsics, q_head=head.q, q_torso=torso.q)
+            self._cameras[eye].put(k=head.k, t=head.t, eye=eye, k_capture=head.k, intrinsics=intrinsics, q_head=head.q, q_torso=torso.q)
             height, width, _ = picture.shape
-            self._images[eye].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
+            self._images[eye].put(
+                k=head.k, t=head.t, eye=eye, k_capture=head.k, width=width, height=height, encoding="rgb8", data=picture.tobytes()
+            )
         self._pairs += 1
         self._pair_time.add(1e3 * (time.perf_counter() - begin))
 

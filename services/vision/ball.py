@@ -77,14 +77,14 @@ def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
     value, green, blue = (channel[is_red].astype(np.float64) for channel in (red, green, blue))
     spread = value - np.minimum(green, blue)
     is_red[is_red] = (spread >= MIN_SATURATION * value) & (60.0 * np.abs(green - blue) <= MAX_HUE * spread)
-    return is_red
+    return np.asarray(is_red, dtype=np.bool_)
 
 
 def _rays(points: Array, intrinsics: Array) -> Array:
     """Unit vectors (m, 3) through pixels (m, 2)."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
     rays = np.linalg.solve(intrinsics, homogeneous.T).T
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _fit(rays: Array, focal: float) -> Sighting | None:
@@ -107,7 +107,7 @@ def _cone(rays: Array) -> tuple[Array, float]:
     """Axis and half angle of the cone nearest to unit rays: they lie in the plane w.r = 1 with w = axis / cos(angle)."""
     w = np.linalg.lstsq(rays, np.ones(len(rays)), rcond=None)[0]
     length = float(np.linalg.norm(w))
-    return w / length, math.acos(min(1.0, 1.0 / length))
+    return np.asarray(w / length, dtype=np.float64), math.acos(min(1.0, 1.0 / length))
 
 
 def _arc(rays: Array, direction: Array) -> float:

@@ -53,7 +53,7 @@ class VisionNode:
 
     def _look(self) -> None:
         """Locate the ball, once all four messages of a tick are here."""
-        parts = [*self._images.values(), *self._cameras.values()]
+        parts: list[Image | Camera] = [*self._images.values(), *self._cameras.values()]
         if len(parts) < 2 * len(keys.EYES) or len({part.k_capture for part in parts}) > 1:
             return
         begin = time.perf_counter()
