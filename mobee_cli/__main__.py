@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from importlib import metadata
 from typing import NoReturn
 
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, INTERRUPTED, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, INTERRUPTED
 
 VERBS = {
     "launch": "start a scenario and keep it running",

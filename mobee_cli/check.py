@@ -17,8 +17,9 @@ from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.robot.robot import Robot
 from mobee_cli import check_srdf
-from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_urdf_options, urdf_options
+from services.common.exit_codes import BAD_INPUT, FAILED
 
 _NOTES = "Exit code: 0 nothing but notes, 1 at least one warning or error, 2 the file cannot be read."
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from mobee_cli.errors import ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import ENVIRONMENT
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 
 _PATIENCE = 0.3  # s: a system that runs answers at once

@@ -15,8 +15,9 @@ from mobee.robot.robot import Robot
 from mobee.robot.urdf.write import write_urdf
 from mobee.robot.xml.node import Remark
 from mobee.robot.xml.write import write_upgraded, write_xml
-from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_urdf_options, urdf_options
+from services.common.exit_codes import BAD_INPUT, FAILED
 
 WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 

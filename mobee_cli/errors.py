@@ -1,13 +1,12 @@
-"""What a verb raises when the person, or the machine, has to change something."""
+"""The error that a verb raises when its user, or the machine, has to change something."""
 
 from __future__ import annotations
 
-FAILED, BAD_INPUT, ENVIRONMENT = 1, 2, 3
-INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
+from services.common.exit_codes import FAILED
 
 
 class UserError(Exception):
-    """One line for standard error, and the exit code."""
+    """A message for standard error, and the exit code of the command."""
 
     def __init__(self, text: str, code: int = FAILED) -> None:
         super().__init__(text)

@@ -29,8 +29,9 @@ from experiments.kit.run_folder import (
 from experiments.kit.sweep import CellsFailed
 from experiments.registry import EXPERIMENTS, load_experiment
 from mobee.errors import InvalidValue, MobeeError, NotInstalled
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.results_text import results_text
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED
 
 RUNS = Path("runs")
 _NEWEST = Path()  # --resume without the name of a run

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from experiments.kit.recorded_transitions import records
 from mobee.errors import MobeeError
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.reach_learned import write_reaches
 from mobee_cli.transition_tables import write_csv, write_parquet
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 
 _NOTES = """Columns: source (file in the run), agent, n (1, 2, ... of this agent), s, a,
 s_next (state, action, state reached), reward (nats), settled, duration (s),

@@ -14,8 +14,9 @@ from mobee.learning.record import Learned, load_learned
 from mobee.learning.space import Space
 from mobee.robot.robot import Robot
 from mobee.store import STORE
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, robot_of_run
+from services.common.exit_codes import BAD_INPUT
 
 SLACK = 0.01  # rad beyond the limits: poses are given rounded, and encoders are noisy
 _NOTES = """A place is the number of a state, or the angles in rad of the joints that the

@@ -20,11 +20,12 @@ from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
 from mobee.robot.robot import Robot
 from mobee.store import STORE
 from mobee_cli.connect import add_endpoint
-from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.reach_learned import go_to_pre_reach
 from mobee_cli.reach_result import ON, Result, lines
 from mobee_cli.reach_stage import Choose, Hand, Stage, hand_chosen, offline
 from mobee_cli.robot_options import add_robot, add_world, require_none, robot_given, robot_of_run, world_given
+from services.common.exit_codes import BAD_INPUT, FAILED
 
 _NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,
 z up, from the waist.

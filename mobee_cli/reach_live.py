@@ -24,11 +24,12 @@ from mobee.reach import ReachOutcome
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
-from mobee_cli.errors import ENVIRONMENT, FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.reach_stage import Choose, Stage
 from services.common import rpc
 from services.common.bus_plant import BusPlant
 from services.common.config import ServiceConfig
+from services.common.exit_codes import ENVIRONMENT, FAILED
 from services.common.service import Service
 
 WHO = f"mobee_reach_{os.getpid()}"  # so that of two who present a target the second is told

@@ -12,7 +12,8 @@ from mobee.model.world import World
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import Corners
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import BAD_INPUT
 from services.common.worlds import NO_WORLD, is_path, world_around
 
 

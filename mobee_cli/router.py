@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from mobee_cli.errors import ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
 from services.common.config import ServiceConfig
+from services.common.exit_codes import ENVIRONMENT
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
 

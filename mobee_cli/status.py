@@ -12,7 +12,7 @@ from typing import Any
 from bus_schema import keys
 from bus_schema.rpc import Stat
 from mobee_cli.connect import add_endpoint, connected
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 from services.common.observe import Heard, alive, listen, stats
 
 _LISTEN = 0.3  # s: longer than the pause between two states of a part

@@ -6,7 +6,8 @@ import argparse
 
 from mobee_cli import topic_echo, topic_hz, topic_list
 from mobee_cli.connect import add_endpoint, connected
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import BAD_INPUT
 
 _ACTIONS = {"list": topic_list, "echo": topic_echo, "hz": topic_hz}
 

@@ -8,7 +8,7 @@ import statistics
 import time
 from typing import Any
 
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 from services.common.observe import listen
 
 _WINDOW = 1.0  # s

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.recorded_transitions import Record
-from mobee_cli.errors import ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import ENVIRONMENT
 
 COLUMNS = ("source", "agent", "n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched", "time")
 

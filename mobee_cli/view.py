@@ -11,8 +11,9 @@ from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_urdf_options, urdf_options
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 from services.common.worlds import world_around
 
 _NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.

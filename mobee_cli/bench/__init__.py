@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import importlib
 
-from mobee_cli.errors import ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import ENVIRONMENT
 
 # One module of this package a benchmark: `add_arguments(parser)`, and `run(arguments)`, which returns the exit code.
 BENCHES = {

@@ -8,7 +8,7 @@ import sys
 
 from experiments.bench.against import LEAST
 from experiments.kit.options import positive_whole
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

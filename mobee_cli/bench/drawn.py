@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from mobee_cli.errors import ENVIRONMENT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import ENVIRONMENT
 
 _PICTURES = (".png", ".svg", ".pdf")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,7 @@ import argparse
 import json
 
 from experiments.kit.options import positive_number, positive_whole
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 _HIGHEST = 1000  # Hz, of robot_sim
 

@@ -6,7 +6,7 @@ import argparse
 import json
 
 from experiments.kit.options import positive_number
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

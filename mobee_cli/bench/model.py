@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from experiments.kit.options import positive_whole
 from mobee_cli.bench.drawn import draw_costs, picture
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ import json
 from dataclasses import replace
 
 from experiments.kit.options import positive_whole
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,7 @@ import argparse
 import json
 
 from mobee_cli.bench.drawn import draw_costs, picture
-from mobee_cli.errors import FAILED
+from services.common.exit_codes import FAILED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

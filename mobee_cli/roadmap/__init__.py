@@ -6,7 +6,8 @@ import argparse
 import importlib
 
 from mobee.errors import MobeeError
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import BAD_INPUT
 
 # One module of this package an action: `add_arguments(parser)`, and `run(arguments)`, which returns the exit code.
 ACTIONS = {

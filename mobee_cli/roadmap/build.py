@@ -10,8 +10,9 @@ from typing import Any
 from experiments.kit.progress import Progress
 from mobee import Model
 from mobee.roadmap.ik.ngik import METHODS
-from mobee_cli.errors import BAD_INPUT, INTERRUPTED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, add_world, given_options, robot_given, world_given
+from services.common.exit_codes import BAD_INPUT, INTERRUPTED
 
 NOTES = """The map is on disk every 10 s: after Ctrl-C, or a crash, the same command goes
 on with it. A file of other settings, or of another robot or world, is refused.

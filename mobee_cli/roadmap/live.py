@@ -27,12 +27,13 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
-from mobee_cli.errors import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.roadmap.play import require_free, tell
 from mobee_cli.roadmap.query import way_of
 from services.common import rpc
 from services.common.bus_follow import BusFollower
 from services.common.config import ServiceConfig
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED
 from services.common.service import Service
 
 WHO = f"mobee_roadmap_{os.getpid()}"

@@ -11,8 +11,9 @@ import numpy as np
 from mobee import Model
 from mobee.arrays import Array
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, world_given
+from services.common.exit_codes import BAD_INPUT
 from services.common.worlds import NO_WORLD
 
 PLACES = """A place is the task's coordinates, in the order of `mobee roadmap show`.

@@ -14,11 +14,12 @@ from mobee.control.gains import Gains
 from mobee.roadmap.playback import SPEED, Played, play
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.connect import add_endpoint
-from mobee_cli.errors import BAD_INPUT, FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
 from mobee_cli.roadmap.query import way_of
 from mobee_cli.roadmap.show import marker_of
 from mobee_cli.roadmap.text import wrapped
+from services.common.exit_codes import BAD_INPUT, FAILED
 
 NOTES = (
     PLACES

@@ -14,9 +14,10 @@ from mobee.control.gains import Gains
 from mobee.errors import InvalidValue, MobeeError
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
-from mobee_cli.errors import FAILED, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
 from mobee_cli.roadmap.text import wrapped
+from services.common.exit_codes import FAILED
 
 NOTES = PLACES + "\nExit code: 0 a free way, 1 none, or something is in the way, 2 bad input."
 _NEAR = 0.25  # rad: the law's own forces keep a motor that far from its place

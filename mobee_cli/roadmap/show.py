@@ -10,10 +10,11 @@ import numpy as np
 
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.roadmap import Roadmap
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import add_map, map_given
 from mobee_cli.roadmap.text import as_json, edges_told, summary, wrapped
 from mobee_cli.view import require_recording, show
+from services.common.exit_codes import BAD_INPUT
 
 NOTES = """The picture shows the robot in the middle pose of the map, and a point for each
 pose: blue where the first coordinate is least, orange where it is largest."""

@@ -15,7 +15,8 @@ from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.roadmap_task import Example
 from mobee import Model
 from mobee.errors import MobeeError
-from mobee_cli.errors import BAD_INPUT, UserError
+from mobee_cli.errors import UserError
+from services.common.exit_codes import BAD_INPUT
 
 MAKER = "example"  # the function of a task file that returns what is built
 

@@ -15,6 +15,7 @@ from msgspec import Meta, Struct
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
+from services.common.exit_codes import BAD_INPUT
 from services.common.session import DEFAULT_ENDPOINT, NAMESPACE
 
 _C = TypeVar("_C", bound=Struct)
@@ -76,7 +77,7 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
         return msgspec.convert(msgspec.to_builtins(parsed), cls)  # constructing a struct does not check its bounds
     except (ConfigError, msgspec.ValidationError) as error:
         print(f"{prog}: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        raise SystemExit(BAD_INPUT) from None
 
 
 def read_toml(path: Path, cls: type[_C]) -> _C:

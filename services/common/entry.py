@@ -11,6 +11,7 @@ from mobee.errors import InvalidValue, MobeeError, RobotFileError, UnknownName
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
+from services.common.exit_codes import BAD_INPUT, FAILED
 from services.common.session import BusUnreachable
 
 HELD = "MOBEE_HELD"  # set: standard input is a pipe that the launcher closes when the service may join the others
@@ -36,4 +37,4 @@ def explained(prog: str) -> Iterator[None]:
         yield
     except (MobeeError, BusUnreachable) as error:
         print(f"{prog}: {error}", file=sys.stderr)
-        raise SystemExit(2 if isinstance(error, (RobotFileError, UnknownName, InvalidValue)) else 1) from None
+        raise SystemExit(BAD_INPUT if isinstance(error, (RobotFileError, UnknownName, InvalidValue)) else FAILED) from None

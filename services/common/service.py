@@ -24,6 +24,7 @@ from services.common import log, rpc
 from services.common.bus import Bus
 from services.common.config import ServiceConfig
 from services.common.entry import wait_until_released
+from services.common.exit_codes import ENVIRONMENT, OK
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
 from services.common.rpc import Answering
@@ -169,7 +170,7 @@ class Service(Listener):
             self._router_seen = time.monotonic()
         elif time.monotonic() - self._router_seen > ORPHANED:
             self.log.error("no router at %s for %g s: ending", self.config.endpoint, ORPHANED)
-            raise SystemExit(3)
+            raise SystemExit(ENVIRONMENT)
 
     def _watch_liveliness(self) -> None:
         def enqueue(sample: zenoh.Sample) -> None:
@@ -192,7 +193,7 @@ class Service(Listener):
         """A service belongs to the system it was started in: a later one at the same endpoint must not inherit it."""
         if self._router not in ("", router):
             self.log.error("another router came to %s: ending", self.config.endpoint)
-            raise SystemExit(3)
+            raise SystemExit(ENVIRONMENT)
         self._router = router
 
     def _stat(self, request: Empty, key: str) -> Stat:
@@ -233,12 +234,12 @@ def _return_free_memory() -> None:
 
 
 def _leave() -> None:
-    raise SystemExit(0)
+    raise SystemExit(OK)
 
 
 def _end(signum: int, frame: FrameType | None) -> None:
     _ignore_signals()  # a second one must not interrupt the end
-    raise SystemExit(0)
+    raise SystemExit(OK)
 
 
 def _ignore_signals() -> None:

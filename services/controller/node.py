@@ -23,6 +23,7 @@ from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 from services.common.bus import LATEST
+from services.common.exit_codes import BAD_INPUT
 from services.common.inbox import CROWDED_WITH_STOPS, Timer
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -36,7 +37,6 @@ from services.controller.reaches import ReachesUnderWay
 from services.controller.terms import ToldContacts, load_terms
 from services.controller.warm import warm
 
-BAD_INPUT = 2  # exit code: the same again would not help
 OLDEST = 3  # ticks: with forces older than that the robot holds
 STALE = 100_000_000  # ns: a part whose state is older than that is not under control
 

@@ -18,6 +18,7 @@ from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
 from services.common import log
 from services.common.config import ConfigError, ServiceConfig
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, LEASE, LOCAL_ENDPOINT, BusUnreachable, local_endpoint, open_router, spare_threads
@@ -38,9 +39,6 @@ from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
 from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
-
-OK, FAILED, BAD_INPUT, ENVIRONMENT = 0, 1, 2, 3
-INTERRUPTED = 130  # as of a shell: 128 and the number of SIGINT
 
 _REDRAW = 0.5  # s
 _FOREVER = 1e6  # s

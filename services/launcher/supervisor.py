@@ -10,12 +10,10 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Stat
 from services.common.bus import STOP
+from services.common.exit_codes import BAD_INPUT
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.launcher.child import Child, Program
-
-BAD_INPUT = 2  # exit code of a service that cannot use its settings: the same again would not help
-
 
 LOOK = 0.05  # s between looks at the processes
 POLL = 0.5  # s between questions

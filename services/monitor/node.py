@@ -13,6 +13,7 @@ from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Ima
 from bus_schema.rpc import World
 from mobee.robot.robot import Robot
 from services.common.body import Body
+from services.common.exit_codes import FAILED
 from services.common.rate import Percentiles, Rate
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -141,7 +142,7 @@ class MonitorNode:
         page = self._output.page
         if page is not None and page.poll() is not None:
             self._service.log.error("the page's server ended with %s: ending too, to be started again", page.returncode)
-            raise SystemExit(1)
+            raise SystemExit(FAILED)
 
     def _mark(self) -> None:
         self._looks = self._transitions = 0

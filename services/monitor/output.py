@@ -17,6 +17,7 @@ from urllib.parse import quote
 import rerun as rr
 import rerun.blueprint as rrb
 
+from services.common.exit_codes import BAD_INPUT
 from services.monitor.config import Config
 from services.monitor.page import HOST, program
 
@@ -115,4 +116,4 @@ def _answers(port: int) -> bool:
 
 def _refuse(text: str) -> None:
     print(f"services.monitor: {text}", file=sys.stderr)
-    raise SystemExit(2)
+    raise SystemExit(BAD_INPUT)

@@ -9,7 +9,7 @@ from mobee.errors import OlderVersion
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee_cli.__main__ import main
-from mobee_cli.errors import BAD_INPUT, FAILED
+from services.common.exit_codes import BAD_INPUT, FAILED
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
