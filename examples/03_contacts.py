@@ -11,9 +11,9 @@ world = mobee.load_world("table")
 model = mobee.Model(robot, world)
 
 
-def show(what: str, q: np.ndarray) -> None:
+def show(what: str, q: np.ndarray, reaching: str | None = None) -> None:
     """Print the contacts of a pose: solids are the bodies themselves, fields the volumes around them."""
-    pose = model.evaluate(q)
+    pose = model.evaluate(q, reaching=reaching)
     print(f"{what}: {pose.count} solid contacts, {len(pose.contacts) - pose.count} of fields")
     for contact in pose.contacts[:2]:
         print(f"    {contact.kind} {contact.first} in {contact.second}: {1000 * contact.depth:.0f} mm, way out {contact.normal.round(2)}")
@@ -38,13 +38,11 @@ show("the post as a ghost", robot.home)
 # A target is an obstacle for all but the hand that reaches for it.
 world.set_role("post", "target")
 for hand in ("right_palm", "left_palm"):
-    model.reaching = hand
-    show(f"the post as the target of {hand}", robot.home)
-model.reaching = None
+    show(f"the post as the target of {hand}", robot.home, reaching=hand)
 
 # An attached object moves with a link, and does not touch it.
-world.attach("post", "l_hand")
-model.evaluate(low)
+model.attach("post", "l_hand", robot.home)
+world.follow(model.evaluate(low))  # where the robot is now
 world.detach("post")
 print(f"carried and let go, the post is at {world.objects['post'].position.round(3)} m")
 

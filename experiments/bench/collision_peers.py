@@ -16,7 +16,7 @@ from mobee.model.fcl_engine import (
     fcl,  # raises NotInstalled
     tested_pairs,
 )
-from mobee.model.hands import NOBODY
+from mobee.model.hands import NO_HANDS
 from mobee.model.snapshot import Snapshot
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape
@@ -48,7 +48,7 @@ class FclPairs(_Placer):
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
         volumes = self.shapes + self.things
-        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
+        first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
         self._pairs = [(volumes[a], volumes[b]) for a, b in zip(first, second, strict=True)]
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()
 
@@ -71,7 +71,7 @@ class FclTrees(_Placer):
         for manager, bodies in ((self._robot, self.shapes), (self._world, self.things)):
             manager.registerObjects(bodies)
             manager.setup()
-        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
+        first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
         volumes = [id(body) for body in self.shapes + self.things]
         self._tested = {key for a, b in zip(first, second, strict=True) for key in ((volumes[a], volumes[b]), (volumes[b], volumes[a]))}
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()
@@ -115,7 +115,7 @@ class CoalPeer:
         except ImportError:
             raise CoalMissing("coal is not installed: pip install '.[dev]' in MoBeE's folder") from None
         self._pin, self._coupling = pinocchio, robot.coupling
-        first, second, _ = tested_pairs(robot, snapshot, NOBODY)
+        first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
         self.pairs = np.stack([first, second], axis=1)
         self._model = _tree(pinocchio, robot)
         self._geometry = _geometry(pinocchio, coal, robot, snapshot)

@@ -23,7 +23,7 @@ from mobee.model.masses import gravity_torque
 from mobee.robot.motor_units import motor_units
 
 if TYPE_CHECKING:
-    from mobee.model.model import Model
+    from mobee.model.model import Model, Reaching
     from mobee.model.pose import Pose
     from mobee.reach import ReachTarget
 
@@ -219,11 +219,14 @@ class Controller:
         """The law's own constraint forces at a pose, as `step` computes them when it is given none."""
         return forces_of(self.law, pose, self.propagate, self._state)
 
-    def own_forces(self, q: Array, dt: float, pose: Pose | None = None) -> dict[str, Array]:
-        """What `terms` give for a tick of dt [s] at the measured q (n,) rad; raises InvalidValue, which names the term."""
+    def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
+        """Return the forces of `terms` for a tick of dt [s] at the measured q (n,) rad; raises InvalidValue, which names the term.
+
+        `pose` None: evaluated when a term reads it, with the markers that are `reaching` (see `Model.evaluate`).
+        """
         if not self.terms:
             return {}
-        state = State(self.robot, q, self.velocity, dt, lambda: self._track.evaluate(q) if pose is None else pose)
+        state = State(self.robot, q, self.velocity, dt, lambda: self._track.evaluate(q, reaching) if pose is None else pose)
         found = {term.name: np.zeros(len(q)) for term in self.terms}
         for term in self.terms:
             found[term.name][self.law.felt] = term.force(state)[self.law.felt]

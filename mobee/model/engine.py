@@ -11,7 +11,7 @@ from mobee._core.tables import ROW_BYTES
 from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.hands import NOBODY, Hands, hand_numbers
+from mobee.model.hands import NO_HANDS, Hands, hand_numbers
 from mobee.model.robot_tables import Carried, robot_tables
 from mobee.model.snapshot import ATTACHED, Snapshot
 from mobee.robot.per_robot import per_robot
@@ -44,7 +44,7 @@ class _Room(core.Room):
     def __init__(self, motors: int) -> None:
         super().__init__(motors)
         self.scene: Scene | None = None
-        self.reaching: Hands = NOBODY
+        self.reaching: Hands = NO_HANDS
         self.cut = False
 
     def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:

@@ -14,7 +14,7 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.hands import NOBODY, Hands
+from mobee.model.hands import NO_HANDS, Hands
 from mobee.model.kinematics import link_transforms, point_jacobian
 from mobee.model.snapshot import ATTACHED, OBSTACLE, TARGET, Snapshot
 from mobee.model.volumes import bound
@@ -36,7 +36,7 @@ class FclEngine:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._pairs: tuple[Snapshot | None, Hands, tuple[Ints, Ints, Ints] | None] = None, NOBODY, None
+        self._pairs: tuple[Snapshot | None, Hands, tuple[Ints, Ints, Ints] | None] = None, NO_HANDS, None
 
     def transforms(self, q: Array) -> Array:
         """Every link in the poses q (B, n), (B, L, 4, 4)."""

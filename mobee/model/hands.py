@@ -1,7 +1,7 @@
-"""Hands that are reaching: links and fields whose contacts with targets are ignored.
+"""Hands that reach: the links and fields whose contacts with targets are ignored.
 
-A hand is the link of its marker with all that this carries; and the fields of the links before it whose fields the marker is in, for
-they would keep it from everything.
+The hand of a marker is the marker's link with everything that this link carries. The fields of the links before it in the same part
+belong to the hand too if the marker is inside one of them: otherwise they would keep the marker away from every target.
 """
 
 from __future__ import annotations
@@ -9,25 +9,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-MOST = 2
+MAX_HANDS = 2  # that reach at once; as in core/scene.hpp
 
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A link of which no volume feels the targets, the same or one before it of which no field does, and what both carry."""
+    """The links of one hand, by index. Contacts with targets are ignored for both links and for all links that they carry."""
 
-    link: int
-    fields: int
+    link: int  # all of its volumes are exempt
+    fields: int  # its fields are exempt; the same link, or one before it
 
 
 Hands = tuple[Hand, ...]
-NOBODY: Hands = ()
+NO_HANDS: Hands = ()
 
 
 @lru_cache(maxsize=64)
 def hand_numbers(reaching: Hands) -> tuple[int, ...]:
-    """`Hands` of core/scene.hpp: the two links of each, -1 where there is none."""
+    """Return the hands as the core takes them (`Hands` in core/scene.hpp): two links for each, -1 where there is no hand."""
     found = [number for hand in reaching for number in (hand.link, hand.fields)]
-    if len(found) > 2 * MOST:
-        raise ValueError(f"{len(reaching)} hands reach at once; at most {MOST} may")
-    return (*found, *[-1] * (2 * MOST - len(found)))
+    if len(found) > 2 * MAX_HANDS:
+        raise ValueError(f"{len(reaching)} hands reach at once; at most {MAX_HANDS} may")
+    return (*found, *[-1] * (2 * MAX_HANDS - len(found)))

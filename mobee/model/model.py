@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model.hands import MOST, NOBODY, Hand, Hands
+from mobee.model.hands import MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.pose import Engine, Pose
 from mobee.model.snapshot import EMPTY
 from mobee.model.world import World, link_pose
@@ -23,61 +24,54 @@ if TYPE_CHECKING:
 
 _FLOAT = np.dtype(np.float64)
 
+Reaching = str | Sequence[str] | None
+"""The marker that reaches for the targets, or the markers; None: no marker."""
+
 
 class Model:
-    """A robot in a world; evaluates poses, in any number of threads, while other threads edit the world.
+    """A robot in a world: evaluates poses, in any number of threads, while other threads edit the world.
 
-    Each evaluation sees one consistent state of the world and never waits for an edit.  `engine`: "compiled", or "fcl", the
-    slow reference.
+    Each evaluation uses one snapshot of the world and never waits for an edit. `engine`: "compiled", or "fcl", the slow reference.
     """
 
     def __init__(self, robot: Robot, world: World | None = None, engine: Literal["compiled", "fcl"] = "compiled") -> None:
         if not isinstance(robot, Robot):
-            raise InvalidValue(f"robot is {robot!r}; it must be a Robot, as of load_robot.")
+            raise InvalidValue(f"robot is {robot!r}; it must be a Robot, as load_robot returns it.")
         if not isinstance(world, World | None):
-            raise InvalidValue(f"world is {world!r}; it must be a World, as of load_world, or None.")
+            raise InvalidValue(f"world is {world!r}; it must be a World, as load_world returns it, or None.")
         self.robot = robot
         self.world = World() if world is None else world
         self._engine = _engine(robot, engine)
         self._motors = len(robot.motor_table)
         self._shape = (self._motors,)  # of one pose
-        self._reaching: str | tuple[str, ...] | None = None
-        self._hands: Hands = NOBODY
+        self._hands_of: dict[tuple[str, ...], Hands] = {(): NO_HANDS}  # found so far; the engine compares them by identity
         self._hand_of: dict[str, Hand] = {}
 
-    @property
-    def reaching(self) -> str | tuple[str, ...] | None:
-        """The marker that reaches for the targets, or some, so that their hands do not feel them; None: nobody."""
-        return self._reaching
-
-    @reaching.setter
-    def reaching(self, marker: str | tuple[str, ...] | None) -> None:
-        markers = () if marker is None else (marker,) if isinstance(marker, str) else tuple(marker)
-        if len(markers) > MOST:
-            raise InvalidValue(f"{len(markers)} markers reach at once: {', '.join(markers)}; at most {MOST} may")
-        self._hands = tuple(self.hand(one) for one in markers)
-        self._reaching = marker
-
-    @property
-    def hands(self) -> Hands:
-        """Those of the markers that reach."""
-        return self._hands
+    def hands(self, reaching: Reaching) -> Hands:
+        """Return the hands of the markers that reach; raises UnknownName, and InvalidValue for more than two markers."""
+        markers = () if reaching is None else (reaching,) if isinstance(reaching, str) else tuple(reaching)
+        known = self._hands_of.get(markers)
+        if known is None:
+            if len(markers) > MAX_HANDS:
+                raise InvalidValue(f"{len(markers)} markers reach at once: {', '.join(markers)}; at most {MAX_HANDS} may")
+            known = self._hands_of.setdefault(markers, tuple(self.hand(one) for one in markers))
+        return known
 
     def hand(self, marker: str) -> Hand:
-        """What does not feel the targets while that marker reaches: its link with all that this carries.
+        """Return the links whose contacts with targets are ignored while that marker reaches: its own and all that this carries.
 
-        And the fields of the links of the same part before it, from the first one on that has the marker inside a field at home.
+        Ignored as well are the fields of the links before it in the same part, from the first one whose field the marker is in at home.
         """
         known = self._hand_of.get(marker)
         if known is None:
-            known = self._hand_of[marker] = self._found_hand(self.robot.marker(marker).link, marker)
+            known = self._hand_of[marker] = self._find_hand(self.robot.marker(marker).link, marker)
         return known
 
-    def _found_hand(self, link: int, marker: str) -> Hand:
+    def _find_hand(self, link: int, marker: str) -> Hand:
         home = self.robot.home.copy()
         speck = World()
-        speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, NOBODY).position(marker))
-        table, _ = self._engine.contacts(home[None], speck.snapshot, NOBODY)
+        speck.add("marker", sphere(1e-9), position=Pose(self.robot, self._engine, home, EMPTY, NO_HANDS).position(marker))
+        table, _ = self._engine.contacts(home[None], speck.snapshot, NO_HANDS)
         around = set(table.first_link[(table.kind == 1) & (table.second_link < 0)].tolist())
         fields = here = link
         part = self._part_of(link)
@@ -87,7 +81,7 @@ class Model:
         return Hand(link, fields)
 
     def _part_of(self, link: int) -> str | None:
-        """Which part moves a link, by the nearest motor before it."""
+        """Return the part of the nearest motor that moves a link; None for the base."""
         while link > 0:
             driven = np.flatnonzero(self.robot.coupling[0][link - 1])
             if driven.size:
@@ -95,49 +89,56 @@ class Model:
             link = self.robot.joints[link - 1].parent
         return None
 
-    def evaluate(self, q: ArrayLike, threads: int = 1) -> Pose:
-        """The pose at q, (n,) or (..., n) rad in the order of robot.motors; raises InvalidValue for any other shape or NaN.
+    def evaluate(self, q: ArrayLike, threads: int = 1, reaching: Reaching = None) -> Pose:
+        """Return the pose at q, (n,) or (..., n) rad in the order of robot.motors, in the world of now; changes nothing.
 
-        `threads`: how many share the poses of a batch, one block each; the results are the same to the last bit for any number.
+        Args:
+            q: motor positions.
+            threads: how many share the poses of a batch, one block each; the results are the same to the last bit for any number.
+            reaching: a marker, or up to two, that reach for the targets: contacts of their hands with targets are ignored (see `hand`).
+
+        Raises:
+            InvalidValue: for any other shape or NaN.
+            UnknownName: for a marker that the robot does not have.
         """
         one = self._one_pose(q)
         value: Array | bytes = self._checked(q) if one is None else one
         if threads < 1:
             raise InvalidValue(f"threads {threads}: must be at least 1")
-        world = self.world
-        pose = Pose(self.robot, self._engine, value, world.snapshot, self._hands, threads)
-        if isinstance(value, bytes) or value.ndim == 1:
-            world.follow(pose)
-        return pose
+        return Pose(self.robot, self._engine, value, self.world.snapshot, NO_HANDS if reaching is None else self.hands(reaching), threads)
 
     def track(self, skin: float = 0.02) -> Track:
-        """An evaluator for poses that follow each other closely, as while the robot moves; one for each thread.
+        """Return an evaluator for poses that follow each other closely, as while the robot moves; make one for each thread.
 
-        `skin` m: pairs nearer than this are kept in a list.  The reference engine, python-fcl, has none and evaluates as ever.
+        `skin` [m]: pairs of volumes nearer than this are kept in a list. The engine "fcl" has no such list and evaluates every pair.
         """
         if not 0.0 < skin < math.inf:
             raise InvalidValue(f"skin {skin} m: must be a finite distance above 0")
         from mobee.model.track import Track
 
-        return Track(self.evaluate, self._engine, skin)
+        return Track(self, self._engine, skin)
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
-        """The marker's Jacobian, (..., 6, n): linear rows [m/rad] then angular, root frame, per motor (thesis eq. 5.1)."""
+        """Return the marker's Jacobian, (..., 6, n): linear rows [m/rad] then angular, root frame, per motor (thesis eq. 5.1)."""
         value = self._checked(q)
         m = self.robot.marker(marker)
         found = self._engine.jacobians(value.reshape(-1, self._motors), m.link, m.position)
         return found.reshape(*value.shape[:-1], 6, self._motors)
 
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
-        """Let a world object move with a link from where both are in the pose q (n,) rad."""
+        """Attach a world object to a link: from now on it moves with it, from the place that it has in the pose q (n,) rad.
+
+        The world follows that pose, see `World.follow`. Raises UnknownName and InvalidValue.
+        """
         pose = self.evaluate(q)
         carrier = link_pose(pose, link)
         if name not in pose.objects:
             raise UnknownName("world object", name, pose.objects)
+        self.world.follow(pose)
         self.world.attach(name, link, seen_from(carrier, pose.objects[name]))
 
     def _one_pose(self, q: ArrayLike) -> bytes | None:
-        """The bytes of one pose as most callers have it; None of all else, which takes several times as long to look at."""
+        """Return the bytes of one pose given as a float64 array, the usual case; None for everything else, whose check takes longer."""
         if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == self._shape:
             value = q.tobytes()
             signs_and_exponents = value[7::8]  # the highest seven bits of the exponent are set beyond 1e303, and of inf and NaN
@@ -170,7 +171,7 @@ def _engine(robot: Robot, name: str) -> Engine:
 
 
 def engine_of(robot: Robot) -> NativeEngine:
-    """The engine of a robot; the first call of a process loads the core."""
+    """Return the compiled engine of a robot; the first call in a process loads the core."""
     from mobee.model.engine import Engine
 
     return Engine(robot)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -15,6 +14,7 @@ from mobee.model.hands import Hands, hand_numbers
 from mobee.model.snapshot import Snapshot
 
 if TYPE_CHECKING:
+    from mobee.model.model import Model, Reaching
     from mobee.model.pose import Pose
 
 
@@ -52,16 +52,17 @@ class Track:
     threads at once: each user has its own.  Where the steps are large it is as fast as `Model.evaluate`.
     """
 
-    def __init__(self, evaluate: Callable[[ArrayLike], Pose], engine: object, skin: float) -> None:
-        self._evaluate = evaluate
+    def __init__(self, model: Model, engine: object, skin: float) -> None:
+        """`engine`: that of the model; one without neighbour lists, python-fcl, evaluates every pair."""
+        self._model = model
         self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
 
-    def evaluate(self, q: ArrayLike) -> Pose:
-        """The pose at q (n,), or the poses along a path (..., n) rad in this order; raises InvalidValue as `Model.evaluate` does.
+    def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
+        """Return the pose at q (n,), or the poses along a path (..., n) rad in this order; arguments and errors as of `Model.evaluate`.
 
-        The contacts are found at once, not when they are asked for.
+        The contacts are computed at once, not when they are read.
         """
-        pose = self._evaluate(q)
+        pose = self._model.evaluate(q, reaching=reaching)
         if self._neighbours is not None:
             pose.feel(self._neighbours)
         return pose

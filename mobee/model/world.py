@@ -116,9 +116,9 @@ class World:
     def attach(self, name: str, link: str, relative: tuple[ArrayLike, ArrayLike] | None = None) -> None:
         """Let an object move with a link of the robot, which then no longer touches it.
 
-        `relative`: position (3,) m and rotation (3, 3) in the link's frame, which is the root frame at zero pose.  Without
-        it the object stays where it is relative to the link in the pose that a Model of this world evaluated last
-        (Model.attach takes the pose explicitly).
+        `relative`: position (3,) m and rotation (3, 3) in the link's frame, which is the root frame at zero pose. Without it the
+        object keeps the place that it has relative to the link in the pose of the last `follow`; `Model.attach` takes q instead.
+        Raises UnknownName, and InvalidValue for values that are not valid or where no pose is known.
         """
         pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
         with self._lock:
@@ -132,7 +132,7 @@ class World:
             self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
 
     def detach(self, name: str) -> None:
-        """Leave an attached object where it is in the pose that a Model of this world evaluated last."""
+        """Leave an attached object where it is in the pose of the last `follow`; raises UnknownName and InvalidValue."""
         with self._lock:
             old = self._get(name)
             if old.link is None:
@@ -140,7 +140,7 @@ class World:
             self._snapshot = changed(self._snapshot, placed(old, link_pose(self._followed, old.link)))
 
     def follow(self, pose: Followed) -> None:
-        """Told by a Model at every single-pose evaluation, for `attach` and `detach`."""
+        """Take a pose as where the robot is now, for `attach` and `detach`; it must be one pose, not a batch."""
         self._followed = pose
 
     def _get(self, name: str) -> WorldObject:
@@ -152,7 +152,9 @@ class World:
 def link_pose(seen: Followed | None, link: str) -> Array:
     """Where a link is, (4, 4); raises UnknownName, and InvalidValue where no pose has been seen."""
     if seen is None:
-        raise InvalidValue(f"where link {link!r} is, no model has said yet: evaluate a pose first, or give `relative`.")
+        raise InvalidValue(
+            f"the world does not know where link {link!r} is: call world.follow(model.evaluate(q)) first, or give `relative`."
+        )
     links = seen.robot.links
     if link not in links:
         raise UnknownName("link", link, links)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.model.model import Model, engine_of
+from mobee.model.model import Model, Reaching, engine_of
 from mobee.model.snapshot import Snapshot
 from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
@@ -32,7 +32,9 @@ class Checked:
     poses: int
 
 
-def check_edges(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> Flags:
+def check_edges(
+    model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
+) -> Flags:
     """Along which edges (E, 2) between poses q (V, n) rad nothing touches anything, (E,).
 
     Every vertex is looked at once.  Of each edge the middle comes first, and the first pose that touches is the last that is looked
@@ -45,11 +47,14 @@ def check_edges(model: Model, q: Array, edges: Ints, step: float = STEP, marker:
         step: how far the marker moves from one pose to the next, at most [m], along a straight line.
         marker: None: whatever shape of the robot moves farthest.
         threads: how many share the edges; the result is the same for any number.
+        reaching: markers whose hands may touch targets, as of `Model.evaluate`.
     """
-    return checked(model, q, edges, step, marker, threads).free
+    return checked(model, q, edges, step, marker, threads, reaching).free
 
 
-def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> Checked:
+def checked(
+    model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
+) -> Checked:
     """What `check_edges` finds, and how many poses that took."""
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
@@ -59,11 +64,11 @@ def checked(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
     q, ends = np.ascontiguousarray(q[vertices], dtype=np.float64), ends.reshape(-1, 2)
     stands = np.ones(len(q), dtype=bool)
     for some in np.array_split(np.arange(len(q)), len(q) // _AT_ONCE + 1):
-        stands[some] = np.asarray(solid.evaluate(q[some]).count) == 0
+        stands[some] = np.asarray(solid.evaluate(q[some], reaching=reaching).count) == 0
     free: Flags = stands[ends[:, 0]] & stands[ends[:, 1]]
     left = np.flatnonzero(free)
     poses = between(solid, q, ends[left], step, marker)
-    free[left], looked = _sweep(solid, q, ends[left], poses, threads)
+    free[left], looked = _sweep(solid, q, ends[left], poses, threads, reaching)
     return Checked(free, len(vertices) + looked)
 
 
@@ -94,12 +99,12 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int) -> tuple[Flags, int]:
+def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int, reaching: Reaching) -> tuple[Flags, int]:
     from mobee._core.edges import sweep  # loads the core: not before somebody asks
     from mobee.model.track import Neighbours
 
     users = [Neighbours(engine_of(model.robot), SKIN) for _ in range(threads)]
-    snapshot, hands = model.world.snapshot, model.hands
+    snapshot, hands = model.world.snapshot, model.hands(reaching)
     return sweep([one.enter(snapshot, hands) for one in users], q, np.ascontiguousarray(edges, dtype=np.int64), poses)
 
 
@@ -124,15 +129,14 @@ class EdgeWatch:
         half = points(solid, 0.5 * (q[edges[:, 0]] + q[edges[:, 1]]))[meets]
         first, second = self._middles[:, edges[:, 0]], self._middles[:, edges[:, 1]]
         self._half_ways = 0.5 * _LONGER * (lengths(half - first) + lengths(second - half)) + _MARGIN
-        self._seen, self._reaching = model.world.snapshot, model.reaching
+        self._seen = model.world.snapshot
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
         """Check again what may be free no more, or again, in the world as it is now; returns the indices of those edges."""
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
-        changed = _changed(old, new, self._reaching != self._model.reaching)
-        self._reaching = self._model.reaching
+        changed = _changed(old, new)
         if any(one.link is not None for one in changed):
             near = np.ones(len(self._edges), dtype=np.bool_)
         else:
@@ -170,11 +174,11 @@ def apart(places: Array, thing: WorldObject) -> Array:
     return found
 
 
-def _changed(old: Snapshot, new: Snapshot, targets_too: bool) -> list[WorldObject]:
-    """Objects that can be touched as they were and as they are, where the two differ; `targets_too`: the targets in any case."""
+def _changed(old: Snapshot, new: Snapshot) -> list[WorldObject]:
+    """The objects that can be touched and differ between two snapshots, as they were and as they are."""
     found = []
     for here, there in ((old.objects, new.objects), (new.objects, old.objects)):
         for name, one in here.items():
-            if one.role != "ghost" and (there.get(name) is not one or (targets_too and one.role == "target")):
+            if one.role != "ghost" and there.get(name) is not one:
                 found.append(one)
     return found

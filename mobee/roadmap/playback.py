@@ -224,7 +224,6 @@ def play(
     if not parts:
         raise InvalidValue("the path leads nowhere: all of its poses are the same.")
     plant = OfflinePlant(Model(standing(robot, given[0]), model.world), seed, law, active=parts)
-    plant.model.reaching = model.reaching
     traces = []
     ticks = round(PERIOD / plant.dt)
     for attractor in attractors(robot, wanted, law):

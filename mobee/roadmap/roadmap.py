@@ -108,7 +108,7 @@ class Roadmap:
         write(
             path,
             {"q": self.q, "y": self.y, "edges": self.edges, "spacing": self.spacing},
-            {"settings": self.settings | digests(model), "world": world_as_json(model.world), "reaching": model.reaching},
+            {"settings": self.settings | digests(model), "world": world_as_json(model.world)},
         )
 
     def told(self, y: Array) -> str:
@@ -172,7 +172,7 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
         settings, made_in = dict(notes["settings"]), notes["world"]
         q, y, spacing = (arrays[name].astype(np.float64, casting="same_kind") for name in ("q", "y", "spacing"))
         edges = arrays["edges"].astype(np.intp, casting="same_kind")
-        here = _rebuilt(path, settings, made_in, notes["reaching"], robot) if model is None else model
+        here = _rebuilt(path, settings, made_in, robot) if model is None else model
         _require_same(path, settings, here)
         return Roadmap(here, q, y, edges, spacing, settings)
     except (KeyError, TypeError) as error:
@@ -192,16 +192,14 @@ def digests(model: Model) -> dict[str, str]:
     }
 
 
-def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], reaching: Any, robot: Robot | None) -> Model:
+def _rebuilt(path: str | Path, settings: dict[str, Any], made_in: list[dict[str, Any]], robot: Robot | None) -> Model:
     name = settings["robot"]
     if robot is None and name not in shipped_robots():
         raise MobeeError(
             f"{path}: made for the robot {name!r}, which does not come with mobee: name its file, as robot=load_robot(FILE), or on the "
             "command line as --robot FILE."
         )
-    model = Model(load_robot(name) if robot is None else robot, world_from_json(made_in))
-    model.reaching = tuple(reaching) if isinstance(reaching, list) else reaching
-    return model
+    return Model(load_robot(name) if robot is None else robot, world_from_json(made_in))
 
 
 def _require_same(path: str | Path, settings: dict[str, Any], model: Model) -> None:

@@ -115,8 +115,13 @@ class OfflinePlant:
     def pose(self) -> Pose | None:
         """The model at the last tick, in the world of now; None before the first."""
         if self._pose is None and self._ticks:
-            self._pose = self.model.evaluate(self._q)
+            self._pose = self.model.evaluate(self._q, reaching=self.reaching)
         return self._pose
+
+    @property
+    def reaching(self) -> tuple[str, ...]:
+        """The markers that reach for the target now: the target does not push their hands."""
+        return self._reaches.reaching
 
     @property
     def acting(self) -> tuple[str, ...]:
@@ -145,14 +150,19 @@ class OfflinePlant:
         """The part's motor positions as the encoders said at the last tick, shape (n_part,), in [rad]."""
         return self._q[self.robot.part(part).slice].copy()
 
-    def act(self, part: str, target: Array) -> Outcome:
+    def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Go towards `target` (n_part,) rad and run until this part has settled or timed out.
 
+        `reaching`: a marker whose hand the targets do not push meanwhile, as in a reach.
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
         self.begin(part, target)
-        return self.advance()[0][1]
+        self._reaches.exempt = None if reaching is None else self.robot.marker(reaching).name
+        try:
+            return self.advance()[0][1]
+        finally:
+            self._reaches.exempt = None
 
     def begin(self, part: str, target: Array) -> None:
         """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; a reach of the part is over."""
@@ -186,8 +196,8 @@ class OfflinePlant:
         return self._reaches.outcome(part)
 
     def follow(self) -> None:
-        """Let the world follow the robot, as after each action: what is attached from now on is seen from the pose of the last tick."""
-        self.model.evaluate(self._q)
+        """Give the world the pose of the last tick, for objects that are attached or detached from now on; every action ends with it."""
+        self.model.world.follow(self.model.evaluate(self._q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
         """Call that function with the plant's time [s] after each so many ticks: it may edit the world.  None: no more."""
@@ -237,7 +247,7 @@ class OfflinePlant:
         """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2), empty if none is asked for."""
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
-        address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced)
+        address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced, self.reaching)
         try:
             yield address
         finally:  # also what was run before a Ctrl-C
@@ -288,4 +298,6 @@ class OfflinePlant:
         snapshot = self.model.world.snapshot
         if not snapshot.names:
             return ()
-        return touched_in(self._touching.contacts_of_one(self._q.tobytes(), snapshot, self.model.hands)[0], self._moved[part])
+        return touched_in(
+            self._touching.contacts_of_one(self._q.tobytes(), snapshot, self.model.hands(self.reaching))[0], self._moved[part]
+        )

@@ -37,6 +37,14 @@ class ReachesUnderWay:
         self._under_way: dict[str, Reach] = {}
         self._ended: dict[str, ReachOutcome] = {}
         self._told: dict[str, Outcome] = {}  # how parts came to rest, until somebody asks
+        self.exempt: str | None = None
+        """A marker whose hand ignores the targets although it is not drawn to one."""
+
+    @property
+    def reaching(self) -> tuple[str, ...]:
+        """The markers whose hands ignore the targets now."""
+        drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
+        return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
 
     @property
     def running(self) -> tuple[str, ...]:
@@ -69,7 +77,6 @@ class ReachesUnderWay:
         self.drop(part)
         self._controller.reach_toward(part, marker, target)
         self._under_way[part] = Reach(marker, stay)
-        self._tell()
 
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
         """Note that a part has settled or timed out in a pose; whether it is to be drawn back now."""
@@ -78,7 +85,6 @@ class ReachesUnderWay:
             reach.end, reach.marker = end, pose.position(reach.name)
             reach.missing = self._target.missing(reach.marker)
             self._controller.end_reach(part)
-            self._tell()
             if not reach.stay:
                 return True
             self._controller.set_attractor(part, end.q)
@@ -103,12 +109,6 @@ class ReachesUnderWay:
         if part in self._under_way:
             del self._under_way[part]
             self._controller.end_reach(part)
-            self._tell()
-
-    def _tell(self) -> None:
-        """Tell the model who reaches."""
-        markers = tuple(dict.fromkeys(reach.name for reach in self._under_way.values() if reach.end is None))
-        self._model.reaching = markers[0] if len(markers) == 1 else markers or None
 
 
 def _outcome(reach: Reach, after: Outcome) -> ReachOutcome:

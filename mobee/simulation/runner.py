@@ -94,16 +94,17 @@ class Runner:
         self._clients_act = False
         self._address = ctypes.addressof(self._struct)
 
-    def prepare(self, ticks: int, most: int, kept: bool, solids: bool) -> int:
+    def prepare(self, ticks: int, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
         """Make ready up to that many ticks after those there have been; gives the address of what the core is to run.
 
-        `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record.
+        `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record;
+        `reaching`: the markers whose hands ignore the targets.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         motors.begin_substeps(self._substep)
         if controller.modality == "torque" or controller.pushed or controller.terms:  # forces beyond what the core knows, of this pose
             most, self._clients_act = 1, True
-            self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt))
+            self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt), reaching)
         elif controller.forced or self._clients_act:
             self._clients_act = controller.forced
             self._client[:] = controller.client_force(self.q)
@@ -115,7 +116,7 @@ class Runner:
         listed = controller.reaches.address, len(controller.reaches)
         if listed != self._listed:
             struct.reaches, self._listed = View(*listed), listed
-        struct.near = self._near(solids) if controller.contact_forces or solids else None
+        struct.near = self._near(solids, reaching) if controller.contact_forces or solids else None
         struct.ticks, struct.most, struct.done = ticks, most, 0
         return self._address
 
@@ -126,11 +127,11 @@ class Runner:
             self._controller.note_forces(self._forces)
         return self._record[:done], done, end == core.STATE_LOST
 
-    def _near(self, solids: bool) -> int:
+    def _near(self, solids: bool, reaching: tuple[str, ...]) -> int:
         """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
         model = self._controller.model
         snapshot = model.world.snapshot
-        key = bool(snapshot.attached), model.hands, solids
+        key = bool(snapshot.attached), model.hands(reaching), solids
         if key not in self._neighbours:
             self._neighbours[key] = self._new_neighbours(*key)
         near, hands = self._neighbours[key]
@@ -146,11 +147,11 @@ class Runner:
             reaching = tuple(Hand(link[hand.link], link[hand.fields]) for hand in reaching)
         return Neighbours(engine_of(stiff), SKIN, self._cut), reaching
 
-    def _pose_forces(self, q: Array) -> Array:
+    def _pose_forces(self, q: Array, reaching: tuple[str, ...]) -> Array:
         """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
         controller, motors = self._controller, self._motors
         if controller.terms and np.isfinite(q).all():
-            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt).values())
+            self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt, reaching=reaching).values())
         if controller.modality == "torque":
             controller.state["feedforward"] = gravity_torque(controller.robot, q)
             motors.load = gravity_torque(controller.robot, motors.q)

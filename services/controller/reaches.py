@@ -15,7 +15,7 @@ from bus_schema.rpc import ReachFor
 from mobee import Controller
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.model.hands import MOST
+from mobee.model.hands import MAX_HANDS
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Robot
 from services.common.bus import Bus
@@ -55,8 +55,8 @@ class ReachesUnderWay:
         """Force the part from now on.  Raises InvalidValue, UnknownName for what cannot be reached for."""
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
-        if len(others) >= MOST:
-            raise InvalidValue(f"{' and '.join(sorted(others))} are reaching: at most {MOST} markers are spared by what they reach for")
+        if len(others) >= MAX_HANDS:
+            raise InvalidValue(f"{' and '.join(sorted(others))} are reaching: at most {MAX_HANDS} markers may reach at once")
         self._law.reach_toward(part, asked.marker, target)
         self._last[part] = Reach(asked.action_id, asked.marker, asked.object, target, asked.stay, *self._here(asked.marker), self._bus.k)
         self._tell(part)

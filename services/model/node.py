@@ -17,7 +17,7 @@ from mobee.control import constraint_forces
 from mobee.control.forces import needs_contacts, told_terms
 from mobee.errors import MobeeError
 from mobee.model.contact import KINDS, Contact, touched
-from mobee.model.hands import MOST
+from mobee.model.hands import MAX_HANDS
 from mobee.model.pose import Pose as ModelPose
 from mobee.model.quaternion import from_matrix
 from mobee.robot.robot import Robot
@@ -51,6 +51,7 @@ class ModelNode:
         self._contacts = bus.publisher(keys.MODEL_CONTACTS, Contacts, LATEST)
         self._targets = bus.publisher(keys.MODEL_TARGETS, Targets, bus.control)
         self._reaches: dict[str, Reach] = {}  # of the parts that reach now
+        self._reaching: tuple[str, ...] | None = None  # their markers
         self._last_k = -1
         self._known: tuple[bytes, tuple[str, ...]] = b"", ()  # contacts of the tick before; what follows is said of them
         self._touching: dict[str, list[str]] = {}  # world objects by part
@@ -78,7 +79,7 @@ class ModelNode:
 
     def _forget_reaches(self) -> None:
         self._reaches.clear()
-        self._model.reaching = None
+        self._reaching = None
 
     def _note_reach(self, part: str, reach: Reach) -> None:
         """Hands that reach do not feel the targets."""
@@ -89,13 +90,13 @@ class ModelNode:
             self._reaches[part] = reach
         else:
             self._reaches.pop(part, None)
-        self._model.reaching = tuple(dict.fromkeys(one.marker for one in self._reaches.values()))[:MOST] or None
+        self._reaching = tuple(dict.fromkeys(one.marker for one in self._reaches.values()))[:MAX_HANDS] or None
 
     def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
         self._desk.expire(tick.t)
         self._q = np.array(tick.q)
-        pose = self._desk.pose = self._track.evaluate(self._q)
+        pose = self._desk.pose = self._track.evaluate(self._q, self._reaching)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         self._note_contacts(pose)
         if self._reaches:

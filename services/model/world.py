@@ -39,7 +39,7 @@ class WorldDesk:
         service.on_request(keys.world_rpc("remove"), OneName, lambda r, _: self._edit(lambda w: self._remove(w, r.name)))
         service.on_request(keys.world_rpc("role"), SetRole, lambda r, _: self._edit(lambda w: w.set_role(r.name, r.role)))
         service.on_request(keys.world_rpc("attach"), Attach, lambda r, _: self._edit(lambda w: self._attach(w, r)))
-        service.on_request(keys.world_rpc("detach"), OneName, lambda r, _: self._edit(lambda w: w.detach(r.name)))
+        service.on_request(keys.world_rpc("detach"), OneName, lambda r, _: self._edit(lambda w: self._detach(w, r.name)))
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
 
     def expire(self, t: int) -> None:
@@ -99,8 +99,13 @@ class WorldDesk:
             self._service.bus.event("info", "target_gone", f"{TARGET} is taken away: {who}, who presented it, is gone")
 
     def _attach(self, world: World, request: Attach) -> None:
+        world.follow(self.pose)
         world.attach(request.name, request.link)
         self._expiry.pop(request.name, None)  # what is in a hand may be hidden from the eyes
+
+    def _detach(self, world: World, name: str) -> None:
+        world.follow(self.pose)
+        world.detach(name)
 
     def _remove(self, world: World, name: str) -> None:
         world.remove(name)

@@ -275,7 +275,7 @@ class Endurance:
         self.world = WatchedWorld()
         model = Model(load_robot(ROBOT), self.world)
         oscillator = Oscillator(model.robot, np.random.default_rng(seed))
-        model.evaluate(oscillator.at(0.0))  # the world learns the poses of the links
+        self.world.follow(model.evaluate(oscillator.at(0.0)))  # before the first object is attached
         for name, shared in zip(SHARED, random_boxes(np.random.default_rng(seed), ROBOT, len(SHARED)), strict=True):
             self.world.add(name, shared.shape, position=shared.position, rotation=shared.rotation)
         self.editors = [Editor(self.world, model.robot, ROBOT, number, seed) for number in range(threads)]

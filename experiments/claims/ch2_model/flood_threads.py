@@ -88,6 +88,7 @@ class MovingModel:
     def _evaluate(self) -> None:
         while not self._end.is_set():
             pose = self._model.evaluate(self._q)
+            self._model.world.follow(pose)
             _ = pose.table
             self.evaluations += 1
             self._watch(pose)

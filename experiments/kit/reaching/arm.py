@@ -195,11 +195,7 @@ class JudgedPlant:
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
         """As `act`, but the target exerts no force on the marker's hand, as in a reach: the planner has planned around it."""
-        self.model.reaching = marker
-        try:
-            return self.act(part, target)
-        finally:
-            self.model.reaching = None
+        return self._reported(self.inner.act(part, target, reaching=marker))
 
     def present(self, target: ReachTarget | None) -> None:
         """See ReachPlant; the target where it is seen."""

@@ -125,8 +125,7 @@ class PeerBelief:
 
     def _felt(self, poses: Array, reaching: bool) -> Pose:
         """The poses (P, n) rad; `reaching`: the hand does not feel the target."""
-        self.model.reaching = self.marker if reaching else None
-        return self.model.evaluate(poses)
+        return self.model.evaluate(poses, reaching=self.marker if reaching else None)
 
 
 RESTARTS, STEPS = 64, 40  # of inverse kinematics

@@ -30,7 +30,6 @@ def request(model: Model, problem: Problem, task: Task, spacing: Array, others: 
     """All that decides what the map will be."""
     return {
         **digests(model),
-        "reaching": model.reaching,
         "costs": list(problem.by_name),
         "names": list(task.names),
         "units": [one.unit for one in task.coordinates],
@@ -174,7 +173,7 @@ class Draft:
 
     def _write(self, file: Path, roadmap: Roadmap, own: dict[str, NDArray[Any]], notes: dict[str, Any]) -> None:
         arrays = {"q": roadmap.q, "y": roadmap.y, "edges": roadmap.edges, "spacing": roadmap.spacing}
-        whole = {"settings": roadmap.settings, "world": world_as_json(self._model.world), "reaching": self._model.reaching}
+        whole = {"settings": roadmap.settings, "world": world_as_json(self._model.world)}
         write(file, arrays | own, whole | notes)
 
     def _require_same(self, settings: dict[str, Any]) -> None:

@@ -28,7 +28,6 @@ def solid_model(model: Model) -> Model:
     known = _KNOWN.get(model)
     if known is None:
         known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
-    known.reaching = model.reaching
     return known
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.bench import workload
 from mobee.model.fcl_engine import tested_pairs as rules
-from mobee.model.hands import NOBODY
+from mobee.model.hands import NO_HANDS
 
 
 def test_it_has_the_size_that_it_says() -> None:
@@ -38,7 +38,7 @@ def test_each_world_is_the_beginning_of_the_next() -> None:
 
 def test_base_and_boxes_are_not_tested_as_none_of_them_moves() -> None:
     robot = workload.robot()
-    first, second, _ = rules(robot, workload.world(10).snapshot, NOBODY)
+    first, second, _ = rules(robot, workload.world(10).snapshot, NO_HANDS)
     base = [index for index, shape in enumerate(robot.shapes) if shape.link == 0]
     assert len(base) == 3
     assert not (np.isin(first, base) & (second >= len(robot.shapes))).any()

@@ -180,7 +180,7 @@ def test_the_default_reach_ends_at_a_free_target(seed: int, dt: float) -> None:
     plant.present(ReachTarget(model.evaluate(rng.uniform([-1.0, 0.4, 0.4], [1.0, 1.5, 1.5])).position("tip")))
     plant.begin_reach("arm", "tip")
     outcome = None
-    while plant.model.reaching is not None:
+    while plant.reaching:
         before = plant.motors.q
         plant.tick()
     outcome = model.evaluate(before).position("tip")

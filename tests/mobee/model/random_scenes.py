@@ -12,7 +12,7 @@ import mobee
 from mobee._core.narrow import Volumes, overlaps
 from mobee.arrays import Array, Ints
 from mobee.model.fcl_engine import tested_pairs
-from mobee.model.hands import NOBODY, Hands
+from mobee.model.hands import NO_HANDS, Hands
 from mobee.model.kinematics import link_transforms
 from mobee.model.world_object import Role, WorldObject
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
@@ -114,7 +114,7 @@ def _geometry(rng: Rng, factor: float) -> Any:
     return (mobee.sphere(x), mobee.capsule(x, y), mobee.cylinder(x, y), mobee.box(x, y, z))[rng.integers(4)]
 
 
-def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NOBODY) -> tuple[NDArray[np.int64], Array]:
+def plain_contacts(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NO_HANDS) -> tuple[NDArray[np.int64], Array]:
     """Numbers (c, 3), kind, first and second, and reals (c, 7) of one pose, in the order of a contact table."""
     transforms, snapshot = link_transforms(robot, q), world.snapshot
     where = [transforms[shape.link] for shape in robot.shapes]

@@ -79,7 +79,6 @@ def test_a_ghost_in_the_hand_touches_nothing(model: mobee.Model) -> None:
 def test_while_its_link_reaches_it_spares_the_targets(model: mobee.Model) -> None:
     model.world.add("goal", mobee.sphere(0.02), position=HAND, role="target")
     assert ("solid", "tool", "goal") in names(model.evaluate(np.zeros(3)))
-    model.reaching = "tip"
-    assert names(model.evaluate(np.zeros(3))) == set()
+    assert names(model.evaluate(np.zeros(3), reaching="tip")) == set()
     model.world.set_role("goal", "obstacle")
-    assert ("solid", "tool", "goal") in names(model.evaluate(np.zeros(3)))
+    assert ("solid", "tool", "goal") in names(model.evaluate(np.zeros(3), reaching="tip"))

@@ -9,7 +9,7 @@ import mobee
 from mobee._core.engine import span
 from mobee.model import engine as engines
 from mobee.model.engine import Engine
-from mobee.model.hands import NOBODY
+from mobee.model.hands import NO_HANDS
 from tests.mobee.model.random_scenes import loaded, posed, random_world
 
 Places = Callable[[np.random.Generator, int], np.ndarray]
@@ -34,7 +34,7 @@ def test_a_grid_hides_nothing(robot: str, places: str, rng: np.random.Generator,
     q, found = posed(rng, loaded(robot), 20), []
     for first in (1, 10**9):
         monkeypatch.setattr(engines, "GRID_FROM", first)
-        found.append(Engine(loaded(robot)).contacts(q, world.snapshot, NOBODY))
+        found.append(Engine(loaded(robot)).contacts(q, world.snapshot, NO_HANDS))
     (gridded, torque), (plain, plain_torque) = found
     assert len(plain) > 0 or places == "all far away"
     assert np.array_equal(gridded.numbers, plain.numbers)
@@ -47,10 +47,10 @@ def test_objects_touch_whatever_their_number(rng: np.random.Generator) -> None:
     robot = loaded("icub")
     world, q = random_world(rng, robot, 98, 0.5), posed(rng, robot, 5)
     engine = Engine(robot)
-    before, _ = engine.contacts(q, world.snapshot, NOBODY)
+    before, _ = engine.contacts(q, world.snapshot, NO_HANDS)
     for index in range(4):
         world.add(f"far{index}", mobee.sphere(0.1), position=(10.0 + index, 0.0, 0.0))
-        after, _ = engine.contacts(q, world.snapshot, NOBODY)
+        after, _ = engine.contacts(q, world.snapshot, NO_HANDS)
         assert np.array_equal(after.numbers, before.numbers)
         assert np.array_equal(after.reals, before.reals)
 

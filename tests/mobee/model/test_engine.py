@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import mobee
 from mobee.arrays import Array
 from mobee.errors import UnknownName
-from mobee.model.hands import MOST, NOBODY, Hand, Hands
+from mobee.model.hands import MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.model import engine_of
 from mobee.robot.robot import Motor, Robot
 from tests.mobee.model.random_scenes import loaded, plain_contacts, posed, random_robot, random_world
@@ -19,7 +19,7 @@ ROUNDING = 1e-9  # m: what overlaps by less may count or not
 def who_reaches(rng: np.random.Generator, robot: Robot) -> Hands:
     """Nobody to two hands, each with the fields of some link before it."""
     found = []
-    for _ in range(rng.integers(MOST + 1)):
+    for _ in range(rng.integers(MAX_HANDS + 1)):
         link = fields = int(rng.integers(len(robot.links)))
         while fields > 0 and rng.random() < 0.5:
             fields = robot.joints[fields - 1].parent
@@ -27,7 +27,7 @@ def who_reaches(rng: np.random.Generator, robot: Robot) -> Hands:
     return tuple(found)
 
 
-def assert_same(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NOBODY) -> int:
+def assert_same(robot: Robot, q: Array, world: mobee.World, reaching: Hands = NO_HANDS) -> int:
     """The contacts of the engine are those of all tested pairs, one by one; returns how many."""
     table, _ = engine_of(robot).contacts(q[None], world.snapshot, reaching)
     numbers, reals = plain_contacts(robot, q, world, reaching)
@@ -63,7 +63,7 @@ def test_shipped_robots_touch_what_they_should(name: str, objects: int, rng: np.
 
 def test_contacts_stand_in_order(rng: np.random.Generator) -> None:
     robot = loaded("icub")
-    table, _ = engine_of(robot).contacts(posed(rng, robot, 20), random_world(rng, robot, 150, 0.6).snapshot, NOBODY)
+    table, _ = engine_of(robot).contacts(posed(rng, robot, 20), random_world(rng, robot, 150, 0.6).snapshot, NO_HANDS)
     rows = table.numbers[:, :4].tolist()
     assert len(rows) > 500
     assert rows == sorted(rows)
@@ -92,7 +92,7 @@ def test_many_contacts_fit(rng: np.random.Generator) -> None:
     numbers, _ = plain_contacts(robot, robot.home, world)
     assert len(numbers) >= 50 * 4
     q = np.tile(robot.home, (100, 1))
-    table, torque = engine_of(robot).contacts(q, world.snapshot, NOBODY)
+    table, torque = engine_of(robot).contacts(q, world.snapshot, NO_HANDS)
     assert np.array_equal(table.numbers[:, 0], np.repeat(np.arange(100), len(numbers)))
     assert np.array_equal(table.numbers[:, 1:4], np.tile(numbers, (100, 1)))
     assert np.array_equal(torque, np.tile(torque[0], (100, 1)))
@@ -152,6 +152,7 @@ def test_a_world_may_shrink_grow_and_change_between_evaluations(rng: np.random.G
                 names[rng.integers(len(names))], robot.links[rng.integers(len(robot.links))], (rng.uniform(-0.2, 0.2, 3), np.eye(3))
             )
         elif world.objects[names[0]].link is not None:
+            world.follow(model.evaluate(robot.home))
             world.detach(names[0])
         fresh, kept = mobee.Model(robot, world).evaluate(q), model.evaluate(q)
         assert np.array_equal(fresh.table.numbers, kept.table.numbers)
@@ -164,7 +165,7 @@ def test_evaluations_leave_one_room_behind_not_one_each(rng: np.random.Generator
     engine = engine_of(robot)
     small, large = random_world(rng, robot, 2).snapshot, random_world(rng, robot, 300).snapshot
     for snapshot in (small, large) * 20:
-        engine.contacts(robot.home[None].copy(), snapshot, NOBODY)
+        engine.contacts(robot.home[None].copy(), snapshot, NO_HANDS)
     assert len(engine._rooms) == 1
 
 
@@ -173,4 +174,4 @@ def test_what_is_attached_to_no_link_of_the_robot_is_refused() -> None:
     world.add("ball", mobee.sphere(0.1))
     world.attach("ball", "tail", ((0.0, 0.0, 0.0), np.eye(3)))
     with pytest.raises(UnknownName, match="tail"):
-        engine_of(loaded("katana")).contacts(loaded("katana").home[None], world.snapshot, NOBODY)
+        engine_of(loaded("katana")).contacts(loaded("katana").home[None], world.snapshot, NO_HANDS)

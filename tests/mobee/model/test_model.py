@@ -99,17 +99,18 @@ def test_only_the_reaching_link_spares_the_target(model):
     model.world.add("ball", mobee.sphere(0.1), position=(0.62, 0.0, 0.0), role="target")
     everything = {"segment1", "segment2", "field1"}
     assert {c.first for c in model.evaluate(STRETCHED).contacts} == everything
-    model.reaching = "tip"
-    assert {c.first for c in model.evaluate(STRETCHED).contacts} == everything - {"segment2"}
-    model.world.set_role("ball", "obstacle")
+    assert {c.first for c in model.evaluate(STRETCHED, reaching="tip").contacts} == everything - {"segment2"}
+    assert {c.first for c in model.evaluate([STRETCHED], reaching=["tip"]).table.contacts()} == everything - {"segment2"}
     assert {c.first for c in model.evaluate(STRETCHED).contacts} == everything
-    model.reaching = None
-    assert model.reaching is None
+    model.world.set_role("ball", "obstacle")
+    assert {c.first for c in model.evaluate(STRETCHED, reaching="tip").contacts} == everything
 
 
 def test_reaching_wants_a_marker_of_the_robot(model):
     with pytest.raises(mobee.UnknownName, match="Did you mean 'tip'"):
-        model.reaching = "top"
+        model.evaluate(STRETCHED, reaching="top")
+    with pytest.raises(mobee.InvalidValue, match="3 markers reach at once"):
+        model.evaluate(STRETCHED, reaching=("tip", "tip", "tip"))
 
 
 def test_contacts_come_in_the_same_order_every_time(model, rng):
@@ -123,11 +124,12 @@ def test_contacts_come_in_the_same_order_every_time(model, rng):
 
 def test_an_attached_object_moves_with_the_link_and_does_not_touch_it(model):
     model.world.add("cup", mobee.sphere(0.04), position=(TIP + 0.08, 0.0, 0.0))
-    model.evaluate(STRETCHED)
+    model.world.follow(model.evaluate(STRETCHED))
     model.world.attach("cup", "link3")
     turned = model.evaluate([np.pi / 2, 0.0, 0.0])
     assert turned.objects["cup"].position == pytest.approx([0.0, TIP + 0.08, 0.0], abs=1e-15)
     assert turned.contacts == ()
+    model.world.follow(turned)
     model.world.detach("cup")
     assert model.world.objects["cup"].link is None
     assert model.world.objects["cup"].position == pytest.approx([0.0, TIP + 0.08, 0.0], abs=1e-15)
@@ -144,16 +146,28 @@ def test_a_carried_object_is_felt_by_the_other_links(model):
     assert solid[0].depth == pytest.approx(RADIUS + 0.04 - 0.12 * np.sin(np.deg2rad(30)), abs=1e-12)
 
 
-def test_attach_in_a_given_pose_does_not_look_at_the_last_one(model):
+def test_an_evaluation_changes_nothing(model):
+    model.world.add("cup", mobee.sphere(0.04), position=(TIP, 0.0, 0.0))
+    model.world.follow(model.evaluate(STRETCHED))
+    version = model.world.version
+    for q in (FOLDED, [FOLDED, STRETCHED]):
+        model.evaluate(q, reaching="tip")
+        model.track().evaluate(q)
+    assert model.world.version == version
+    model.world.attach("cup", "link3")
+    assert model.world.objects["cup"].position == pytest.approx([TIP, 0.0, 0.0], abs=1e-15)  # as in the pose that the world follows
+
+
+def test_attach_in_a_given_pose_does_not_need_the_one_that_the_world_follows(model):
     model.world.add("cup", mobee.sphere(0.04), position=(0.0, TIP, 0.0))
+    model.world.follow(model.evaluate(FOLDED))
     model.attach("cup", "link3", [np.pi / 2, 0.0, 0.0])
-    model.evaluate(FOLDED)
     assert model.evaluate(STRETCHED).objects["cup"].position == pytest.approx([TIP, 0.0, 0.0], abs=1e-15)
 
 
 def test_attach_names_the_nearest_link_and_object(model):
     model.world.add("cup", mobee.sphere(0.04))
-    model.evaluate(STRETCHED)
+    model.world.follow(model.evaluate(STRETCHED))
     with pytest.raises(mobee.UnknownName, match="unknown link 'link4'. Did you mean"):
         model.world.attach("cup", "link4")
     with pytest.raises(mobee.UnknownName, match="unknown world object 'cap'. Did you mean 'cup'"):

@@ -10,7 +10,7 @@ import pytest
 
 import mobee
 from mobee.errors import InvalidValue
-from mobee.model.hands import NOBODY
+from mobee.model.hands import NO_HANDS
 from tests.mobee.model.random_scenes import loaded, posed, random_world
 
 THREADS = 8
@@ -52,7 +52,7 @@ def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.
     assert len({pose._snapshot.version for pose in threaded}) > 10
     alone = mobee.Model(robot)
     for pose in threaded:
-        table, torque = alone._engine.contacts(pose._flat, pose._snapshot, NOBODY)
+        table, torque = alone._engine.contacts(pose._flat, pose._snapshot, NO_HANDS)
         assert np.array_equal(pose.table.numbers, table.numbers)
         assert np.array_equal(pose.table.reals, table.reals)
         assert np.array_equal(pose.projection, torque.reshape(pose.q.shape))

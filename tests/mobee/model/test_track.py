@@ -61,7 +61,9 @@ def test_edits_of_the_world_are_felt_at_once(seed: int) -> None:
     for index, q in enumerate(walk(rng, robot, float(rng.choice(STEPS[:4])), 300)):
         if index > 0 and rng.random() < 0.2:
             edit(rng, model, index)
-        assert same(track.evaluate(q), model.evaluate(q))
+        pose = track.evaluate(q)
+        model.world.follow(pose)
+        assert same(pose, model.evaluate(q))
 
 
 def edit(rng: Rng, model: mobee.Model, index: int) -> None:
@@ -89,10 +91,9 @@ def test_the_link_that_reaches_spares_its_target_from_the_moment_it_is_named(rng
     model.world.add("ball", mobee.sphere(0.05), position=model.evaluate(q).position("left_palm"), role="target")
     felt = []
     for marker in (None, "left_palm", None):
-        model.reaching = marker
         for _ in range(4):
-            pose = track.evaluate(q)
-            assert same(pose, model.evaluate(q))
+            pose = track.evaluate(q, marker)
+            assert same(pose, model.evaluate(q, reaching=marker))
         felt.append(any("ball" in (c.first, c.second) and c.first_link == model.robot.marker("left_palm").link for c in pose.contacts))
     assert felt == [True, False, True]
 
@@ -133,11 +134,11 @@ def test_a_tracked_pose_knows_its_links_and_the_forces_of_its_parts(rng: Rng) ->
         assert np.array_equal(tracked.projection_of_part, single.projection_of_part)
 
 
-def test_objects_are_attached_where_the_tracked_pose_has_brought_the_link() -> None:
+def test_objects_are_attached_where_a_tracked_pose_that_the_world_follows_has_brought_the_link() -> None:
     model = mobee.Model(loaded("icub"))
     model.world.add("tool", mobee.sphere(0.03))
     moved = model.robot.home + 0.1
-    model.track().evaluate(moved)
+    model.world.follow(model.track().evaluate(moved))
     link = model.robot.links[model.robot.marker("left_palm").link]
     model.world.attach("tool", link)
     assert model.evaluate(moved).objects["tool"].position == pytest.approx(np.zeros(3), abs=1e-12)

@@ -91,7 +91,7 @@ def test_a_volume_without_a_finite_size_is_refused(world, size):
 
 
 def test_attaching_needs_to_know_where_the_link_is(world):
-    with pytest.raises(mobee.InvalidValue, match="evaluate a pose first"):
+    with pytest.raises(mobee.InvalidValue, match="call world.follow"):
         world.attach("cup", "hand")
 
 

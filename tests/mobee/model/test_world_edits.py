@@ -53,7 +53,9 @@ class Edits(RuleBasedStateMachine):
     @initialize(q=st.tuples(*[st.floats(-3.0, 3.0)] * 3))
     def pose(self, q):
         self.q = np.array(q)
-        self.links = self.model.evaluate(self.q).transforms
+        pose = self.model.evaluate(self.q)
+        self.world.follow(pose)
+        self.links = pose.transforms
 
     def name(self, data) -> str:
         return data.draw(st.sampled_from(sorted(self.expected)))
@@ -108,7 +110,9 @@ class Edits(RuleBasedStateMachine):
     def evaluate_elsewhere(self, q):
         """What is attached goes with its link, which the dictionary does by hand."""
         before, self.q = self.links, np.array(q)
-        self.links = self.model.evaluate(self.q).transforms
+        pose = self.model.evaluate(self.q)
+        self.world.follow(pose)
+        self.links = pose.transforms
         for thing in self.expected.values():
             if thing["link"] is not None:
                 turn = self.links[thing["link"]] @ np.linalg.inv(before[thing["link"]])

@@ -98,7 +98,7 @@ def test_all_edits_and_other_evaluations_go_on_while_an_evaluation_is_in_progres
 
     monkeypatch.setattr(engine, what, held)
     other = mobee.Model(model.robot, model.world)
-    model.evaluate(np.zeros(3))
+    model.world.follow(model.evaluate(np.zeros(3)))
     results = []
     evaluation = started(lambda: results.append((model.evaluate(slow[None]).count, model.evaluate(slow[None]).transforms)))
     finished = threading.Event()

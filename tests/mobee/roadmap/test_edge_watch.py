@@ -55,14 +55,13 @@ def test_without_a_change_nothing_is_looked_at_again(model: mobee.Model, poses: 
     assert len(watch.update()) == 0
 
 
-def test_a_ghost_made_solid_counts_and_so_do_who_reaches_and_what_is_carried(model: mobee.Model, poses: np.ndarray) -> None:
+def test_a_ghost_made_solid_counts_and_so_does_a_carried_object(model: mobee.Model, poses: np.ndarray) -> None:
     palm = model.evaluate(poses).position("right_palm")
     model.world.move("ball", position=palm[0])
     model.world.set_role("ball", "ghost")
     watch = EdgeWatch(model, poses, EDGES, STEP)
     for change in (
         lambda: model.world.set_role("ball", "target"),
-        lambda: setattr(model, "reaching", "right_palm"),
         lambda: model.attach("ball", "r_hand", poses[0]),
     ):
         change()

@@ -67,8 +67,8 @@ def test_an_edge_is_as_free_in_the_world_as_it_is_now(model: mobee.Model, poses:
     after = check_edges(other, poses, EDGES, STEP)
     assert not after[edge] and not (after & ~free).any()
     world.set_role("block", "target")
-    other.reaching = "right_palm"
-    np.testing.assert_array_equal(check_edges(other, poses, EDGES, STEP), free)
+    np.testing.assert_array_equal(check_edges(other, poses, EDGES, STEP), after)
+    np.testing.assert_array_equal(check_edges(other, poses, EDGES, STEP, reaching="right_palm"), free)
 
 
 def test_no_edges_are_no_trouble(model: mobee.Model, poses: np.ndarray) -> None:

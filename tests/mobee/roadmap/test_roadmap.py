@@ -127,7 +127,7 @@ def test_what_is_no_map_is_refused_in_a_line(tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("no map")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     np.save(tmp_path / "array.npy", np.zeros(3))
-    write(tmp_path / "partial.npz", {"q": np.zeros((1, 41))}, {"settings": {}, "world": [], "reaching": None})
+    write(tmp_path / "partial.npz", {"q": np.zeros((1, 41))}, {"settings": {}, "world": []})
     for name in ("cut.npz", "text.npz", "other.npz", "array.npy", "partial.npz"):
         with pytest.raises(MobeeError, match=name) as told:
             load_roadmap(tmp_path / name, table())

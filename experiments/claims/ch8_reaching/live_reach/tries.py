@@ -183,9 +183,7 @@ def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]
 
 def _felt(plant: OfflinePlant, q: Array) -> str:
     """The deepest contacts of a pose (n,) rad while the hand reaches."""
-    plant.model.reaching = MARKER
-    contacts = sorted(plant.model.evaluate(q).contacts, key=lambda contact: -contact.depth)
-    plant.model.reaching = None
+    contacts = sorted(plant.model.evaluate(q, reaching=MARKER).contacts, key=lambda contact: -contact.depth)
     return ", ".join(f"{one.first} {one.second} {1e3 * one.depth:.0f}" for one in contacts[:FELT])
 
 

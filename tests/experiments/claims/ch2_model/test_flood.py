@@ -150,7 +150,7 @@ def test_an_edit_that_raises_does_not_pass(tmp_path, monkeypatch):
 @pytest.fixture
 def model():
     made = mobee.Model(mobee.load_robot("katana"), WatchedWorld())
-    made.evaluate(made.robot.home)
+    made.world.follow(made.evaluate(made.robot.home))
     made.world.add("a", mobee.box(0.1, 0.2, 0.3), position=(0.1, 0.0, 0.2))
     made.world.add("b", mobee.box(0.3, 0.3, 0.3), position=(0.0, 0.0, 0.3), role="target")
     made.world.add("c", mobee.box(0.1, 0.1, 0.1), position=(0.0, 0.3, 0.0), role="ghost")
