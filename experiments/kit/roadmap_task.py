@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import mobee
-from experiments.drawing.filmstrip import View
 from mobee import Geometry, Model, Robot, World
 from mobee.arrays import Array
+from mobee.rendering.sheet import View
 from mobee.roadmap.building.build import LONGEST
 from mobee.roadmap.building.task import Task
 from mobee.roadmap.ik.term import Term

@@ -5,15 +5,13 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
-from experiments.drawing.filmstrip import pictures_of
-from experiments.drawing.scene import object_solids, robot_solids
-from experiments.drawing.sheet import Panel, write_sheet
-from experiments.drawing.solid import Solid
 from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.model.world import World
 from mobee.model.world_file import load_world
+from mobee.rendering.sheet import Panel, pictures_of, write_sheet
+from mobee.rendering.solid import Solid, object_solids, robot_solids
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 

@@ -133,8 +133,8 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
 
 
 def _filmstrip(trm: Roadmap, played: Played, path: Path) -> Path:
-    from experiments.drawing.filmstrip import Strip, filmstrip
-    from experiments.drawing.motion import motion_through
+    from mobee.rendering.motion import motion_through
+    from mobee.rendering.sheet import Strip, filmstrip
 
     if path.suffix.lower() != ".png" or not path.resolve().parent.is_dir():
         raise UserError(f"--picture {path}: give a name that ends in .png, in a folder that is there", BAD_INPUT)

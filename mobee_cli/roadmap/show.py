@@ -61,7 +61,7 @@ def _toured(trm: Roadmap, save: Path | None) -> int:
 
 
 def _draw(trm: Roadmap, marker: str, path: Path) -> Path:
-    from experiments.drawing.cloud import marker_cloud
+    from mobee.rendering.sheet import marker_cloud
 
     if path.suffix.lower() != ".png":
         raise UserError(f"--picture {path}: it is a PNG: give a name that ends in .png", BAD_INPUT)

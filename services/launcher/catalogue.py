@@ -43,7 +43,6 @@ _ENTRIES = {
         vital=False,
         steps=False,
         looks=True,
-        needs={"pybullet": "sim", "icub_models": "sim"},
     ),
     "vision": Entry(
         "services.vision",

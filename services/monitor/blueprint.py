@@ -10,9 +10,9 @@ import rerun.blueprint as rrb
 
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
+from mobee.rendering.palette import colors_of
 from mobee.robot.robot import Robot
 from services.common.worlds import AT_TABLE
-from services.monitor.palette import colors_of
 
 VIEWPOINT = np.array([-1.0, -0.9, 0.6])  # direction from which a robot is seen
 DISTANCE = 1.4  # of the eye, in diameters of the robot

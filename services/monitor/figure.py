@@ -11,10 +11,10 @@ from mobee.model.kinematics import link_transforms
 from mobee.model.model import Model
 from mobee.model.quaternion import from_matrix
 from mobee.model.world import World
+from mobee.rendering import palette
+from mobee.rendering.palette import Rgba
 from mobee.robot.robot import Robot, Shape, ShapeKind
 from mobee.robot.urdf.hull import facets
-from services.monitor import palette
-from services.monitor.palette import Rgba
 
 
 def drawn(

@@ -14,9 +14,9 @@ from mobee.errors import MobeeError
 from mobee.learning.flat import flat
 from mobee.learning.record import space_from
 from mobee.learning.space import Space
+from mobee.rendering import palette
+from mobee.rendering.palette import Rgba
 from mobee.robot.robot import Robot
-from services.monitor import palette
-from services.monitor.palette import Rgba
 
 SOUND = (92, 98, 110, 110)  # an action that has always reached its goal
 THIN, THICK = 0.012, 0.06  # widths of arrows, in steps of the lattice

@@ -11,6 +11,7 @@ import rerun as rr
 from bus_schema import keys
 from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Image, Learned, Motion, Transition, WorldObject
 from bus_schema.rpc import World
+from mobee.rendering.palette import colors_of
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.exit_codes import FAILED
@@ -21,7 +22,6 @@ from services.monitor.blueprint import TIMELINE
 from services.monitor.config import Config
 from services.monitor.learning import Learning
 from services.monitor.output import Output
-from services.monitor.palette import colors_of
 from services.monitor.plots import Plots
 from services.monitor.poses import Poses
 from services.monitor.scene import Scene

@@ -9,8 +9,8 @@ import rerun as rr
 
 from bus_schema.messages import Forces, Motion, Transition
 from mobee.control.forces import told_terms
+from mobee.rendering import palette
 from mobee.robot.robot import Robot
-from services.monitor import palette
 
 SHOWN = 4  # joints of a part: shoulder and elbow of an arm, all of the torso
 LEARNED = ("reward", "value", "transitions")

@@ -9,8 +9,8 @@ import rerun as rr
 
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
+from mobee.rendering import palette
 from mobee.robot.robot import Robot
-from services.monitor import palette
 from services.monitor.blueprint import ROOT
 
 KEPT = 600  # poses

@@ -17,9 +17,9 @@ from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.model.kinematics import link_transforms
 from mobee.model.quaternion import from_matrix, to_matrix
+from mobee.rendering import palette
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Robot, Shape
-from services.monitor import palette
 from services.monitor.blueprint import ROOT
 from services.monitor.figure import drawn
 

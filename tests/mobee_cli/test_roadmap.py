@@ -75,7 +75,7 @@ def _flat(text: str) -> str:
 
 def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr("experiments.drawing.cloud.marker_cloud", lambda *given, **_: drawn.append(given) or given[3])
+    monkeypatch.setattr("mobee.rendering.sheet.marker_cloud", lambda *given, **_: drawn.append(given) or given[3])
     code, out, _ = say("show", free, "--check", "--picture", tmp_path / "a.png")
     lines = out.splitlines()
     assert code == 0
@@ -132,7 +132,7 @@ def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: P
 
 def test_play_arrives_offline(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr("experiments.drawing.filmstrip.filmstrip", lambda strips, path: drawn.extend(strips) or path)
+    monkeypatch.setattr("mobee.rendering.sheet.filmstrip", lambda strips, path: drawn.extend(strips) or path)
     code, out, _ = say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--picture", tmp_path / "film.png")
     assert code == 0
     assert out.startswith("Arrived at yaw 0.4, elbow 0.2 after ") and "No solids touched" in _flat(out)
@@ -240,7 +240,7 @@ def arm(tmp_path: Path) -> Path:
 def test_a_task_file_is_built_shown_asked_and_played_for_another_robot(
     say: Say, arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.drawing.cloud.marker_cloud", lambda *given, **_: given[3])
+    monkeypatch.setattr("mobee.rendering.sheet.marker_cloud", lambda *given, **_: given[3])
     path, robot = tmp_path / "task.npz", ("--robot", arm)
     assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--neighbours", 4, *robot)[0] == 0
     code, out, _ = say("show", path, *robot)

@@ -27,7 +27,7 @@ from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
-from services.monitor import palette  # noqa: E402  # only where Rerun is
+from mobee.rendering import palette  # noqa: E402  # only where Rerun is
 from services.monitor.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
 from services.monitor.page import program  # noqa: E402  # only where Rerun is
 from services.monitor.plots import Plots  # noqa: E402  # only where Rerun is

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,10 @@ from bus_schema.messages import Camera, Image
 from mobee import World, box, cylinder, load_world, sphere
 from mobee.robot.load import load_robot
 from services.common.eyes import eye_frame, frame_at_capture
+from services.robot_sim.renderer_scene import BACKGROUND, Scene
 from tests.services.harness import wait_for
 from tests.services.robots import seer
 from tests.services.stage import LOOKING_DOWN, Stage, posture
-
-pytest.importorskip("pybullet")
-from services.robot_sim.renderer_scene import BACKGROUND, Scene  # noqa: E402  # only where PyBullet is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)
@@ -39,10 +36,8 @@ def project(scene: Scene, eye: str, q: np.ndarray, point: np.ndarray) -> np.ndar
 
 
 @pytest.fixture
-def scene() -> Iterator[Scene]:
-    made = Scene(ROBOT, load_world("table"))
-    yield made
-    made.close()
+def scene() -> Scene:
+    return Scene(ROBOT, load_world("table"))
 
 
 AHEAD = {"neck_pitch": 0.0, "eyes_tilt": 0.0, "eyes_vergence": 0.0}
@@ -84,16 +79,15 @@ def test_the_ball_is_drawn_where_intrinsics_and_posture_say(scene: Scene) -> Non
         np.testing.assert_allclose(seen, project(scene, eye, DOWN, np.array([-0.35, 0.0, -0.07])), atol=0.6)  # perspective: .4 px
 
 
-def test_the_rasteriser_keeps_to_the_intrinsics_too() -> None:
+def test_objects_anywhere_in_the_picture_keep_to_the_intrinsics() -> None:
     offsets = []
     for x, y in ((-0.45, -0.06), (-0.40, 0.05), (-0.30, 0.0), (-0.32, 0.06)):
         world = World()
-        world.add("mark", cylinder(0.008, 0.01), position=(x, y, -0.05), color=(1, 0, 0))  # PyBullet draws it
+        world.add("mark", cylinder(0.008, 0.01), position=(x, y, -0.05), color=(1, 0, 0))
         scene = Scene(ROBOT, world)
         scene.pose(DOWN)
         rows, columns = np.nonzero(red(scene.draw("left")))
         offsets.append([columns.mean(), rows.mean()] - project(scene, "left", DOWN, np.array([x, y, -0.05])))
-        scene.close()
     assert np.abs(np.mean(offsets, axis=0)).max() < 0.2  # px
 
 
@@ -107,7 +101,6 @@ def test_near_things_hide_far_ones() -> None:
     scene.place("lid", np.array([-0.33, 0.0, -0.3]), NO_TURN)
     assert hidden == 0
     assert red(scene.draw("left")).sum() > 500
-    scene.close()
 
 
 def test_the_robot_has_no_red_on_it(scene: Scene) -> None:
@@ -134,7 +127,6 @@ def test_a_hull_is_drawn_as_the_box_that_it_is(tmp_path: Path) -> None:
         for turn in (0.0, 0.4):
             scene.pose(robot.home + [turn, 0.0])
             pictures.append(scene.draw("left").astype(int))
-        scene.close()
     for box_drawn, hull_drawn in ((pictures[0], pictures[2]), (pictures[1], pictures[3])):
         assert (box_drawn != BACKGROUND).any(axis=2).mean() > 0.05
         assert np.abs(box_drawn - hull_drawn).max() <= 2

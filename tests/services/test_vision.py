@@ -29,6 +29,7 @@ from bus_schema.messages import (
 from mobee import load_world
 from mobee.robot.load import load_robot
 from services.common.eyes import frame_at_capture
+from services.robot_sim.renderer_scene import Scene
 from services.vision.ball import Sighting, find_balls
 from services.vision.triangulate import Fix, locate, triangulate
 from tests.services.stage import LOOKING_DOWN, TICK, Stage, matched, posture
@@ -138,16 +139,11 @@ def test_the_matching_pair_is_chosen_among_several() -> None:
 
 
 @pytest.fixture(scope="module")
-def scene() -> Iterator[object]:
-    pytest.importorskip("pybullet")
-    from services.robot_sim.renderer_scene import Scene
-
-    made = Scene(ROBOT, load_world("table"))
-    yield made
-    made.close()
+def scene() -> Scene:
+    return Scene(ROBOT, load_world("table"))
 
 
-def test_the_drawn_ball_is_located_within_a_centimetre(scene: object, rng: np.random.Generator) -> None:
+def test_the_drawn_ball_is_located_within_a_centimetre(scene: Scene, rng: np.random.Generator) -> None:
     """Median 1 cm, 95 % 2 cm over frames in which both eyes see 90 % of the ball, at ten places."""
     head, torso = ROBOT.part("head"), ROBOT.part("torso")
     errors = []

@@ -40,8 +40,6 @@ from experiments.claims.ch3_roadmaps.replanning_scene import (
     new_map,
     robot,
 )
-from experiments.drawing.filmstrip import Strip, filmstrip
-from experiments.drawing.motion import Motion
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.live import read_done, write_job
@@ -52,6 +50,8 @@ from experiments.kit.progress import Progress
 from experiments.kit.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
+from mobee.rendering.motion import Motion
+from mobee.rendering.sheet import Strip, filmstrip
 
 SOONEST, LATEST = 0.1, 1.2  # s after the start of a crossing
 PIECE = 5  # crossings of a launch

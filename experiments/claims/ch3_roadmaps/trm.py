@@ -23,7 +23,6 @@ import numpy as np
 from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
-from experiments.drawing.sheet import write_sheet
 from experiments.kit.cells import Cell, CellResult, load_cells
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment, Steps
@@ -32,6 +31,7 @@ from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
+from mobee.rendering.sheet import write_sheet
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.graph import nearest_before
 from mobee.roadmap.roadmap import Roadmap

@@ -16,13 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
-from experiments.drawing.cloud import cloud_solids, marker_cloud
-from experiments.drawing.filmstrip import Strip, filmstrip, pictures_of
-from experiments.drawing.motion import Motion, motion_through
-from experiments.drawing.sheet import Panel, write_sheet
 from experiments.kit.roadmap_task import LEFT_ARM, Example, Method, build
 from mobee import MobeeError
 from mobee.arrays import Array
+from mobee.rendering.motion import Motion, motion_through
+from mobee.rendering.sheet import Panel, Strip, cloud_solids, filmstrip, marker_cloud, pictures_of, write_sheet
 from mobee.roadmap.building.task import Coordinate
 from mobee.roadmap.roadmap import Roadmap
 

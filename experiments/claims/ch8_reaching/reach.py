@@ -23,10 +23,6 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, STRATEGIES, Runs, runs_of
-from experiments.drawing.filmstrip import pictures_of
-from experiments.drawing.picture import Picture
-from experiments.drawing.scene import robot_solids
-from experiments.drawing.solid import Solid, ball
 from experiments.kit.claims import Claim
 from experiments.kit.experiment import Experiment
 from experiments.kit.options import positive_number
@@ -41,6 +37,9 @@ from mobee import Model
 from mobee.arrays import Array
 from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.rendering.picture import Picture
+from mobee.rendering.sheet import pictures_of
+from mobee.rendering.solid import Solid, ball, robot_solids
 
 REPETITIONS = 5  # of an evaluation
 COST = {"random": 2.0}

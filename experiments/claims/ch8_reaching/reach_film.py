@@ -20,9 +20,6 @@ from pathlib import Path
 import numpy as np
 
 import mobee
-from experiments.drawing.camera import axes_named
-from experiments.drawing.filmstrip import Strip, filmstrip
-from experiments.drawing.motion import Motion, recorded
 from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.kit.reaching.arm import LEARNED, MARKER, PART
 from experiments.kit.reaching.targets import grid, targets_at
@@ -32,6 +29,9 @@ from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget
+from mobee.rendering.camera import camera_axes
+from mobee.rendering.motion import Motion, recorded
+from mobee.rendering.sheet import Strip, filmstrip
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60
@@ -91,7 +91,7 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
             done = agent.try_problem(target)
         if done.reach_state is not None and done.missing <= REACHED:
             motion = recording.motion()
-            away = np.linalg.norm(motion.way(agent.marker) - target.position, axis=1)
+            away = np.linalg.norm(motion.path(agent.marker) - target.position, axis=1)
             found.append(Episode(target, done, motion.part(0, int(np.argmax(away <= away.min() + NEAR)))))
     return found
 
@@ -133,7 +133,7 @@ KINDS = {"From above": _descent, "Far": _distance, "Around the target": _detour}
 def _strip(name: str, one: Episode, marker: str, poses: int) -> Strip:
     """From the view in which the target hides least of the hand that is at it."""
     behind = one.motion.poses[-1].position(marker) - one.target.position
-    view = min(VIEWS, key=lambda view: float(axes_named(view)[2] @ behind))
+    view = min(VIEWS, key=lambda view: float(camera_axes(view)[2] @ behind))
     return Strip(one.motion, marker, (view,), poses, _title(name, one), partial(_caption, marker))
 
 
@@ -155,7 +155,7 @@ def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]
     plant = table_plant(seed + 1, joints)
     agent = load_reaches(file, plant, PART)
     found = episodes(agent, plant, EPISODES, seed)
-    chosen = [(name, found[number]) for name, number in selected([one.motion.way(agent.marker) for one in found]).items()]
+    chosen = [(name, found[number]) for name, number in selected([one.motion.path(agent.marker) for one in found]).items()]
     if not chosen:
         raise MobeeError(f"{file}: none of {EPISODES} reaches ended within {REACHED} m of its target; let it learn more.")
     strips = [_strip(name, one, agent.marker, poses) for name, one in chosen]

@@ -11,7 +11,7 @@ from mobee.robot.robot import Robot
 from tests.mobee.check.arm import arm
 
 rr = pytest.importorskip("rerun")
-from services.monitor import palette  # noqa: E402  # only where Rerun is
+from mobee.rendering import palette  # noqa: E402  # only where Rerun is
 from services.monitor.figure import Figure  # noqa: E402  # only where Rerun is
 
 

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.drawing.camera import Camera, axes_of
-from experiments.drawing.picture import draw
-from experiments.drawing.solid import Solid, ball
+from mobee.rendering.camera import Camera, camera_axes
+from mobee.rendering.picture import draw
+from mobee.rendering.solid import Solid, ball
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-EYE = Camera(axes_of(0.0, 30.0), np.array([-0.5, 0.5]), 80.0, 80, 80)
+EYE = Camera(camera_axes((0.0, 30.0)), np.array([-0.5, 0.5]), 80.0, 80, 80)
 
 
 def test_without_anything_the_paper_is_white() -> None:

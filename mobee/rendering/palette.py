@@ -1,4 +1,4 @@
-"""The colours of the page: 8-bit red, green, blue (, opacity)."""
+"""The colours of robots, worlds and plots: 8-bit red, green, blue (, opacity)."""
 
 from __future__ import annotations
 

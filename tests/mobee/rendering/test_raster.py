@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.drawing.camera import Camera, axes_named, axes_of, framing
-from experiments.drawing.raster import Raster, along
-from experiments.drawing.solid import Solid, ball
 from mobee.errors import UnknownName
+from mobee.rendering.camera import NEAREST, Camera, Raster, camera_axes, eye_camera, framing, pixel_middles
+from mobee.rendering.solid import Solid, ball
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-AHEAD = axes_of(0.0, 0.0)  # looks along x
+AHEAD = camera_axes((0.0, 0.0))  # looks along x
 
 
 def camera(size: float = 1.0, pixels: int = 50, axes: np.ndarray = AHEAD) -> Camera:
@@ -25,7 +24,7 @@ def turn(seed: int) -> np.ndarray:
 
 def test_a_sphere_covers_the_pixels_whose_centres_are_within_its_radius() -> None:
     seen = Raster(camera(), [ball(np.array([0.3, 0.11, -0.07]), 0.203, RED)])
-    right, up = along(seen.camera)
+    right, up = pixel_middles(seen.camera)
     beside = np.hypot(right + 0.11, up[:, None] + 0.07)  # y is to the left of a camera in front of the robot
     np.testing.assert_array_equal(np.isfinite(seen.depth), beside <= 0.203)
     inside = beside < 0.19
@@ -34,7 +33,7 @@ def test_a_sphere_covers_the_pixels_whose_centres_are_within_its_radius() -> Non
 
 def test_a_box_covers_the_pixels_whose_centres_are_within_its_edges() -> None:
     seen = Raster(camera(), [Solid("box", (0.5, 0.31, 0.63), np.zeros(3), np.eye(3), RED)])
-    right, up = along(seen.camera)
+    right, up = pixel_middles(seen.camera)
     np.testing.assert_array_equal(np.isfinite(seen.depth), (np.abs(right) <= 0.155) & (np.abs(up[:, None]) <= 0.315))
     np.testing.assert_allclose(seen.depth[np.isfinite(seen.depth)], -0.25, atol=1e-6)
     np.testing.assert_allclose(seen.normal[25, 25], [-1.0, 0.0, 0.0], atol=1e-6)
@@ -77,7 +76,7 @@ def test_rays_enter_a_turned_volume_where_points_along_them_begin_to_be_inside(s
     solid = Solid(shape.kind, shape.size, rng.uniform(-0.1, 0.1, 3), turn(seed), RED)
     eye = camera(0.8, 8, turn(seed + 1))
     seen = Raster(eye, [solid])
-    right, up = along(eye)
+    right, up = pixel_middles(eye)
     starts = right[:, None] * eye.axes[0] + up[:, None, None] * eye.axes[1]
     ahead = np.arange(-0.4, 0.4, 0.002)
     within = inside(solid, (starts[:, :, None] + ahead[:, None] * eye.axes[2]).reshape(-1, 3)).reshape(8, 8, -1)
@@ -90,6 +89,29 @@ def test_rays_enter_a_turned_volume_where_points_along_them_begin_to_be_inside(s
     outwards = seen.normal[np.isfinite(seen.depth)]
     np.testing.assert_allclose(np.linalg.norm(outwards, axis=1), 1.0, atol=1e-3)
     assert (outwards @ eye.axes[2] <= 1e-3).all()
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind)
+@settings(max_examples=25)
+@given(seed=st.integers(0, 10**6))
+def test_an_eye_sees_a_turned_volume_where_points_along_its_rays_begin_to_be_inside(shape: Solid, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    solid = Solid(shape.kind, shape.size, rng.uniform(-0.3, 0.3, 3), turn(seed), RED)
+    eye = eye_camera(rng.uniform(-0.3, 0.3, 3), turn(seed + 1), 8, 8, 90.0)  # at times inside the volume, or with it behind
+    seen = Raster(eye, [solid])
+    right, up = pixel_middles(eye)
+    rays = right[:, None] * eye.axes[0] + up[:, None, None] * eye.axes[1] + eye.axes[2]
+    depths = np.arange(NEAREST, 1.2, 0.001)
+    assert eye.eye is not None
+    within = inside(solid, (eye.eye + depths[:, None] * rays[:, :, None]).reshape(-1, 3)).reshape(8, 8, -1)
+    entered = within[..., 1:] & ~within[..., :-1]
+    first = np.where(entered.any(axis=2), depths[1:][entered.argmax(axis=2)], np.inf)
+    first[within[..., 0]] = np.inf  # the ray begins inside: the surface is behind the eye or too near
+    both = np.isfinite(first)
+    assert np.isfinite(seen.depth[both]).all()
+    late = first[both] - seen.depth[both]
+    assert (late >= -1e-4).all() and (late <= 0.0011).all()
+    assert (np.isfinite(seen.depth) & ~both).sum() <= 3  # only where less than a step of the ray is inside
 
 
 def test_the_hull_of_a_boxs_corners_is_seen_as_the_box() -> None:
@@ -111,13 +133,13 @@ def test_a_framed_volume_fills_the_picture_up_to_its_margin(shape: Solid) -> Non
 
 
 def test_the_robots_right_is_left_in_front_of_it_and_its_front_right_at_its_right_side() -> None:
-    np.testing.assert_allclose(axes_named("front")[0] @ [0.0, 1.0, 0.0], -1.0)
-    np.testing.assert_allclose(axes_named("side")[0] @ [-1.0, 0.0, 0.0], 1.0)
+    np.testing.assert_allclose(camera_axes("front")[0] @ [0.0, 1.0, 0.0], -1.0)
+    np.testing.assert_allclose(camera_axes("side")[0] @ [-1.0, 0.0, 0.0], 1.0)
     for view in ("front", "side", "oblique", "left", "top", "behind"):
-        np.testing.assert_allclose(axes_named(view) @ axes_named(view).T, np.eye(3), atol=1e-12)
-        assert axes_named(view)[1][2] > 0.0
+        np.testing.assert_allclose(camera_axes(view) @ camera_axes(view).T, np.eye(3), atol=1e-12)
+        assert camera_axes(view)[1][2] > 0.0
 
 
 def test_an_unknown_view_is_answered_with_the_nearest() -> None:
     with pytest.raises(UnknownName, match="oblique"):
-        axes_named("obliqe")
+        camera_axes("obliqe")

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.drawing.cloud import cloud_solids, marker_cloud
-from experiments.drawing.filmstrip import Strip, filmstrip, panels
-from experiments.drawing.motion import Motion, motion_through, recorded
-from experiments.drawing.scene import object_solids, robot_solids, trail_solids
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.world_object import sphere
+from mobee.rendering.motion import Motion, motion_through, recorded
+from mobee.rendering.sheet import Strip, cloud_solids, filmstrip, marker_cloud, panels
+from mobee.rendering.solid import object_solids, robot_solids, trail_solids
 
 ARM = ["r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"]
 PALM = "right_palm"
@@ -33,7 +32,7 @@ def motion(model: mobee.Model) -> Motion:
 
 
 def test_a_trail_begins_where_the_marker_was_and_ends_in_a_ball_at_the_palm(motion: Motion) -> None:
-    *pieces, tip = trail_solids(motion.way(PALM)[:20])
+    *pieces, tip = trail_solids(motion.path(PALM)[:20])
     np.testing.assert_array_equal(tip.position, motion.poses[19].position(PALM))
     first, last = pieces[0], pieces[-1]
     np.testing.assert_allclose(first.position - 0.5 * first.size[1] * first.rotation[:, 2], motion.poses[0].position(PALM), atol=1e-12)
@@ -41,13 +40,13 @@ def test_a_trail_begins_where_the_marker_was_and_ends_in_a_ball_at_the_palm(moti
 
 
 def test_a_trail_of_one_place_is_a_ball(motion: Motion) -> None:
-    assert [solid.kind for solid in trail_solids(motion.way(PALM)[:1])] == ["sphere"]
+    assert [solid.kind for solid in trail_solids(motion.path(PALM)[:1])] == ["sphere"]
 
 
 def test_moments_are_the_first_the_last_and_equally_far_from_each_other(motion: Motion) -> None:
     moments = motion.moments(PALM, 4)
     assert moments[0] == 0 and moments[-1] == 29 and len(moments) == 4
-    gone = np.cumsum(np.linalg.norm(np.diff(motion.way(PALM), axis=0), axis=1))
+    gone = np.cumsum(np.linalg.norm(np.diff(motion.path(PALM), axis=0), axis=1))
     between = np.diff(np.concatenate([[0.0], gone])[moments])
     np.testing.assert_allclose(between, between.mean(), rtol=0.25)
     assert motion.moments(PALM, 1).tolist() == [29]
@@ -112,7 +111,7 @@ def test_a_filmstrip_is_written_as_one_picture(motion: Motion, tmp_path: Path) -
 
 
 def test_a_cloud_has_a_point_where_the_marker_is_in_each_pose_coloured_by_its_value(motion: Motion, model: mobee.Model) -> None:
-    places = motion.way(PALM)[:3]
+    places = motion.path(PALM)[:3]
     points = [solid for solid in cloud_solids(motion.poses[0], places, np.array([0.0, 1.0, 0.0])) if solid.group == -3]
     np.testing.assert_array_equal([point.position for point in points], places)
     assert points[0].color == points[2].color != points[1].color

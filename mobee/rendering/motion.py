@@ -1,4 +1,4 @@
-"""What is drawn of a motion: poses one after the other, with the world as it was in each."""
+"""Motions to draw: poses one after the other, with the world's objects at each."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from mobee.model.pose import Pose
 from mobee.model.world_object import WorldObject
 from mobee.simulation.plant import OfflinePlant
 
-STILL = 0.02  # rad, or m: a motor that moves less is still
-SLOW = 0.002  # m/s: standing still counts as moving that fast, so that a pause is seen, but little
+MOVED = 0.02  # rad, or m: a motor that moves less counts as still
+REST_SPEED = 0.002  # m/s: a pause counts as motion at this speed, so that it gets few of the moments shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """T poses and their times [s], (T,), with the objects of the world as they were in each, by name."""
+    """T poses, their times [s] (T,), and the objects of the world at each, by name."""
 
     poses: tuple[Pose, ...]
     times: Array
@@ -38,64 +38,67 @@ class Motion:
         return len(self.poses)
 
     def part(self, first: int, last: int) -> Motion:
-        """From one pose to another, both included."""
+        """Return the motion from one pose to another, both included."""
         return Motion(self.poses[first : last + 1], self.times[first : last + 1], self.objects[first : last + 1])
 
-    def way(self, marker: str) -> Array:
-        """Where a marker was, (T, 3) m in the root frame; raises UnknownName."""
+    def path(self, marker: str) -> Array:
+        """Return the path of a marker, (T, 3) m in the root frame; raises UnknownName."""
         return np.array([pose.position(marker) for pose in self.poses])
 
     def moved(self) -> tuple[str, ...]:
-        """The parts of which some motor moved."""
+        """Return the parts of which some motor moved."""
         q = np.array([pose.q for pose in self.poses])
-        moves = np.ptp(q, axis=0) > STILL
+        moves = np.ptp(q, axis=0) > MOVED
         return tuple(name for name, part in self.poses[0].robot.parts.items() if moves[part.slice].any())
 
     def moments(self, marker: str, count: int) -> Ints:
-        """Up to that many poses, the first and the last among them, between which the marker goes equally far, in order."""
-        steps = np.linalg.norm(np.diff(self.way(marker), axis=0), axis=1) + SLOW * np.diff(self.times)
-        gone = np.concatenate([[0.0], np.cumsum(steps)])
-        shares = np.linspace(0.0, gone[-1], count) if count > 1 else gone[-1:]
-        return np.unique(np.abs(gone - shares[:, None]).argmin(axis=1))
+        """Return the numbers of up to `count` poses, first and last included, between which the marker covers equal distances."""
+        steps = np.linalg.norm(np.diff(self.path(marker), axis=0), axis=1) + REST_SPEED * np.diff(self.times)
+        covered = np.concatenate([[0.0], np.cumsum(steps)])
+        shares = np.linspace(0.0, covered[-1], count) if count > 1 else covered[-1:]
+        return np.unique(np.abs(covered - shares[:, None]).argmin(axis=1))
 
 
 def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = None) -> Motion:
-    """Poses q (T, n) rad in the model's world of now, in which attached objects go with their links; `times`: 0, 1, 2, ... s if None."""
+    """Return the motion through poses q (T, n) rad in the model's present world; attached objects move with their links.
+
+    `times`: (T,) s; 0, 1, 2, ... if None.
+    """
     poses = tuple(model.evaluate(row) for row in np.atleast_2d(np.asarray(q, dtype=np.float64)))
     found = np.arange(len(poses), dtype=np.float64) if times is None else np.asarray(times, dtype=np.float64)
     return Motion(poses, found, tuple(pose.objects for pose in poses))
 
 
 class Recording:
-    """Poses of a plant as they come, from where it is."""
+    """Records the poses of a plant, from the present one on."""
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant
         self._poses: list[Pose] = []
         self._times: list[float] = []
         self._objects: list[dict[str, WorldObject]] = []
-        self.note(plant.time)
+        self.add(plant.time)
 
     def __len__(self) -> int:
         return len(self._poses)
 
-    def note(self, time: float) -> None:
-        """Keep the plant's pose of now, if it has one."""
+    def add(self, time: float) -> None:
+        """Add the plant's present pose, if it has one."""
         if (pose := self._plant.pose) is not None:
             self._poses.append(pose)
             self._times.append(time)
             self._objects.append(pose.objects)
 
     def motion(self) -> Motion:
-        """All that was kept so far; raises InvalidValue if nothing was."""
+        """Return the motion so far; raises InvalidValue if no pose was recorded."""
         return Motion(tuple(self._poses), np.array(self._times) - self._times[:1], tuple(self._objects))
 
 
 @contextmanager
 def recorded(plant: OfflinePlant, step: float = 0.05) -> Iterator[Recording]:
-    """Record what a plant does meanwhile, a pose each `step` s; what it was to call before with `every`, it does not call any more."""
+    """Record a plant inside the `with` block, a pose every `step` s; this replaces a function that was set by `plant.every`."""
     recording = Recording(plant)
-    plant.every(max(1, round(step / plant.dt)), recording.note)
+    plant.every(max(1, round(step / plant.dt)), recording.add)
     try:
         yield recording
     finally:

@@ -1,1 +1,0 @@
-"""Pictures of robots in their worlds, without a display: poses, filmstrips of motions, clouds of a marker."""

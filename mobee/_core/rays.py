@@ -1,0 +1,82 @@
+"""Draws convex volumes by one ray a pixel; declares core/rays.cpp."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core import ADDRESS, INTEGER, REAL, address, function
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+CONVEX = np.dtype(
+    [
+        ("center", np.float64, 3),
+        ("rotation", np.float64, (3, 3)),
+        ("half", np.float64, 3),
+        ("bound", np.float64),
+        ("kind", np.int64),
+        ("planes", np.uint64),
+        ("count", np.int64),
+    ],
+    align=True,
+)
+"""`Convex` of core/rays.cpp; `planes` is an address, and the caller keeps the planes alive."""
+
+KINDS = ("sphere", "capsule", "cylinder", "box", "convex")
+
+
+class _Picture(ctypes.Structure):
+    """`Picture` of core/rays.cpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("volumes", "depth", "which", "normal")),
+        *((name, INTEGER) for name in ("count", "height", "width", "perspective")),
+        *((name, REAL * 3) for name in ("origin", "right", "down", "ahead")),
+        *((name, REAL) for name in ("left", "top", "step", "nearest")),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rays:
+    """The rays of a picture: through column i and row j, at x = left + i step and y = top + j step of the plane 1 m ahead of `origin`.
+
+    `axes` (3, 3): rows are right, down and ahead, in the root frame.  In a parallel picture all rays run along ahead, and x and y are
+    metres.  What is entered nearer than `nearest` m is not seen.
+    """
+
+    axes: Array
+    origin: Array
+    left: float
+    top: float
+    step: float
+    height: int
+    width: int
+    perspective: bool
+    nearest: float
+
+
+_cast = function("cast", ADDRESS)
+_convex_size = function("convex_size", result=INTEGER)
+
+
+def cast(volumes: NDArray[np.void], rays: Rays) -> tuple[Floats, NDArray[np.int32], Floats]:
+    """Return what rays meet first among volumes (N,) CONVEX.
+
+    Depths (H, W) m along the axis ahead, infinite where there is nothing; the numbers of the volumes (H, W), -1 where there is nothing;
+    and outward normals (H, W, 3), root frame.
+    """
+    if volumes.dtype != CONVEX or CONVEX.itemsize != _convex_size():
+        raise RuntimeError("the library's volumes have another layout than these")
+    shape = rays.height, rays.width
+    depth, which, normal = np.empty(shape, np.float32), np.empty(shape, np.int32), np.empty((*shape, 3), np.float32)
+    arrays = (address(array) for array in (volumes, depth, which, normal))
+    vectors = ((REAL * 3)(*vector) for vector in (rays.origin, *rays.axes))
+    numbers = (rays.left, rays.top, rays.step, rays.nearest)
+    picture = _Picture(*arrays, len(volumes), *shape, rays.perspective, *vectors, *numbers)
+    _cast(ctypes.addressof(picture))
+    return depth, which, normal

@@ -1,0 +1,1 @@
+"""Pictures of robots and worlds, computed on the CPU and without a display: what an eye sees, poses, filmstrips, clouds of points."""

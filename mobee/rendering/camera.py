@@ -1,0 +1,130 @@
+"""Cameras: parallel ones, in whose pictures lengths are the same near and far, and perspective ones, as an eye is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core.rays import Rays, cast
+from mobee.arrays import Array
+from mobee.errors import UnknownName
+from mobee.rendering.solid import Solid, packed
+
+Floats = NDArray[np.float32]
+
+# Azimuth and elevation of the camera, degrees: 0 is in front of a robot that looks along -x as the iCub does, 90 at its right.
+VIEWS = {
+    "front": (0.0, 8.0),
+    "side": (90.0, 8.0),
+    "oblique": (40.0, 25.0),
+    "left": (-40.0, 25.0),
+    "top": (0.0, 89.0),
+    "behind": (140.0, 25.0),
+}
+MARGIN = 0.03  # m
+NOTHING = -1  # in place of a group
+NEAREST = 0.03  # m: a perspective camera does not see what is nearer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A picture of width x height pixels, of `scale` pixels a metre.
+
+    `axes` (3, 3): rows are right, up and ahead of the camera, in the root frame.  `corner`: right and up [m] of the picture's upper left
+    corner.  `eye` (3,) m, root frame: where the rays of a perspective picture begin; scale and corner are then those of the plane
+    1 m ahead of it.  None: the rays are parallel.
+    """
+
+    axes: Array
+    corner: Array
+    scale: float
+    width: int
+    height: int
+    eye: Array | None = None
+
+    def finer(self, times: int) -> Camera:
+        """Return the same picture with that many times the pixels in both directions."""
+        return replace(self, scale=self.scale * times, width=self.width * times, height=self.height * times)
+
+    def pixels(self, points: Array) -> Array:
+        """Return where points (..., 3) m are in the picture of a parallel camera: column and row from its corner, (..., 2)."""
+        flat = points @ self.axes[:2].T - self.corner
+        found: Array = self.scale * flat * np.array([1.0, -1.0])
+        return found
+
+    def rays(self) -> Rays:
+        """Return the rays through the middles of the pixels."""
+        axes, step = self.axes * np.array([[1.0], [-1.0], [1.0]]), 1.0 / self.scale
+        left, top = float(self.corner[0]) + 0.5 * step, 0.5 * step - float(self.corner[1])
+        if self.eye is None:
+            return Rays(axes, np.zeros(3), left, top, step, self.height, self.width, False, -np.inf)
+        return Rays(axes, self.eye, left, top, step, self.height, self.width, True, NEAREST)
+
+
+def eye_camera(position: Array, axes: Array, width: int, height: int, view_deg: float) -> Camera:
+    """Return the perspective camera at a position (3,) m with a vertical field of view [degrees]; `axes` as those of Camera."""
+    scale = 0.5 * height / float(np.tan(0.5 * np.deg2rad(view_deg)))
+    return Camera(axes, np.array([-0.5 * width, 0.5 * height]) / scale, scale, width, height, position)
+
+
+def camera_axes(view: str | tuple[float, float]) -> Array:
+    """Return the axes (3, 3) of a view: its name in VIEWS, or azimuth and elevation [degrees]; raises UnknownName."""
+    if isinstance(view, str):
+        if view not in VIEWS:
+            raise UnknownName("view", view, VIEWS)
+        view = VIEWS[view]
+    a, e = np.deg2rad(view)
+    ahead = np.array([np.cos(a) * np.cos(e), -np.sin(a) * np.cos(e), -np.sin(e)])
+    right = np.array([-np.sin(a), -np.cos(a), 0.0])
+    return np.array([right, np.cross(right, ahead), ahead])
+
+
+def framing(axes: Array, solids: Sequence[Solid], points: Array, height: int, margin: float = MARGIN) -> Camera:
+    """Return the parallel camera whose picture, that many pixels high, holds solids and points (P, 3) m with a margin [m] around them."""
+    seen = [points @ axes[:2].T] if len(points) else []
+    for sign in (1.0, -1.0):
+        if solids:
+            seen.append(np.array([[solid.position @ axis + sign * solid.extent(sign * axis) for axis in axes[:2]] for solid in solids]))
+    low, high = np.min([flat.min(axis=0) for flat in seen], axis=0) - margin, np.max([flat.max(axis=0) for flat in seen], axis=0) + margin
+    scale = height / float(high[1] - low[1])
+    return Camera(axes, np.array([low[0], high[1]]), scale, max(1, int(np.ceil(scale * (high[0] - low[0])))), height)
+
+
+class Raster:
+    """The nearest surface in each pixel of a picture.
+
+    `depth` (H, W) m along the camera's axis, from the eye or, with parallel rays, from the root frame's origin; infinite where there is
+    nothing.  `normal` (H, W, 3), root frame.  `which` (H, W): the number of the solid, -1 where there is nothing; `group` likewise.
+    `color` (H, W, 3).
+    """
+
+    def __init__(self, camera: Camera, solids: Sequence[Solid] = ()) -> None:
+        self.camera = camera
+        volumes, _kept = packed(solids)
+        self.depth, self.which, self.normal = cast(volumes, camera.rays())
+        groups = np.array([*(solid.group for solid in solids), NOTHING])
+        colors = np.array([*(solid.color for solid in solids), (0.0, 0.0, 0.0)], np.float32)
+        self.group: NDArray[np.int64] = groups[self.which]
+        self.color: Floats = colors[self.which]
+
+    def points(self) -> Floats:
+        """Return the places that are seen, (N, 3) m in the root frame, pixel by pixel where there is something; of parallel rays."""
+        return places(self.camera, self.depth, np.isfinite(self.depth))
+
+
+def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
+    """Return the points (N, 3) m, root frame, at a depth (H, W) m in those of a parallel camera's pixels."""
+    right, up = pixel_middles(camera)
+    rows, columns = np.nonzero(which)
+    found: Floats = np.stack([right[columns], up[rows], depth[which]], axis=1) @ camera.axes.astype(np.float32)
+    return found
+
+
+def pixel_middles(camera: Camera) -> tuple[Floats, Floats]:
+    """Return how far right the middle of each column of pixels is, (W,) m, and how far up that of each row, (H,) m."""
+    right = camera.corner[0] + (np.arange(camera.width) + 0.5) / camera.scale
+    up = camera.corner[1] - (np.arange(camera.height) + 0.5) / camera.scale
+    return right.astype(np.float32), up.astype(np.float32)

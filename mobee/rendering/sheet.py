@@ -1,0 +1,202 @@
+"""Sheets of pictures as PNG files: filmstrips of motions, and the places of markers in many poses (as thesis figs. 3.1, 3.2).
+
+Of a plant:  `with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.
+Of poses (T, n) rad, such as a path of a roadmap:  `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue, NotInstalled
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.rendering.camera import camera_axes, framing
+from mobee.rendering.motion import Motion
+from mobee.rendering.picture import Picture, draw
+from mobee.rendering.solid import Color, Solid, ball, focus, lowest, object_solids, robot_solids, trail_solids
+
+View = str | tuple[float, float]
+
+DPI = 100
+GAP, MARGIN = 8, 10  # pixels
+TITLE_HEIGHT, CAPTION_HEIGHT = 30, 22  # pixels
+POINT_RADIUS = 0.0045  # m
+LOWEST, MIDDLE, HIGHEST = np.array([0.16, 0.42, 0.92]), np.array([0.20, 0.78, 0.58]), np.array([1.00, 0.70, 0.12])  # colours of values
+POINT_VEIL = 0.2
+POINT_GROUP = -3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """A picture, and the line below it."""
+
+    picture: Picture
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strip:
+    """One motion of a filmstrip, a row for each view.
+
+    `views`: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.  `poses`: how many.  `title`: above the row.  `caption`: returns
+    the line below a pose, given the motion and the pose's number; None: its time.  `bright`: parts that are not pale; None: those that
+    moved.
+    """
+
+    motion: Motion
+    marker: str
+    views: Sequence[View] = ("oblique",)
+    poses: int = 6
+    title: str = ""
+    caption: Callable[[Motion, int], str] | None = None
+    bright: Sequence[str] | None = None
+
+
+def filmstrip(strips: Sequence[Strip], path: Path, height: int = 300, colors: int = 256) -> Path:
+    """Write strips one below the other as a PNG of at most that many colours, each picture that many pixels high."""
+    rows = [(strip.title if number == 0 else "", row) for strip in strips for number, row in enumerate(panels(strip, height))]
+    return write_sheet(rows, path, colors)
+
+
+def panels(strip: Strip, height: int) -> list[list[Panel]]:
+    """Return the pictures of a strip, a row for each view; raises InvalidValue, UnknownName."""
+    if strip.poses < 1 or not strip.views:
+        raise InvalidValue(f"{strip.poses} poses in {len(strip.views)} views: must be at least one of each")
+    motion = strip.motion
+    moments = motion.moments(strip.marker, strip.poses).tolist()
+    path, bright = motion.path(strip.marker), motion.moved() if strip.bright is None else strip.bright
+    caption = _time_caption if strip.caption is None else strip.caption
+    scenes = []
+    for moment in moments:
+        trail = trail_solids(path[: moment + 1])
+        scenes.append([*robot_solids(motion.poses[moment], bright), *object_solids(motion.objects[moment]), *trail])
+    pictures = [pictures_of(scenes, view, height) for view in strip.views]
+    below = [caption(motion, moment) for moment in moments]
+    return [[Panel(picture, text if row is pictures[-1] else "") for picture, text in zip(row, below, strict=True)] for row in pictures]
+
+
+def pictures_of(scenes: Sequence[Sequence[Solid]], view: View, height: int) -> list[Picture]:
+    """Return pictures of several scenes by one camera, whose frame holds what each of them must show."""
+    about = [solid for scene in scenes for solid in focus(scene)]
+    camera = framing(camera_axes(view), about, np.empty((0, 3)), height)
+    floor = min(lowest(scene) for scene in scenes)
+    return [draw(scene, camera, floor) for scene in scenes]
+
+
+def marker_cloud(
+    model: Model,
+    q: ArrayLike,
+    markers: str | Sequence[str],
+    path: Path,
+    shown: ArrayLike | None = None,
+    views: Sequence[View] = ("front", "side", "oblique"),
+    values: ArrayLike | None = None,
+    title: str = "",
+    height: int = 400,
+) -> Path:
+    """Write a PNG of the places of markers in the poses q (P, n) rad, and of the robot in the pose `shown` (n,), at home if None.
+
+    `values` (P,) give the points' colours, blue for the smallest, orange for the largest; the height of each point if None.
+    Raises InvalidValue, UnknownName.
+    """
+    pose, names = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))), [markers] if isinstance(markers, str) else list(markers)
+    if not names or not len(pose.q):
+        raise InvalidValue(f"{len(pose.q)} poses and {len(names)} markers: must be at least one of each")
+    places = np.concatenate([pose.position(name) for name in names])
+    given = pose.position(names[0])[:, 2] if values is None else np.asarray(values, dtype=np.float64)
+    if given.shape != pose.q.shape[:1]:
+        raise InvalidValue(f"{len(pose.q)} poses and values of shape {given.shape}: must be one value a pose")
+    colored = places[:, 2] if values is None else np.tile(given, len(names))
+    scene = cloud_solids(model.evaluate(model.robot.home if shown is None else shown), places, colored)
+    row = [Panel(pictures_of([scene], view, height)[0], view if isinstance(view, str) else "") for view in views]
+    return write_sheet([(title, row)], path)
+
+
+def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
+    """Return the robot in a pose, the world around it, and points (P, 3) m in the colours of their values (P,)."""
+    low, high = float(values.min()), float(values.max())
+    shares = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
+    colors = [_value_color(float(share)) for share in shares]
+    points = [ball(place, POINT_RADIUS, color, POINT_VEIL, POINT_GROUP) for place, color in zip(places, colors, strict=True)]
+    return [*robot_solids(pose, bright=()), *object_solids(pose.objects), *points]
+
+
+def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors: int = 256) -> Path:
+    """Write rows, each a title and panels from left to right, as a PNG of at most that many colours; raises NotInstalled."""
+    columns = [max(one.picture.shape[1] for one in column if one) for column in zip_longest(*(panels for _, panels in rows))]
+    heights = [_row_height(title, panels) for title, panels in rows]
+    width, height = sum(columns) + GAP * (len(columns) - 1) + 2 * MARGIN, sum(heights) + GAP * (len(rows) - 1) + 2 * MARGIN
+    figure = _figure(width / DPI, height / DPI)
+    sheet = np.full((height, width, 3), 255, np.uint8)
+    top = MARGIN
+    for (title, panels), row_height in zip(rows, heights, strict=True):
+        left, below = MARGIN, top + (TITLE_HEIGHT if title else 0)
+        if title:
+            figure.text(left / width, 1.0 - (top + 0.5 * TITLE_HEIGHT) / height, title, fontsize=11, fontweight="bold", va="center")
+        for panel, column_width in zip(panels, columns, strict=False):
+            (high, narrow), start = panel.picture.shape[:2], left + (column_width - panel.picture.shape[1]) // 2
+            sheet[below : below + high, start : start + narrow] = panel.picture
+            middle = (left + 0.5 * column_width) / width, 1.0 - (below + high + 0.5 * CAPTION_HEIGHT) / height
+            figure.text(*middle, panel.caption, fontsize=10, color="0.25", ha="center", va="center")
+            left += column_width + GAP
+        top += row_height + GAP
+    figure.figimage(sheet, zorder=-1)
+    _write_png(figure, path, colors)
+    return path
+
+
+def _figure(width: float, height: float) -> Any:
+    """An empty figure, inches; Matplotlib is needed for the texts of a sheet only."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise NotInstalled('sheets of pictures need Matplotlib, which is not installed: pip install "mobee[figures]"') from None
+    return Figure(figsize=(width, height))
+
+
+def _row_height(title: str, panels: Sequence[Panel]) -> int:
+    captions = CAPTION_HEIGHT if any(panel.caption for panel in panels) else 0
+    highest: int = max(panel.picture.shape[0] for panel in panels)
+    return highest + captions + (TITLE_HEIGHT if title else 0)
+
+
+def _write_png(figure: Any, path: Path, colors: int) -> None:
+    """Write a figure with a palette, a third as large as without; rare colours have their share in it, and white stays white."""
+    from PIL import Image  # a dependency of Matplotlib
+
+    written = io.BytesIO()
+    figure.savefig(written, dpi=DPI, format="png")
+    image = Image.open(written).convert("RGB")
+    pixels = np.asarray(image)
+    shades, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
+    palette = Image.fromarray(np.repeat(shades, np.ceil(np.sqrt(counts)).astype(int), axis=0)[None]).quantize(colors, kmeans=2)
+    entries = np.array(palette.getpalette()).reshape(-1, 3)
+    white = int(entries.sum(axis=1).argmax())
+    entries[white] = 255
+    palette.putpalette(entries.ravel().tolist())
+    chosen = np.array(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    chosen[(pixels == 255).all(axis=2)] = white
+    found = Image.fromarray(chosen)
+    found.putpalette(entries.ravel().tolist())
+    found.save(path, optimize=True)
+
+
+def _time_caption(motion: Motion, moment: int) -> str:
+    return f"{motion.times[moment]:.1f} s"
+
+
+def _value_color(share: float) -> Color:
+    """The colour between LOWEST at 0, MIDDLE at one half and HIGHEST at 1."""
+    first, second, part = (LOWEST, MIDDLE, 2.0 * share) if share < 0.5 else (MIDDLE, HIGHEST, 2.0 * share - 1.0)
+    red, green, blue = ((1.0 - part) * first + part * second).tolist()
+    return red, green, blue

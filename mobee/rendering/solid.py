@@ -1,0 +1,179 @@
+"""The volumes of a picture with their colours, and how a robot, a world and a path become such volumes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core.rays import CONVEX, KINDS
+from mobee.arrays import Array
+from mobee.model.pose import Pose
+from mobee.model.world_object import WorldObject
+from mobee.rendering import palette
+from mobee.robot.robot import ShapeKind
+from mobee.robot.urdf.hull import facets
+
+Color = tuple[float, float, float]  # red, green, blue in 0..1
+
+TRAIL_RADIUS, TIP_RADIUS = 0.005, 0.009  # m
+SHORTEST_PIECE = 0.006  # m, of a trail
+OLD, NEW = np.array([1.0, 0.90, 0.55]), np.array([0.96, 0.62, 0.0])  # colours of a trail
+TRAIL_VEIL = 0.35
+PALENESS = 0.72  # share of white in the colour of parts that do not matter
+GHOST_OPACITY = 0.35
+TRAIL_GROUP, FIRST_OBJECT_GROUP = -2, 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A convex volume, as a robot's Shape or a WorldObject is one.
+
+    `position` (3,) m, `rotation` (3, 3): root frame.  `opacity`: below 1 the volume is transparent.  `veiled`: the share of its colour that
+    shows through opaque volumes in front of it, 0 to 1.  `group`: there is no outline between solids of one group.
+    `aside`: the picture's frame need not hold it.
+    """
+
+    kind: ShapeKind
+    size: tuple[float, ...]
+    position: Array
+    rotation: Array
+    color: Color
+    opacity: float = 1.0
+    veiled: float = 0.0
+    group: int = 0
+    vertices: Array | None = None
+    aside: bool = False
+
+    def extent(self, along: Array) -> float:
+        """Return how far it extends from its position in the direction `along`, a unit vector (3,), in m."""
+        x, y, z = along @ self.rotation
+        if self.kind == "sphere":
+            return self.size[0]
+        if self.kind == "box":
+            return 0.5 * float(np.abs(np.array([x, y, z])) @ np.array(self.size))
+        if self.kind == "convex":
+            assert self.vertices is not None
+            return float((self.vertices @ np.array([x, y, z])).max())
+        radius, height = self.size
+        return radius * (1.0 if self.kind == "capsule" else float(np.hypot(x, y))) + 0.5 * height * abs(float(z))
+
+
+def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, group: int = 0) -> Solid:
+    """Return a sphere at a position (3,) m."""
+    return Solid("sphere", (radius,), position, np.eye(3), color, veiled=veiled, group=group)
+
+
+def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 0.0, group: int = 0) -> list[Solid]:
+    """Return a round line through points (P, 3) m, with a colour for each of its P - 1 pieces."""
+    pieces = []
+    for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
+        length = float(np.linalg.norm(end - start))
+        rotation = _rotation_with_z((end - start) / length) if length > 0.0 else np.eye(3)
+        pieces.append(Solid("capsule", (radius, length), 0.5 * (start + end), rotation, color, veiled=veiled, group=group))
+    return pieces
+
+
+def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
+    """Return the solid shapes of a robot in one pose, a group a link; parts that are not in `bright` are pale, none if it is None."""
+    shapes, parts = pose.robot.shapes, list(pose.robot.parts)
+    vivid = set(parts if bright is None else bright)
+    found = []
+    for shape in shapes:
+        if shape.role == "solid":
+            link = pose.transforms[shape.link]
+            color = _part_color(parts.index(shape.part) if shape.part in parts else 0, shape.part in vivid)
+            position, rotation = link[:3, :3] @ shape.position + link[:3, 3], link[:3, :3] @ shape.rotation
+            found.append(Solid(shape.kind, shape.size, position, rotation, color, group=shape.link, vertices=shape.vertices))
+    return found
+
+
+def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
+    """Return world objects in the colours of their roles; ghosts are transparent."""
+    found = []
+    for number, item in enumerate(objects.values()):
+        red, green, blue, given = (channel / 255.0 for channel in palette.of_object(item.kind, item.role, item.color))
+        opacity = min(given, GHOST_OPACITY) if item.role == "ghost" else given
+        frame, aside = (item.position, item.rotation), item.role != "target"
+        group = FIRST_OBJECT_GROUP + number
+        found.append(Solid(item.kind, item.size, *frame, (red, green, blue), opacity, group=group, aside=aside))
+    return found
+
+
+def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
+    """Return the path of a marker through points (P, 3) m: a line that is brighter towards its end, with a ball at the last point."""
+    path = _thinned(points)
+    shares = np.linspace(0.0, 1.0, max(len(path) - 1, 1))[:, None]
+    colors = [(float(r), float(g), float(b)) for r, g, b in (1.0 - shares) * OLD + shares * NEW]
+    line = tube(path, TRAIL_RADIUS, colors[: len(path) - 1], TRAIL_VEIL, group)
+    return [*line, ball(path[-1], TIP_RADIUS, colors[-1], TRAIL_VEIL, group)]
+
+
+def focus(solids: Sequence[Solid]) -> list[Solid]:
+    """Return the solids that a picture's frame must hold: all but world objects that are no targets."""
+    return [solid for solid in solids if not solid.aside]
+
+
+def lowest(solids: Sequence[Solid]) -> float:
+    """Return the height of the lowest point of the solids, m: where the floor is drawn."""
+    down = np.array([0.0, 0.0, -1.0])
+    return min(float(solid.position[2]) - solid.extent(down) for solid in solids)
+
+
+def packed(solids: Sequence[Solid]) -> tuple[NDArray[np.void], list[Array]]:
+    """Return solids as the rows that the core reads (N,) CONVEX, and the arrays that must be kept alive as long as these."""
+    table, kept = np.zeros(len(solids), CONVEX), []
+    for row, solid in zip(table, solids, strict=True):
+        row["center"], row["rotation"], row["kind"] = solid.position, solid.rotation, KINDS.index(solid.kind)
+        if solid.kind == "convex":
+            assert solid.vertices is not None
+            planes = _planes(solid.vertices.tobytes())
+            kept.append(planes)
+            row["planes"], row["count"] = planes.ctypes.data, len(planes)
+            row["bound"] = np.linalg.norm(solid.vertices, axis=1).max()
+        elif solid.kind == "box":
+            row["half"] = 0.5 * np.array(solid.size)
+            row["bound"] = np.linalg.norm(row["half"])
+        else:
+            radius, half_height = solid.size[0], 0.5 * solid.size[1] if len(solid.size) > 1 else 0.0
+            row["half"] = radius, half_height, 0.0
+            row["bound"] = np.hypot(radius, half_height) if solid.kind == "cylinder" else radius + half_height
+    return table, kept
+
+
+@lru_cache(maxsize=256)
+def _planes(vertices: bytes) -> Array:
+    """The outward unit normals and offsets (F, 4) of the faces of a hull, of whose vertices (V, 3) these are the bytes."""
+    corners = facets(np.frombuffer(vertices).reshape(-1, 3))
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.column_stack([normals, (normals * corners[:, 0]).sum(axis=1)])
+
+
+def _rotation_with_z(z: Array) -> Array:
+    """Some rotation (3, 3) that has this unit vector as its z axis."""
+    other = np.zeros(3)
+    other[np.abs(z).argmin()] = 1.0
+    x = np.cross(other, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _thinned(points: Array) -> Array:
+    """The points without those nearer than the shortest piece to the one before; the last one stays."""
+    kept = [points[0]]
+    for point in points[1:]:
+        if np.linalg.norm(point - kept[-1]) >= SHORTEST_PIECE:
+            kept.append(point)
+    if np.any(kept[-1] != points[-1]):
+        kept.append(points[-1])
+    return np.array(kept)
+
+
+def _part_color(number: int, vivid: bool) -> Color:
+    white = 0.0 if vivid else PALENESS
+    red, green, blue = (white + (1.0 - white) * channel / 255.0 for channel in palette.SOLIDS[number % len(palette.SOLIDS)])
+    return red, green, blue
