@@ -20,6 +20,7 @@ from contextlib import contextmanager
 import numpy as np
 
 import mobee
+import mobee_system  # noqa: F401  (puts the packages of the live system on the path)
 from bus_schema import keys
 from bus_schema.messages import State
 from services.common.config import ServiceConfig
@@ -39,7 +40,7 @@ def own_system() -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
         probe.close()
-        launch = [sys.executable, "-m", "mobee_cli", "launch", "kinematic", "--headless", "--duration", "60"]
+        launch = [sys.executable, "-m", "mobee_system", "launch", "kinematic", "--headless", "--duration", "60"]
         process = subprocess.Popen([*launch, "--endpoint", endpoint, "--runs", runs], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             yield endpoint

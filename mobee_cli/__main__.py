@@ -33,6 +33,9 @@ VERBS = {
     "view": "a robot's file as a picture that moves",
 }
 
+EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "icub_models": "sim"}
+"""Packages that some verbs import, and the extra of this project that installs each."""
+
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: threads only wait for each other
 
 
@@ -82,6 +85,11 @@ def _run(verb: str, arguments: list[str]) -> int:
     except UserError as error:
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return error.code
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        print(f'mobee {verb}: needs {error.name}, which is not installed: pip install "mobee[{EXTRAS[error.name]}]"', file=sys.stderr)
+        return ENVIRONMENT
     except Exception as error:
         if not _is_not_installed(error):
             raise

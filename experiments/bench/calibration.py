@@ -199,7 +199,7 @@ def _newest(received: bytes, before: int) -> int:
 
 
 def _helper(gets: socket.socket, puts: socket.socket) -> subprocess.Popen[bytes]:
-    argv = [sys.executable, "-m", "experiments.bench.calibration", str(gets.fileno()), str(puts.fileno())]
+    argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.calibration", str(gets.fileno()), str(puts.fileno())]
     return subprocess.Popen(argv, pass_fds=(gets.fileno(), puts.fileno()))
 
 

@@ -138,7 +138,8 @@ def _name(words: list[str]) -> str:
     """Of a service by its command: its module, or its settings' name where several share one."""
     if "--config" in words:
         return Path(words[words.index("--config") + 1]).stem
-    return words[words.index("-m") + 1] if "-m" in words else words[0]
+    modules = [word for word in words[words.index("-m") + 1 :] if word != "mobee_system.run"] if "-m" in words else words
+    return modules[0]
 
 
 def report(result: Mapping[str, Any]) -> str:

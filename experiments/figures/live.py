@@ -112,7 +112,7 @@ def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
     """A system of its own on free ports, stopped as by Ctrl-C afterwards; the address of its page."""
     router, web, grpc = free_ports(3)
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
+        command = [sys.executable, "-m", "mobee_system", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
         for setting in (f"services.monitor.web_port={web}", f"services.monitor.grpc_port={grpc}", *settings):
             command += ["--set", setting]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True) as launcher:

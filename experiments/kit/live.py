@@ -45,7 +45,7 @@ def summary_of(
     `watch` is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
+        argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
         argv += ["--runs", str(runs or scratch)]
         argv += [] if duration is None else ["--duration", str(duration)]
         argv += [] if ticks is None else ["--ticks", str(ticks)]

@@ -24,8 +24,13 @@ from mobee.robot.xml.node import VERSION
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
 HEADING = """
 iCub v2.5 upper body, 41 motors. Written by experiments/robots/write_icub.py; do not edit by hand.
-Kinematics and solids derive from robotology/icub-models (Istituto Italiano di Tecnologia), licence CC BY-SA 4.0;
-this file is distributed under the same licence. Origin of every number: README.md beside this file.
+SPDX-FileCopyrightText: Istituto Italiano di Tecnologia
+SPDX-FileCopyrightText: The MoBeE developers
+SPDX-License-Identifier: CC-BY-SA-4.0
+Kinematics, solids and masses derive from icub-models 3.2.0 (https://github.com/robotology/icub-models), (c) Istituto Italiano di
+Tecnologia, CC BY-SA 4.0 (https://creativecommons.org/licenses/by-sa/4.0/); this file is distributed under the same licence.
+Changed: zero-position form; boxes and capsules instead of meshes; added fields, motors, limits, couplings, constraints, markers.
+Origin of every number: README.md beside this file.
 """
 # A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
 ANCHORS = {

@@ -14,9 +14,11 @@ import msgspec
 from msgspec import Meta, Struct
 
 from mobee.errors import InvalidValue
+from mobee.model.world import World
 from mobee.robot.robot import Robot
 from services.common.exit_codes import BAD_INPUT
 from services.common.session import DEFAULT_ENDPOINT, NAMESPACE
+from services.common.worlds import world_around
 
 _C = TypeVar("_C", bound=Struct)
 _KEY = re.compile("[a-z0-9_]+")
@@ -53,6 +55,17 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                     f"part {part!r} of {robot.name!r} cannot be used live, because its name stands in keys on the bus, which have a-z, 0-9 "
                     "and _ only: rename the part (bodypart of an XML file, group of an SRDF)."
                 )
+
+
+class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
+    """Settings of a service that has a world of its own."""
+
+    world: str = ""
+    """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
+
+    def load_world(self) -> World:
+        """A new world as it is at the start; raises MobeeError for a name or file that cannot be read."""
+        return world_around(self.world, self.robot)
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:

@@ -10,22 +10,10 @@ import numpy as np
 from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.robot.robot import Robot
-from services.common.config import ServiceConfig
 
 NO_WORLD = "none"  # the word for a world without objects
 TABLE = "table"
 AT_TABLE = ("icub", "icub_2014", "icub_katana")  # shipped robots whose experiments take place at the table
-
-
-class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings of a service that has a world of its own."""
-
-    world: str = ""
-    """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
-
-    def load_world(self) -> World:
-        """A new world as it is at the start; raises MobeeError for a name or file that cannot be read."""
-        return world_around(self.world, self.robot)
 
 
 def effective_world(given: str | None, robot: str | Path) -> str:

@@ -12,7 +12,7 @@ AGENT = "agent_"
 class Entry:
     """What the launcher knows of a service before it reads its settings."""
 
-    module: str  # run with `python -m`
+    module: str  # run with `python -m mobee_system.run`
     config: str  # its configuration: module:class
     stage: int  # services are listed in this order, and stopped in the opposite one
     after: tuple[str, ...] = ()  # who must be ready before it joins them

@@ -242,7 +242,7 @@ def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
     return [
         Program(
             who=part.who,
-            argv=(sys.executable, "-m", part.entry.module, "--config", str(directory / f"{part.who}.toml")),
+            argv=(sys.executable, "-m", "mobee_system.run", part.entry.module, "--config", str(directory / f"{part.who}.toml")),
             log=directory / "logs" / f"{part.who}.log",
             stage=part.entry.stage,
             after=part.entry.after,

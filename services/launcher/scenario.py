@@ -12,8 +12,8 @@ from typing import Any
 
 from msgspec import Struct, structs, to_builtins
 
-from services.common.config import ConfigError, ServiceConfig, convert, line_of, nearest
-from services.common.worlds import WorldConfig, effective_world
+from services.common.config import ConfigError, ServiceConfig, WorldConfig, convert, line_of, nearest
+from services.common.worlds import effective_world
 from services.launcher.catalogue import NAMES, Entry, entry_of
 
 SHIPPED = Path(__file__).parent / "scenarios"

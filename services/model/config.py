@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from services.common.worlds import WorldConfig
+from services.common.config import WorldConfig
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):

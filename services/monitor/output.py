@@ -77,7 +77,8 @@ def _start_page(config: Config, folder: str) -> subprocess.Popen[bytes]:
     for name, port in (("web_port", config.web_port), ("grpc_port", config.grpc_port)):
         _require_free(config, name, port)
     words = [str(os.getpid()), config.bind, str(config.web_port), str(config.grpc_port), config.memory_limit]
-    page = subprocess.Popen([sys.executable, "-m", "services.monitor.page", *words], stdin=subprocess.DEVNULL, env=_private(folder))
+    command = [sys.executable, "-m", "mobee_system.run", "services.monitor.page", *words]
+    page = subprocess.Popen(command, stdin=subprocess.DEVNULL, env=_private(folder))
     give_up = time.monotonic() + START
     while not all(_answers(port) for port in (config.web_port, config.grpc_port)):
         if page.poll() is not None or time.monotonic() > give_up:

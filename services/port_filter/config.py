@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from mobee.control.reflex import ReflexSettings
-from services.common.worlds import WorldConfig
+from services.common.config import WorldConfig
 
 _SETTINGS = ReflexSettings()
 Seconds = Annotated[float, Meta(ge=0, le=60)]

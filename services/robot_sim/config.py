@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
-from services.common.worlds import WorldConfig
+from services.common.config import WorldConfig
 from services.robot_sim.kinematic import require_simulated
 
 NotNegative = Annotated[float, Meta(ge=0)]

@@ -7,8 +7,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from mobee.robot.robot import Robot
+from services.common.config import WorldConfig
 from services.common.eyes import require_eyes
-from services.common.worlds import WorldConfig
 
 
 class RendererConfig(WorldConfig, frozen=True, kw_only=True):

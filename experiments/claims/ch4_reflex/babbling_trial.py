@@ -116,7 +116,7 @@ def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show
 @contextmanager
 def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """`mobee launch` at an endpoint of its own; it must end without fault, and is stopped when anything is raised."""
-    argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--headless", "--json"]
+    argv = [sys.executable, "-m", "mobee_system", "launch", str(file), "--headless", "--json"]
     argv += ["--endpoint", free_endpoint(), "--runs", str(folder / "launch")]
     with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
         # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.

@@ -1,0 +1,31 @@
+"""The place of the packages `services`, `bus_schema`, `experiments` and `mobee_cli`, which make the live system and the command `mobee`.
+
+A wheel installs these four packages inside this folder, so that site-packages holds no package of such a general name as `services`.
+In a clone of the repository they stand beside this folder.  Importing this module puts their place first in `sys.path`; after that,
+`import services` finds MoBeE's package, also where the working directory has a folder of that name.  A script of yours that uses the
+bus begins with::
+
+    import mobee_system
+    from services.common.service import Service
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+PACKAGES = ("services", "bus_schema", "experiments", "mobee_cli")
+
+_HERE = Path(__file__).parent
+FOLDER = _HERE if (_HERE / PACKAGES[0]).is_dir() else _HERE.parent
+"""The folder that holds the four packages."""
+
+if sys.path[:1] != [str(FOLDER)]:
+    sys.path.insert(0, str(FOLDER))
+
+
+def main() -> int:
+    """Run the command `mobee`; return its exit code."""
+    from mobee_cli.__main__ import main as run_command
+
+    return run_command()

@@ -1,0 +1,21 @@
+"""Run a module of the system: `python -m mobee_system.run services.model --help`.
+
+As `python -m services.model --help`, but it also works in a folder that has a package `services` of its own.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+
+
+def main() -> None:
+    """Run the module that the first argument names as `__main__`, with the arguments that follow."""
+    if len(sys.argv) < 2:
+        sys.exit("usage: python -m mobee_system.run MODULE [arguments]")
+    del sys.argv[0]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    main()
