@@ -11,7 +11,7 @@ from typing import Any
 
 from experiments.kit.claims import LEAST_SEEDS, Claim, open_with_few_seeds
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
-from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, load_experiment
+from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue
 
 HERE = Path(__file__).parent
@@ -39,9 +39,9 @@ this machine alone if there is none; MoBeE must be installed on each of them in 
 **confirmed**: our number is what was published. **refuted**: it is not. **open**: it was not measured, does not decide, or rests on
 fewer than {LEAST_SEEDS} seeds.
 
-Where states have 16 neighbours, many samples are equally far, and which become neighbours is drawn. In coverage and connectivity each
-seed draws its own graph. Everywhere else all seeds share one (tie seed 0): there the intervals cover noise, starts and ties of
-choice, not the draw of the graph, and what the numbers say may be a property of that graph.
+Where states have 16 neighbours, many samples are equally far, and which become neighbours is drawn. In exploration-coverage and
+neighbour-count each seed draws its own graph. Everywhere else all seeds share one (tie seed 0): there the intervals cover noise,
+starts and ties of choice, not the draw of the graph, and what the numbers say may be a property of that graph.
 """
 
 
@@ -53,7 +53,7 @@ def stated() -> Rows:
 
 def recorded() -> Recorded:
     """What the page was last written from."""
-    return read(RECORD) if RECORD.exists() else {}
+    return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
 def rows(record: Mapping[str, Mapping[str, Any]]) -> Rows:
@@ -78,7 +78,7 @@ def found_in(folders: Sequence[Path]) -> Recorded:
             if claims:
                 run = folder if (folder / VERSIONS).exists() else folder.parent  # a part of chapter7 has it in the whole's folder
                 seeds, commit = config["options"].get("seeds"), read(run / VERSIONS).get("commit")
-                found = better(found, {config["experiment"]: {"seeds": seeds, "commit": commit, "claims": claims}})
+                found = better(found, {current_name(config["experiment"]): {"seeds": seeds, "commit": commit, "claims": claims}})
     return found
 
 
@@ -91,7 +91,7 @@ def better(before: Recorded, after: Recorded) -> Recorded:
 def finished_runs(runs: Path) -> list[Path]:
     """The runs that are finished, at least in part, and no --quick ones, the oldest first."""
     folders = sorted({path.parent for path in runs.glob(f"*/{CONFIG}")}, key=lambda folder: folder.name)
-    return [folder for folder in folders if read(folder / CONFIG).get("experiment") in EXPERIMENTS and _counts(folder)]
+    return [folder for folder in folders if current_name(read(folder / CONFIG).get("experiment", "")) in EXPERIMENTS and _counts(folder)]
 
 
 def _counts(run: Path) -> bool:

@@ -9,67 +9,110 @@ from experiments.kit.experiment import Experiment, Steps
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
-    "accuracy": "experiments.claims.ch7_learning.accuracy",
     "babbling": "experiments.claims.ch4_reflex.babbling",
-    "change": "experiments.claims.ch7_learning.change",
+    "changed-outcomes": "experiments.claims.ch7_learning.changed_outcomes",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
-    "clauses": "experiments.claims.ch5_control.clauses",
-    "connectivity": "experiments.claims.ch7_learning.connectivity",
-    "coverage": "experiments.claims.ch7_learning.coverage",
-    "decay": "experiments.claims.ch7_learning.decay",
-    "either-alone": "experiments.claims.ch8_reaching.either_alone",
-    "flood": "experiments.claims.ch2_model.flood",
-    "graze": "experiments.claims.ch4_reflex.graze",
-    "hypercube": "experiments.claims.ch7_learning.hypercube",
-    "identify": "experiments.claims.ch5_control.identify",
-    "kail": "experiments.claims.ch7_learning.kail",
-    "lattice": "experiments.claims.ch7_learning.lattice",
+    "constraint-discovery": "experiments.claims.ch7_learning.constraint_discovery",
+    "constraint-violations": "experiments.claims.ch5_control.constraint_violations",
+    "exploration-coverage": "experiments.claims.ch7_learning.exploration_coverage",
+    "exploration-uniformity": "experiments.claims.ch7_learning.exploration_uniformity",
+    "forced-contact": "experiments.claims.ch5_control.forced_contact",
+    "gain-tuning": "experiments.claims.ch5_control.gain_tuning",
+    "hypercube-exploration": "experiments.claims.ch7_learning.hypercube_exploration",
+    "information-gain": "experiments.claims.ch7_learning.information_gain",
     "live-reach": "experiments.claims.ch8_reaching.live_reach.claim",
-    "live-table": "experiments.claims.ch7_learning.live_table",
+    "live-table-discovery": "experiments.claims.ch7_learning.live_table_discovery",
+    "mdp-planner": "experiments.claims.ch7_learning.mdp_planner",
+    "model-accuracy": "experiments.claims.ch7_learning.model_accuracy",
+    "model-throughput": "experiments.claims.ch2_model.model_throughput",
+    "motor-identification": "experiments.claims.ch5_control.motor_identification",
+    "neighbour-count": "experiments.claims.ch7_learning.neighbour_count",
     "nes": "experiments.claims.ch3_roadmaps.nes",
     "ngik": "experiments.claims.ch3_roadmaps.ngik",
     "originals": "experiments.originals",
     "own-robots": "experiments.own_robots",
-    "planner": "experiments.claims.ch7_learning.planner",
-    "pregrasp": "experiments.claims.ch8_reaching.pregrasp",
+    "planner-reach-ablation": "experiments.claims.ch8_reaching.planner_reach_ablation",
+    "plant-sensitivity": "experiments.claims.ch7_learning.plant_sensitivity",
     "prm-vs-mdp": "experiments.claims.ch8_reaching.prm_vs_mdp",
-    "rank4": "experiments.claims.ch7_learning.rank4",
-    "reach": "experiments.claims.ch8_reaching.reach",
+    "push-disturbance": "experiments.claims.ch5_control.push_disturbance",
+    "reach-exploration": "experiments.claims.ch8_reaching.reach_exploration",
     "reach-predictors": "experiments.claims.ch8_reaching.reach_predictors",
+    "reach-under-model-error": "experiments.claims.ch8_reaching.reach_under_model_error",
     "reach-vs-planners": "experiments.claims.ch8_reaching.reach_vs_planners",
     "replanning": "experiments.claims.ch3_roadmaps.replanning",
+    "reward-decay": "experiments.claims.ch7_learning.reward_decay",
+    "roadmap-density": "experiments.claims.ch8_reaching.roadmap_density",
     "roadmap-from-scratch": "experiments.claims.ch3_roadmaps.roadmap_from_scratch",
-    "sensitivity": "experiments.claims.ch7_learning.sensitivity",
-    "settle": "experiments.claims.ch5_control.settle",
-    "shove": "experiments.claims.ch5_control.shove",
-    "simultaneous": "experiments.claims.ch8_reaching.simultaneous",
-    "table": "experiments.claims.ch7_learning.table",
-    "transfer": "experiments.claims.ch7_learning.transfer",
+    "shallow-contact-recovery": "experiments.claims.ch4_reflex.shallow_contact_recovery",
+    "simulation-transfer": "experiments.claims.ch7_learning.simulation_transfer",
+    "simultaneous-learning": "experiments.claims.ch8_reaching.simultaneous_learning",
+    "step-response": "experiments.claims.ch5_control.step_response",
+    "table-discovery": "experiments.claims.ch7_learning.table_discovery",
     "trm": "experiments.claims.ch3_roadmaps.trm",
-    "tune": "experiments.claims.ch5_control.tune",
-    "uniformity": "experiments.claims.ch7_learning.uniformity",
-    "unmodelled": "experiments.claims.ch8_reaching.unmodelled",
+    "unreachable-states": "experiments.claims.ch7_learning.unreachable_states",
     "urdf-files": "experiments.urdf_files",
-    "wall": "experiments.claims.ch5_control.wall",
+}
+
+FORMER_NAMES = {  # still accepted, and read in the records of older runs
+    "accuracy": "model-accuracy",
+    "change": "changed-outcomes",
+    "clauses": "constraint-violations",
+    "connectivity": "neighbour-count",
+    "coverage": "exploration-coverage",
+    "decay": "reward-decay",
+    "either-alone": "planner-reach-ablation",
+    "flood": "model-throughput",
+    "graze": "shallow-contact-recovery",
+    "hypercube": "hypercube-exploration",
+    "identify": "motor-identification",
+    "kail": "information-gain",
+    "lattice": "constraint-discovery",
+    "live-table": "live-table-discovery",
+    "planner": "mdp-planner",
+    "pregrasp": "roadmap-density",
+    "rank4": "unreachable-states",
+    "reach": "reach-exploration",
+    "sensitivity": "plant-sensitivity",
+    "settle": "step-response",
+    "shove": "push-disturbance",
+    "simultaneous": "simultaneous-learning",
+    "table": "table-discovery",
+    "transfer": "simulation-transfer",
+    "tune": "gain-tuning",
+    "uniformity": "exploration-uniformity",
+    "unmodelled": "reach-under-model-error",
+    "wall": "forced-contact",
 }
 
 CHAPTER7 = (  # what `mobee experiment run chapter7` runs, in this order: thesis chapter 7 and section 3 of the paper
-    "hypercube",
-    "coverage",
-    "lattice",
-    "decay",
-    "uniformity",
-    "kail",
-    "rank4",
-    "change",
-    "table",
-    "planner",
+    "hypercube-exploration",
+    "exploration-coverage",
+    "constraint-discovery",
+    "reward-decay",
+    "exploration-uniformity",
+    "information-gain",
+    "unreachable-states",
+    "changed-outcomes",
+    "table-discovery",
+    "mdp-planner",
 )
-BEYOND = ("accuracy", "connectivity", "prm-vs-mdp", "sensitivity")  # what its --all runs besides: what the works promise, and our own
+BEYOND = ("model-accuracy", "neighbour-count", "prm-vs-mdp", "plant-sensitivity")  # run by its --all too: other claims, and our own studies
+
+
+def current_name(name: str) -> str:
+    """The name of an experiment today, given that or a former one; other names are returned as they are."""
+    return FORMER_NAMES.get(name, name)
+
+
+def all_names(name: str) -> tuple[str, ...]:
+    """The current name of an experiment, then its former ones."""
+    current = current_name(name)
+    return (current, *(former for former, new in FORMER_NAMES.items() if new == current))
 
 
 def load_experiment(name: str) -> Experiment:
-    """The experiment of that name; raises UnknownName with the nearest."""
+    """The experiment of that name, which may be a former one; raises UnknownName with the nearest name."""
+    name = current_name(name)
     if name not in EXPERIMENTS:
         raise UnknownName("experiment", name, EXPERIMENTS)
     module = importlib.import_module(EXPERIMENTS[name])

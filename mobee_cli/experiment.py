@@ -27,7 +27,7 @@ from experiments.kit.run_folder import (
     write,
 )
 from experiments.kit.sweep import CellsFailed
-from experiments.registry import EXPERIMENTS, load_experiment
+from experiments.registry import EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue, MobeeError, NotInstalled
 from mobee_cli.errors import UserError
 from mobee_cli.results_text import results_text
@@ -84,9 +84,11 @@ def _list(arguments: argparse.Namespace) -> int:
         print(json.dumps([{"name": e.name, "claim": e.claim, "source": e.source} for e in found], indent=2))
         return 0
     columns = shutil.get_terminal_size().columns  # 80 in a pipe
+    indent = max(len(experiment.name) for experiment in found) + 1
     for experiment in found:
         text = f"{experiment.claim} ({experiment.source})"
-        print(textwrap.fill(text, columns, initial_indent=f"{experiment.name:<12} ", subsequent_indent=" " * 13, break_on_hyphens=False))
+        head = f"{experiment.name:<{indent}}"
+        print(textwrap.fill(text, columns, initial_indent=head, subsequent_indent=" " * indent, break_on_hyphens=False))
     return 0
 
 
@@ -174,7 +176,7 @@ def _claims(arguments: argparse.Namespace) -> int:
 
 def _figure(arguments: argparse.Namespace) -> int:
     runs, name, folder = arguments.runs, arguments.name, arguments.folder
-    if folder is None and name not in EXPERIMENTS and Path(name).is_dir():
+    if folder is None and current_name(name) not in EXPERIMENTS and Path(name).is_dir():
         name, folder = experiment_of(Path(name)), Path(name)
     experiment = load_experiment(name)
     path = experiment.method.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))

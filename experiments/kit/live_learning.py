@@ -31,7 +31,7 @@ PIECE = 200  # transitions a part of one launch
 _ACTION = 7.0  # s of robot time, a little more than the torso's take on average at the table
 _TRIES = 3  # launches without a single new transition
 
-_SCENARIO = """# Written by the experiment `transfer`.
+_SCENARIO = """# Written by the experiment `simulation-transfer`.
 title = "Learning on {robot}, to be compared with the offline plant"
 
 [shared]

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from experiments.registry import all_names, current_name
 from mobee.errors import InvalidValue
 
 PACKAGES = ("mobee", "numpy", "python-fcl", "mujoco", "matplotlib")
@@ -60,7 +61,7 @@ def _begun(folder: Path) -> tuple[str, dict[str, Any]]:
 def options_of(folder: Path, name: str) -> dict[str, Any]:
     """With what options a run was begun; raises InvalidValue if it is no run of that experiment."""
     begun, options = _begun(folder)
-    if begun != name:
+    if current_name(begun) != current_name(name):
         raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
     return options
 
@@ -92,7 +93,7 @@ def _lock(config: int, folder: Path) -> None:
 
 def newest_run(runs: Path, name: str) -> Path:
     """The folder of the latest run of an experiment; raises InvalidValue if there is none."""
-    runs_of_it = re.compile(rf"(\d{{8}}-\d{{6}})-{re.escape(name)}(?:-(\d+))?")
+    runs_of_it = re.compile(rf"(\d{{8}}-\d{{6}})-(?:{'|'.join(map(re.escape, all_names(name)))})(?:-(\d+))?")
     found = {path.parent: match.groups() for path in runs.glob(f"*/{CONFIG}") if (match := runs_of_it.fullmatch(path.parent.name))}
     if not found:
         raise InvalidValue(f"no run of {name!r} in {runs}: start one with `mobee experiment run {name}`, or name its folder.")

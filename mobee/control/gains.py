@@ -88,7 +88,7 @@ class Gains:
     def default(cls) -> Gains:
         """The thesis' equations with our own tuning: time constant C/K = 0.32 s, contacts held within the fields.
 
-        Tuned by the experiment `tune`, with the lag and delay of the motors and commands up to three ticks old at 100 Hz: with a
+        Tuned by the experiment `gain-tuning`, with the lag and delay of the motors and commands up to three ticks old at 100 Hz: with a
         stiffer contact it begins to oscillate, with stronger springs the fields are left.  The springs of torso and shoulders are
         weaker, for many motors push a hand together.  The contact force is bounded a little above what the springs of an
         arm do together, so that it is stiff where a field begins.

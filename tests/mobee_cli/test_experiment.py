@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.claims.ch2_model import flood
-from experiments.claims.ch7_learning import hypercube
+from experiments.claims.ch2_model import model_throughput
+from experiments.claims.ch7_learning import hypercube_exploration
 from experiments.kit.run_folder import held
 from experiments.registry import EXPERIMENTS
 from mobee.errors import InvalidValue
@@ -33,7 +33,7 @@ def test_list_names_every_experiment_with_its_claim(capsys):
 
 
 def test_a_run_leaves_its_options_versions_records_and_results(tmp_path, capsys):
-    assert main(["experiment", "run", "flood", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"]) == 0
+    assert main(["experiment", "run", "model-throughput", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"]) == 0
     said = capsys.readouterr()
     results = json.loads(said.out)
     folder = Path(results.pop("run"))
@@ -53,11 +53,11 @@ def test_the_help_of_an_experiment_fits_the_terminal(name, capsys):
 
 
 def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path, capsys):
-    main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+    main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
     folder = Path(json.loads(capsys.readouterr().out)["run"])
     before = (folder / "flood.csv").read_bytes()
     with held(folder):
-        assert main(["experiment", "run", "flood", "--resume", str(folder)]) == 2
+        assert main(["experiment", "run", "model-throughput", "--resume", str(folder)]) == 2
     assert "another process is at this run" in capsys.readouterr().err
     assert (folder / "flood.csv").read_bytes() == before
 
@@ -65,18 +65,18 @@ def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path, capsys):
 def test_a_figure_is_drawn_of_the_newest_run(tmp_path, capsys):
     pytest.importorskip("matplotlib")
     for _ in range(2):
-        assert main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path)]) == 0
+        assert main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path)]) == 0
         folder = Path(capsys.readouterr().out.splitlines()[0].partition(": ")[2])
-    assert main(["experiment", "figure", "flood", "--runs", str(tmp_path), "--json"]) == 0
+    assert main(["experiment", "figure", "model-throughput", "--runs", str(tmp_path), "--json"]) == 0
     assert Path(json.loads(capsys.readouterr().out)["figure"]).parent == folder
     assert main(["experiment", "figure", str(folder)]) == 0
     assert Path(capsys.readouterr().out.strip()).parent == folder
 
 
 def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
-    main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+    main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
     folder = json.loads(capsys.readouterr().out)["run"]
-    assert main(["experiment", "run", "flood", "--resume", folder, "--objects", "3", "--json"]) == 0
+    assert main(["experiment", "run", "model-throughput", "--resume", folder, "--objects", "3", "--json"]) == 0
     results = json.loads(capsys.readouterr().out)
     assert results["run"] == folder
     assert set(results) == {"run", "complete", "katana"}
@@ -87,25 +87,25 @@ def test_a_resumed_run_keeps_its_options(tmp_path, capsys):
 def test_a_short_run_is_not_mixed_with_a_whole_one(tmp_path, capsys):
     folder = tmp_path / "20260101-000000-lattice"
     folder.mkdir()
-    (folder / "config.json").write_text(json.dumps({"experiment": "lattice", "options": {"seed": 0, "seeds": 1, "quick": False}}))
-    assert main(["experiment", "run", "lattice", "--resume", str(folder), "--quick"]) == 2
+    (folder / "config.json").write_text(json.dumps({"experiment": "reward-decay", "options": {"seed": 0, "seeds": 1, "quick": False}}))
+    assert main(["experiment", "run", "reward-decay", "--resume", str(folder), "--quick"]) == 2
     assert "was begun without --quick" in capsys.readouterr().err
 
 
 def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):
-    main(["experiment", "run", "flood", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"])
+    main(["experiment", "run", "model-throughput", *QUICK, "--seed", "3", "--runs", str(tmp_path), "--json"])
     folder = json.loads(capsys.readouterr().out)["run"]
-    assert main(["experiment", "run", "flood", "--resume", folder, "--seed", "4"]) == 2
+    assert main(["experiment", "run", "model-throughput", "--resume", folder, "--seed", "4"]) == 2
     assert f"{folder} has seed 3, not 4" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["run", "flod"], "Did you mean 'flood'"),
-        (["figure", "flood", "--runs", "nowhere"], "no run of 'flood'"),
-        (["figure", "flood", "nope", "--runs", "nowhere"], "nope: there is no such folder"),
-        (["run", "flood", "--resume", "nowhere"], "not the folder of a run"),
+        (["run", "model-troughput"], "Did you mean 'model-throughput'"),
+        (["figure", "model-throughput", "--runs", "nowhere"], "no run of 'model-throughput'"),
+        (["figure", "model-throughput", "nope", "--runs", "nowhere"], "nope: there is no such folder"),
+        (["run", "model-throughput", "--resume", "nowhere"], "not the folder of a run"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(arguments, says, capsys):
@@ -118,27 +118,29 @@ def test_what_cannot_be_done_is_said_in_one_line(arguments, says, capsys):
 @pytest.mark.parametrize("option", [["--objects", "0"], ["--edits", "many"], ["--duration", "nan"], ["--robots", "nao"], ["--objcts", "3"]])
 def test_a_wrong_option_of_an_experiment_is_said_in_one_line(option, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["experiment", "run", "flood", *option])
+        main(["experiment", "run", "model-throughput", *option])
     assert ended.value.code == 2
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1
-    assert said.startswith("mobee experiment run flood")
+    assert said.startswith("mobee experiment run model-throughput")
 
 
 def set_run(monkeypatch, run):
-    """Make this the `run` of the experiment flood."""
-    monkeypatch.setattr(flood, "EXPERIMENT", replace(flood.EXPERIMENT, method=replace(flood.EXPERIMENT.method, run=run)))
+    """Make this the `run` of the experiment model-throughput."""
+    monkeypatch.setattr(
+        model_throughput, "EXPERIMENT", replace(model_throughput.EXPERIMENT, method=replace(model_throughput.EXPERIMENT.method, run=run))
+    )
 
 
 def test_a_failed_verdict_fails_the_command(tmp_path, monkeypatch, capsys):
     set_run(monkeypatch, lambda arguments, folder: {"passed": False, "torn": {"rows": 3}})
-    assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 1
+    assert main(["experiment", "run", "model-throughput", "--runs", str(tmp_path)]) == 1
     assert "torn:\n  rows: 3\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("option", "says"), [("--motors=l_elbo", "Did you mean 'l_elbow'"), ("--periods=40", "tick of 0.04 s")])
 def test_a_refused_run_leaves_no_folder(option, says, tmp_path, capsys):
-    assert main(["experiment", "run", "settle", option, "--postures", "1", "--runs", str(tmp_path)]) == 2
+    assert main(["experiment", "run", "step-response", option, "--postures", "1", "--runs", str(tmp_path)]) == 2
     assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -149,13 +151,13 @@ def test_a_run_refused_after_its_first_record_keeps_it(tmp_path, monkeypatch):
         raise InvalidValue("no more")
 
     set_run(monkeypatch, refuse)
-    assert main(["experiment", "run", "flood", "--runs", str(tmp_path)]) == 2
+    assert main(["experiment", "run", "model-throughput", "--runs", str(tmp_path)]) == 2
     (folder,) = tmp_path.iterdir()
     assert (folder / "records.csv").read_text() == "depth\n1.0\n"
 
 
 def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
-    argv = [sys.executable, "-m", "mobee_cli", "experiment", "run", "flood", "--robots", "katana", "--runs", str(tmp_path)]
+    argv = [sys.executable, "-m", "mobee_cli", "experiment", "run", "model-throughput", "--robots", "katana", "--runs", str(tmp_path)]
     with subprocess.Popen(argv, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         give_up = time.monotonic() + 120.0
         while not any(len(path.read_text().splitlines()) > 4 for path in tmp_path.glob("*/flood.csv")):
@@ -173,9 +175,9 @@ def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
 
 def test_resume_without_a_name_goes_on_with_the_newest_run(tmp_path, capsys):
     for _ in range(2):
-        main(["experiment", "run", "flood", *QUICK, "--runs", str(tmp_path), "--json"])
+        main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
         newest = json.loads(capsys.readouterr().out)["run"]
-    assert main(["experiment", "run", "flood", "--runs", str(tmp_path), "--resume", "--json"]) == 0
+    assert main(["experiment", "run", "model-throughput", "--runs", str(tmp_path), "--resume", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["run"] == newest
 
 
@@ -193,8 +195,8 @@ def test_cells_that_fail_fail_the_command_and_are_named(tmp_path, capsys, monkey
     def broken(settings, seed):
         raise ValueError("broken")
 
-    failing = replace(hypercube.EXPERIMENT, method=replace(hypercube.EXPERIMENT.method, trial=broken))
-    monkeypatch.setattr(hypercube, "EXPERIMENT", failing)
-    assert main(["experiment", "run", "hypercube", "--seeds", "1", "--jobs", "1", "--runs", str(tmp_path)]) == 1
+    failing = replace(hypercube_exploration.EXPERIMENT, method=replace(hypercube_exploration.EXPERIMENT.method, trial=broken))
+    monkeypatch.setattr(hypercube_exploration, "EXPERIMENT", failing)
+    assert main(["experiment", "run", "hypercube-exploration", "--seeds", "1", "--jobs", "1", "--runs", str(tmp_path)]) == 1
     said = capsys.readouterr().err
     assert "g0.9-s0: ValueError: broken" in said and "--resume" in said

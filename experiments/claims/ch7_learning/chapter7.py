@@ -24,7 +24,7 @@ from experiments.kit.options import positive_whole
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.run_folder import CONFIG, RESULTS, read, write
 from experiments.kit.sweep import ENGINES
-from experiments.registry import BEYOND, CHAPTER7, load_experiment
+from experiments.registry import BEYOND, CHAPTER7, all_names, current_name, load_experiment
 from mobee.errors import MobeeError, UnknownName
 
 _COMMON = ("seeds", "jobs", "engine", "quick")  # options that are handed on
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Run what has no results yet, and draw it."""
     every = (*CHAPTER7, *BEYOND)
-    names = arguments.only or (every if arguments.all else CHAPTER7)
+    names = [current_name(name) for name in arguments.only or (every if arguments.all else CHAPTER7)]
     for name in names:
         if name not in every:
             raise UnknownName("experiment of chapter 7", name, every)
@@ -67,7 +67,8 @@ def figure(folder: Path) -> Path:
 
 def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """One experiment in its own folder: how long it took in all, its figure, or why it failed."""
-    place, start = folder / name, time.monotonic()
+    begun = [folder / one for one in all_names(name) if (folder / one).exists()]  # an older run has it under its former name
+    place, start = begun[0] if begun else folder / name, time.monotonic()
     place.mkdir(exist_ok=True)
     try:
         options = options_of_part(name, arguments)

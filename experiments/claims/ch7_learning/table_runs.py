@@ -84,7 +84,7 @@ def is_forward(q: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of three agents; see the trial of `table`."""
+    """One run of three agents; see the trial of `table-discovery`."""
 
     result: CellResult
 

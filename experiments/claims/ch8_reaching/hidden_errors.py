@@ -1,4 +1,4 @@
-"""An arm and its workspace, with the errors and the ball that are hidden from planners, or from everyone (experiment `unmodelled`)."""
+"""An arm and its workspace, with the errors and the ball that are hidden from planners, or from all (`reach-under-model-error`)."""
 
 from __future__ import annotations
 

@@ -5,10 +5,11 @@ after 400 and .97 after 1600, and .80 on targets never tried after 800; the publ
 Source: aims of this reproduction, to thesis 8.5 and 9.4.4 ("a more powerful function approximator").  Published: no numbers.
 Run time: 20 minutes on 2 cores.
 
-The arm, its targets and its evaluations are those of `reach`; all learners have the same seeds, problems and transition models.  The oracle
-plans as they do, but knows the mean reward of every reach and which transitions a target blocks, both measured by 5 tries of each
-on the plant (truth.npz in the run's folder).  Fractions are of the oracle's mean score over all seeds, so that they can exceed 1 by chance.
-Targets never tried: the middles of the grid's eight cells.  "spread", "local", "alike": how failed transitions are remembered.
+The arm, its targets and its evaluations are those of `reach-exploration`; all learners have the same seeds, problems and
+transition models.  The oracle plans as they do, but knows the mean reward of every reach and which transitions a target blocks,
+both measured by 5 tries of each on the plant (truth.npz in the run's folder).  Fractions are of the oracle's mean score over all
+seeds, so that they can exceed 1 by chance. Targets never tried: the middles of the grid's eight cells.  "spread", "local",
+"alike": how failed transitions are remembered.
 """
 
 from __future__ import annotations

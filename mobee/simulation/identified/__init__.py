@@ -1,4 +1,4 @@
-"""Motor models fitted to the responses of a robot, one TOML file a robot; `mobee experiment run identify` makes them."""
+"""Motor models fitted to the responses of a robot, one TOML file a robot; `mobee experiment run motor-identification` makes them."""
 
 from __future__ import annotations
 

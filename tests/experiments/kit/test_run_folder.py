@@ -9,41 +9,47 @@ from experiments.kit.run_folder import given_run, held, new_run, newest_run, opt
 
 
 def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
-    folder = new_run(tmp_path / "runs", "flood", {"objects": 3, "seed": 7})
-    assert options_of(folder, "flood") == {"objects": 3, "seed": 7}
+    folder = new_run(tmp_path / "runs", "model-throughput", {"objects": 3, "seed": 7})
+    assert options_of(folder, "model-throughput") == {"objects": 3, "seed": 7}
     versions = json.loads((folder / "versions.json").read_text())
     assert {"mobee", "numpy"} <= set(versions["packages"])
     assert {"python", "platform", "commit", "begun"} <= set(versions)
 
 
 def test_two_runs_in_one_second_get_two_folders_and_the_newest_is_found(tmp_path):
-    folders = [new_run(tmp_path, "flood", {}) for _ in range(12)]
+    folders = [new_run(tmp_path, "model-throughput", {}) for _ in range(12)]
     assert len(set(folders)) == 12
     new_run(tmp_path, "floods", {})
-    assert newest_run(tmp_path, "flood") == folders[-1]
+    assert newest_run(tmp_path, "model-throughput") == folders[-1]
 
 
 def test_what_is_no_run_is_refused(tmp_path):
-    with pytest.raises(mobee.InvalidValue, match="no run of 'flood'.*mobee experiment run flood"):
-        newest_run(tmp_path, "flood")
+    with pytest.raises(mobee.InvalidValue, match="no run of 'model-throughput'.*mobee experiment run model-throughput"):
+        newest_run(tmp_path, "model-throughput")
     with pytest.raises(mobee.InvalidValue, match="not the folder of a run"):
-        options_of(tmp_path, "flood")
-    with pytest.raises(mobee.InvalidValue, match="run of 'flood', not of 'press'"):
-        options_of(new_run(tmp_path, "flood", {}), "press")
+        options_of(tmp_path, "model-throughput")
+    with pytest.raises(mobee.InvalidValue, match="run of 'model-throughput', not of 'press'"):
+        options_of(new_run(tmp_path, "model-throughput", {}), "press")
 
 
 def test_a_folder_that_is_not_there_is_answered_with_the_newest(tmp_path):
-    with pytest.raises(mobee.InvalidValue, match="nope: there is no such folder; no run of 'flood'"):
-        given_run(tmp_path / "nope", tmp_path, "flood")
-    folder = new_run(tmp_path, "flood", {})
-    assert given_run(folder, tmp_path, "flood") == folder
-    with pytest.raises(mobee.InvalidValue, match=f"there is no such folder. The newest run of 'flood' is {folder}"):
-        given_run(tmp_path / "nope", tmp_path, "flood")
+    with pytest.raises(mobee.InvalidValue, match="nope: there is no such folder; no run of 'model-throughput'"):
+        given_run(tmp_path / "nope", tmp_path, "model-throughput")
+    folder = new_run(tmp_path, "model-throughput", {})
+    assert given_run(folder, tmp_path, "model-throughput") == folder
+    with pytest.raises(mobee.InvalidValue, match=f"there is no such folder. The newest run of 'model-throughput' is {folder}"):
+        given_run(tmp_path / "nope", tmp_path, "model-throughput")
 
 
 def test_a_run_belongs_to_one_process_at_a_time(tmp_path):
-    folder = new_run(tmp_path, "flood", {})
+    folder = new_run(tmp_path, "model-throughput", {})
     with held(folder), pytest.raises(mobee.InvalidValue, match="another process is at this run. Wait until it ends"), held(folder):
         pytest.fail("two hold one run")
     with held(folder):
-        assert options_of(folder, "flood") == {}
+        assert options_of(folder, "model-throughput") == {}
+
+
+def test_a_run_is_found_under_the_former_name_of_its_experiment(tmp_path):
+    folder = new_run(tmp_path, "flood", {"seed": 7})
+    assert newest_run(tmp_path, "model-throughput") == newest_run(tmp_path, "flood") == folder
+    assert options_of(folder, "model-throughput") == {"seed": 7}

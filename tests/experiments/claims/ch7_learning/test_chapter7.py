@@ -44,9 +44,9 @@ def toys(monkeypatch):
         return folder / "toy.png"
 
     broken: dict[str, Exception] = {}
-    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube", "coverage"))
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration", "exploration-coverage"))
     monkeypatch.setattr(chapter7, "BEYOND", ())
-    for name in ("hypercube", "coverage"):
+    for name in ("hypercube-exploration", "exploration-coverage"):
         toy = SimpleNamespace(EXPERIMENT=Experiment(name, "it works", "thesis 7", "", Steps(sweep_arguments, run(name), figure)))
         monkeypatch.setitem(EXPERIMENTS, name, f"toy_{name}")
         monkeypatch.setitem(sys.modules, f"toy_{name}", toy)
@@ -62,16 +62,19 @@ def test_a_part_needs_no_option(name):
 def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys):
     folder = new_run(tmp_path, "chapter7", {})
     results = chapter7.run(options("--seed", "3"), folder)
-    assert toys.calls == [("hypercube", 10, 3, False), ("coverage", 10, 3, False)]
-    assert results["passed"] and results["parts"]["coverage"]["figure"] == "coverage/toy.png"
-    assert json.loads((folder / "hypercube" / "results.json").read_text())["answer"] == 42
-    config = json.loads((folder / "hypercube" / "config.json").read_text())
-    assert config == {"experiment": "hypercube", "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3}}
+    assert toys.calls == [("hypercube-exploration", 10, 3, False), ("exploration-coverage", 10, 3, False)]
+    assert results["passed"] and results["parts"]["exploration-coverage"]["figure"] == "exploration-coverage/toy.png"
+    assert json.loads((folder / "hypercube-exploration" / "results.json").read_text())["answer"] == 42
+    config = json.loads((folder / "hypercube-exploration" / "config.json").read_text())
+    assert config == {
+        "experiment": "hypercube-exploration",
+        "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3},
+    }
 
 
 def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
-    chapter7.run(options("--seeds", "2", "--quick", "--only", "coverage"), new_run(tmp_path, "chapter7", {}))
-    assert toys.calls == [("coverage", 2, 0, True)]
+    chapter7.run(options("--seeds", "2", "--quick", "--only", "exploration-coverage"), new_run(tmp_path, "chapter7", {}))
+    assert toys.calls == [("exploration-coverage", 2, 0, True)]
 
 
 @pytest.mark.parametrize(
@@ -80,38 +83,38 @@ def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
 )
 def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, told):
     folder = new_run(tmp_path, "chapter7", {})
-    toys.broken["hypercube"] = error
+    toys.broken["hypercube-exploration"] = error
     results = chapter7.run(options(), folder)
-    assert not results["passed"] and results["parts"]["hypercube"]["failed"] == told
-    assert str(error) in (folder / "hypercube" / "failed.txt").read_text()
+    assert not results["passed"] and results["parts"]["hypercube-exploration"]["failed"] == told
+    assert str(error) in (folder / "hypercube-exploration" / "failed.txt").read_text()
     toys.broken.clear()
     assert chapter7.run(options(), folder)["passed"]
-    assert [name for name, *_ in toys.calls] == ["hypercube", "coverage", "hypercube"]
-    assert not (folder / "hypercube" / "failed.txt").exists()
+    assert [name for name, *_ in toys.calls] == ["hypercube-exploration", "exploration-coverage", "hypercube-exploration"]
+    assert not (folder / "hypercube-exploration" / "failed.txt").exists()
 
 
 def test_a_part_goes_on_when_more_seeds_are_asked_for_and_not_when_fewer_are(tmp_path, toys):
     folder = new_run(tmp_path, "chapter7", {})
     for seeds in ("2", "6", "3"):
-        chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
+        chapter7.run(options("--only", "exploration-coverage", "--seeds", seeds), folder)
     assert [seeds for _, seeds, *_ in toys.calls] == [2, 6]
 
 
 @pytest.mark.parametrize(("seeds", "verdict"), [("4", "open"), ("5", "confirmed")])
 def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
     folder = new_run(tmp_path, "chapter7", {})
-    chapter7.run(options("--only", "coverage", "--seeds", seeds), folder)
-    assert json.loads((folder / "coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
+    chapter7.run(options("--only", "exploration-coverage", "--seeds", seeds), folder)
+    assert json.loads((folder / "exploration-coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
 
 
 def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkeypatch):
     clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
     monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
     folder = new_run(tmp_path, "chapter7", {})
-    toys.broken["hypercube"] = MobeeError("broken")
-    chapter7.run(options("--only", "hypercube"), folder)
+    toys.broken["hypercube-exploration"] = MobeeError("broken")
+    chapter7.run(options("--only", "hypercube-exploration"), folder)
     toys.broken.clear()
-    assert chapter7.run(options("--only", "hypercube"), folder)["minutes"] == pytest.approx(3.0)
+    assert chapter7.run(options("--only", "hypercube-exploration"), folder)["minutes"] == pytest.approx(3.0)
 
 
 def test_an_unknown_part_is_refused(tmp_path):
@@ -120,7 +123,7 @@ def test_an_unknown_part_is_refused(tmp_path):
 
 
 def test_all_runs_what_goes_beyond_the_chapter_too(tmp_path, toys, monkeypatch):
-    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube",))
-    monkeypatch.setattr(chapter7, "BEYOND", ("coverage",))
-    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube"]
-    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube", "coverage"]
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration",))
+    monkeypatch.setattr(chapter7, "BEYOND", ("exploration-coverage",))
+    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube-exploration"]
+    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube-exploration", "exploration-coverage"]

@@ -7,7 +7,10 @@ import pytest
 from experiments.registry import load_experiment
 
 
-@pytest.mark.parametrize("name", ["hypercube", "lattice", "uniformity", "kail", "connectivity", "planner"])
+@pytest.mark.parametrize(
+    "name",
+    ["hypercube-exploration", "constraint-discovery", "exploration-uniformity", "information-gain", "neighbour-count", "mdp-planner"],
+)
 def test_a_short_version_with_all_conditions_gives_every_claim_a_number_and_can_be_drawn(tmp_path, name):
     pytest.importorskip("matplotlib")
     experiment = load_experiment(name)

@@ -1,0 +1,412 @@
+"""Graze: recovery of the reflex when the hand comes into the table's field at a low angle.
+
+Claim: the reflex of MoBeE 1.0 recovers from a contact that it meets head on; where the hand comes in flat its recovery fails ever
+more often and control goes back and forth, as the encoders' noise decides what counts as contact; a filter and a dead time mend
+most of that; MoBeE 2.0 lets the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which
+gives no numbers.  Run time: 5 to 10 minutes for 10 angles with 30 trials of each of four variants.
+
+A client drives the left hand along a straight path through the surface of the table's field, 6 cm before it and 4 cm behind, at 20 % speed,
+and tries again whenever it gets control back, for 12 s.  Motors with lag, delay, play and encoder noise, ticks of 10 ms.  Variants:
+off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
+are attractors of the controller.  The first recovery of each trial counts.  It is a success when the hand ends out of contact, has not come
+into contact again nor gone deeper while it moved back, and the reflex does not come again within 0.3 s; it is clean when besides the reflex
+saw nothing of the contact any more meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from experiments.claims.ch4_reflex.shallow_contact_paths import MARKER, SPEED, Client, HandPath, Spot, Table
+from experiments.kit.experiment import Experiment
+from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.plots import new_figure
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee.arrays import Array
+from mobee.control import Controller, Gains, SettleTest
+from mobee.control.reflex import Recovery, Reflex, ReflexSettings
+from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
+
+ANGLES = (90.0, 60.0, 30.0, 20.0, 10.0, 7.0, 5.0, 3.0, 2.0, 1.0)  # degrees
+SHARES = ("recovered", "clean", "again", "came_back", "never", "deeper", "relapse", "settled", "switches", "flips", "flicker")
+LOW = 3.0  # degrees, up to which a path counts as flat
+QUICK_ANGLES, QUICK_SPOTS, QUICK_REPEAT = (60.0, 2.0), 2, 1
+
+DT = 0.01  # s
+SECONDS = 12.0
+RELAPSE = 0.3  # s after control is back; the motion from the start to the contact takes longer
+UNLIMITED = 1e6  # rad/s: the velocity of the naive reflex has no limit
+SETTINGS = {"naive": ReflexSettings.naive(), "mended": ReflexSettings()}
+VARIANTS = ("off", *SETTINGS, "2.0")
+
+STOPPING = 30  # ticks in which the robot comes to a stop
+MORE = 1e-3  # m by which the motion back must be deeper than the stop to count as deeper
+
+COLORS = {"off": "0.6", "naive": "tab:red", "mended": "tab:orange", "2.0": "tab:blue"}
+LABELS = {"off": "no reflex", "naive": "1.0, naive", "mended": "1.0, filter and dead time", "2.0": "2.0"}
+DEPTHS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # mm, marked
+SWITCHING = ("naive", "mended")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Angles, places and repetitions."""
+    parser.add_argument("--angles", nargs="+", type=positive_number, default=list(ANGLES), metavar="DEG", help="of the approach, degrees")
+    parser.add_argument("--spots", type=positive_whole, default=10, metavar="N", help="places on the table (default: 10)")
+    parser.add_argument("--repeat", type=positive_whole, default=3, metavar="N", help="trials at each place, other noise (default: 3)")
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every angle at every place; each seed has places of its own."""
+    angles, spots, repeat = arguments.angles, arguments.spots, arguments.repeat
+    if arguments.quick:
+        angles, spots, repeat = QUICK_ANGLES, min(spots, QUICK_SPOTS), min(repeat, QUICK_REPEAT)
+    return [
+        Condition(f"{angle:g}-{spot}", {"angle": angle, "spot": spot, "spots": spots, "repeat": repeat})
+        for angle in angles
+        for spot in range(spots)
+    ]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """All variants with several noises at a place; no trials where the hand has no path at the angle."""
+    table, spot, angle = _table(), settings["spot"], settings["angle"]
+    path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))
+    if path is None:
+        return {"trials": []}
+    noises = range(seed, seed + settings["repeat"])
+    return {"trials": [asdict(run_trial(table, path, variant, angle, spot, noise)) for noise in noises for variant in VARIANTS]}
+
+
+@cache
+def _table() -> Table:
+    return Table()
+
+
+@cache
+def _spots(count: int, seed: int) -> list[Spot]:
+    return _table().spots(count, seed)
+
+
+class Truth:
+    """Depths, and the course of the first recovery, by the joints, without the noise of the encoders."""
+
+    def __init__(self, table: Table, path: HandPath) -> None:
+        self._track = table.model.track()
+        start, end = (table.model.evaluate(path.postures[i]).position(MARKER)[:2] for i in (path.start, -1))
+        length = float(np.linalg.norm(end - start))
+        self._start, self._along = start, (end - start) / length if length > MORE else np.zeros(2)
+        self.depth = self.solid = self.progress = 0.0
+        self.flips = self.flicker = 0
+        self.again = self.came_back = self.never = self.deeper = False
+        self._seen = False
+        self._since_first = -1  # ticks, since the encoders first saw a contact
+        self._first: Recovery | None = None
+        self._depths: list[float] = []  # along the first recovery
+        self._is_over = False
+
+    def update(self, q: Array, seen: bool, reflex: Reflex | None) -> None:
+        """One tick: the joints q (n,) rad, whether the encoders saw a violation, and the reflex after this tick."""
+        pose = self._track.evaluate(q)
+        depths = {"solid": 0.0, "field": 0.0}
+        for contact in pose.contacts:
+            depths[contact.kind] = max(depths[contact.kind], float(contact.depth))
+        depth = max(depths.values())
+        self.depth, self.solid = max(self.depth, depth), max(self.solid, depths["solid"])
+        self.progress = max(self.progress, float((pose.position(MARKER)[:2] - self._start) @ self._along))
+        self.flips += seen != self._seen
+        self._seen = seen
+        if seen or self._since_first >= 0:
+            self._since_first += 1
+            if not seen:
+                self.flicker = self._since_first
+        if reflex is not None and reflex.recovery is not None and not self._is_over:
+            self._follow(reflex.recovery, depth)
+
+    def finish(self) -> None:
+        """The trial is over."""
+        if not self._is_over and self._first is not None:
+            self._conclude(self._first, self._depths[-1])
+
+    def _follow(self, recovery: Recovery, depth: float) -> None:
+        """The first recovery, from where control is taken to where it is given back."""
+        if self._first is None:
+            self._first = recovery
+        self._depths.append(depth)
+        if self._first.outcome != "under way":
+            self._conclude(self._first, depth)
+
+    def _conclude(self, recovery: Recovery, depth: float) -> None:
+        self._is_over = True
+        touching = np.array(self._depths) > 0.0
+        left = np.flatnonzero(touching[:-1] & ~touching[1:])
+        self.again = recovery.again > 0
+        self.came_back = bool(len(left)) and bool(touching[left[0] + 1 :].any())
+        self.never = depth > 0.0
+        stop, back = self._depths[:STOPPING], self._depths[STOPPING:]
+        self.deeper = bool(back) and max(back) > max(stop) + MORE
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """Measures of a trial."""
+
+    variant: str
+    angle: float  # degrees
+    spot: int
+    seed: int
+    depth: float  # m, deepest that any shape went into the table, of the joints as they are
+    solid: float  # m, the same of solids alone
+    switches: float  # of control, a second
+    flips: float  # changes between free and in contact by the encoders, a second
+    flicker: float  # s, from the first contact to the last free pose, on the path of `off`
+    reflexes: int
+    again: bool  # the first recovery: contact came back, by the encoders
+    came_back: bool  # the same, by the joints
+    never: bool  # control came back, or never did, while the hand was in contact
+    deeper: bool  # the motion back went deeper than the stop
+    relapse: bool  # the second reflex came as soon as control was back
+    settled: bool  # 2.0: by the controller's test
+    progress: float  # m, from the start to where the hand was farthest along the table
+
+    @property
+    def recovered(self) -> bool:
+        """1.0: the first recovery took the hand out of contact, and there it was free."""
+        return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
+
+    @property
+    def clean(self) -> bool:
+        """1.0: besides, the encoders saw nothing of the contact during the motion back."""
+        return self.recovered and not self.again
+
+
+def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: int, seed: int) -> Trial:
+    """Let the client insist for SECONDS; `angle` in degrees only names the path."""
+    client = Client(table.robot, path, DT)
+    body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
+    truth = Truth(table, path)
+    if variant == "2.0":
+        settled, control = _deflect(table, client, body, truth), Control()
+    else:
+        settled, control = False, _switch(table, client, body, truth, SETTINGS.get(variant))
+    return Trial(
+        variant=variant,
+        angle=angle,
+        spot=spot,
+        seed=seed,
+        depth=truth.depth,
+        solid=truth.solid,
+        switches=control.switches / SECONDS,
+        flips=truth.flips / SECONDS,
+        flicker=truth.flicker * DT if variant == "off" else 0.0,
+        reflexes=len(control.taken),
+        again=truth.again,
+        came_back=truth.came_back,
+        never=truth.never,
+        deeper=truth.deeper,
+        relapse=control.relapsed,
+        settled=settled,
+        progress=truth.progress,
+    )
+
+
+@dataclass(slots=True)
+class Control:
+    """When the reflex took control, and when it gave it back; ticks."""
+
+    taken: list[int] = field(default_factory=list)
+    given: list[int] = field(default_factory=list)
+
+    @property
+    def switches(self) -> int:
+        """How often control changed hands."""
+        return len(self.taken) + len(self.given)
+
+    @property
+    def relapsed(self) -> bool:
+        """Whether the second reflex followed at once upon the first."""
+        return len(self.taken) > 1 and (self.taken[1] - self.given[0]) * DT <= RELAPSE
+
+
+class _Body:
+    """Motors and encoders; a command acts one tick after it was formed, as live."""
+
+    def __init__(self, table: Table, q: Array, rng: np.random.Generator) -> None:
+        parameters = MotorParameters()
+        self._motors = Motors(table.robot, parameters, 0, q)
+        self._substeps = parameters.substeps(DT)
+        self._noise = parameters.encoder_noise * np.sqrt(NOISE_PERIOD / DT)
+        self._rng = rng
+
+    @property
+    def q(self) -> Array:
+        """Where the joints are, (n,) rad."""
+        return self._motors.q
+
+    def encoders(self) -> Array:
+        """The encoders' readings of it."""
+        q: Array = self._motors.q + self._noise * self._rng.standard_normal(len(self._motors.q))
+        return q
+
+    def tick(self, mode: str, reference: Array) -> None:
+        """Run for a tick under the command of the tick before."""
+        self._motors.command(slice(None), "velocity" if mode == "velocity" else "position", reference)
+        self._motors.move(self._substeps, DT / self._substeps)
+
+
+def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> Control:
+    """MoBeE 1.0, or no reflex: position commands, forwarded or replaced."""
+    limit = np.full(len(table.robot.motors), UNLIMITED)
+    if settings is not None and settings.brake:
+        limit = np.array([motor.max_velocity for motor in table.robot.motor_table])
+    reflex = Reflex(settings or ReflexSettings(confirm=SECONDS + 1.0), DT, limit)
+    track, command, control = table.model.track(), client.start, Control()
+    for k in range(round(SECONDS / DT)):
+        body.tick("position", command)
+        q = body.encoders()
+        violations = table.watch.look(track.evaluate(q))
+        target = reflex.tick(q, violations)
+        truth.update(body.q, bool(violations), reflex)
+        if reflex.counts.reflexes > len(control.taken):
+            control.taken.append(k)
+        if target is not None:
+            command = target
+            continue
+        if len(control.given) < len(control.taken):
+            control.given.append(k)
+            client.retry(q)
+        if client.leaves_start:
+            reflex.mark()
+        command = client.next()
+    truth.finish()
+    return control
+
+
+def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
+    """MoBeE 2.0: the client's references are attractors; whether the arm settled after the last one."""
+    controller = Controller(table.model, Gains.default(), speed_scale=SPEED)
+    controller.reset(client.start)
+    track, command = table.model.track(), np.zeros(len(client.start))
+    arm = table.robot.part("left_arm").slice
+    test, verdict = None, "moving"
+    for k in range(round(SECONDS / DT)):
+        body.tick("velocity", command)
+        q = body.encoders()
+        pose = track.evaluate(q)
+        controller.attractor = client.next()
+        command = controller.step(q, DT, controller.forces(pose)).velocity
+        truth.update(body.q, bool(table.watch.look(pose)), None)
+        if client.is_over and test is None:
+            test = SettleTest(controller.gains.settle, k * DT)
+        if test is not None and verdict == "moving":
+            verdict = test.look(k * DT, controller.velocity[arm], controller.acceleration[arm])
+    return verdict == "settled"
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """Every variant's numbers at every angle, and whether the claim holds."""
+    return results(_trials(found))
+
+
+def results(trials: Sequence[Trial]) -> dict[str, Any]:
+    """The same of trials."""
+    angles = sorted({trial.angle for trial in trials}, reverse=True)
+    table: dict[str, Any] = {
+        variant: {f"{angle:g}": summary([t for t in trials if (t.variant, t.angle) == (variant, angle)]) for angle in angles}
+        for variant in VARIANTS
+    }
+    return {"passed": holds(trials), **table}
+
+
+def summary(trials: Sequence[Trial]) -> dict[str, float]:
+    """The trials of one variant at one angle: shares of all, depths in mm, rates a second."""
+    if not trials:
+        return {"trials": 0}
+
+    def share(name: str) -> float:
+        return round(float(np.mean([getattr(trial, name) for trial in trials])), 3)
+
+    return {
+        "trials": len(trials),
+        **{name: share(name) for name in SHARES},
+        "depth_mm_median": round(1e3 * float(np.median([trial.depth for trial in trials])), 1),
+        "depth_mm_max": round(1e3 * max(trial.depth for trial in trials), 1),
+        "solid_mm_max": round(1e3 * max(trial.solid for trial in trials), 1),
+        "progress_cm": round(1e2 * float(np.mean([trial.progress for trial in trials])), 1),
+    }
+
+
+def holds(trials: Sequence[Trial]) -> bool:
+    """The claim: flat paths are worse for the naive reflex than steep ones, the mended one is better there, and 2.0 settles."""
+
+    def share(name: str, variant: str, low: bool) -> float:
+        values = [getattr(t, name) for t in trials if t.variant == variant and (t.angle <= LOW) == low]
+        return float(np.mean(values)) if values else float("nan")
+
+    naive_low, naive_steep = share("recovered", "naive", True), share("recovered", "naive", False)
+    switching = share("switches", "mended", True) < share("switches", "naive", True)
+    deflected = [trial for trial in trials if trial.variant == "2.0"]
+    calm = bool(deflected) and all(t.settled and t.solid == 0.0 for t in deflected)
+    return naive_low < naive_steep and share("recovered", "mended", True) > naive_low and switching and calm
+
+
+def _trials(found: Cells) -> list[Trial]:
+    return [Trial(**one) for result in found.values() for one in result.values["trials"]]
+
+
+def plot(found: Cells) -> Any:
+    """Recovery, switching, depth and progress against the angle of approach."""
+    trials = _trials(found)
+    drawing = new_figure(10.0, 7.0)
+    (success, switching), (depth, progress) = drawing.subplots(2, 2, sharex=True)
+    _curves(success, trials, SWITCHING, lambda t: 100.0 * t.recovered)
+    _curves(success, trials, SWITCHING, lambda t: 100.0 * t.clean, "--")
+    _curves(success, trials, ("2.0",), lambda t: 100.0 * t.settled)
+    success.set(ylabel="share of trials [%]", ylim=(-3.0, 103.0))
+    success.set_title("1.0: the first recovery succeeds (dashed: and is clean); 2.0: settles", fontsize=9)
+    _curves(switching, trials, SWITCHING, lambda t: t.switches)
+    switching.set(ylabel="switches of control per second", ylim=(0.0, None))
+    _curves(depth, trials, tuple(LABELS), lambda t: 1e3 * t.depth)
+    depth.set(ylabel="deepest in the table's field [mm]", xlabel="angle of approach [degrees]", yscale="symlog", ylim=(0.0, None))
+    depth.set_yticks(DEPTHS, [f"{each:g}" for each in DEPTHS])
+    _curves(progress, trials, tuple(LABELS), lambda t: 1e2 * t.progress)
+    progress.set(ylabel="how far along the table [cm]", xlabel="angle of approach [degrees]")
+    for axes in (success, switching, depth, progress):
+        axes.set_xscale("log")
+        axes.set_xticks(angles := _angles(trials), [f"{angle:g}" for angle in angles], minor=False)
+        axes.minorticks_off()
+        axes.grid(alpha=0.2)
+    depth.legend(fontsize=8)
+    drawing.suptitle("Thesis 4.4: a hand that grazes the table at 20 % speed, its client insisting (mean, standard error)")
+    return drawing
+
+
+def _angles(trials: Sequence[Trial]) -> list[float]:
+    return sorted({trial.angle for trial in trials})
+
+
+def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: Callable[[Trial], float], line: str = "-") -> None:
+    """Mean and standard error against the angle."""
+    for variant in variants:
+        rows = []
+        for angle in _angles(trials):
+            values = [value(trial) for trial in trials if (trial.variant, trial.angle) == (variant, angle)]
+            if values:
+                rows.append((angle, float(np.mean(values)), float(np.std(values)) / np.sqrt(len(values))))
+        if rows:
+            x, mean, error = zip(*rows, strict=True)
+            axes.errorbar(x, mean, error, linestyle=line, marker="o", markersize=3, capsize=2, color=COLORS[variant], label=LABELS[variant])
+
+
+EXPERIMENT = Experiment(
+    name="shallow-contact-recovery",
+    claim="rewinding fails the more often the flatter the hand comes into contact; MoBeE 2.0 slides and settles at every angle",
+    source="thesis 4.4",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
+)

@@ -1,0 +1,207 @@
+"""Clauses: a search for the command that violates the cable rows or the forearm clauses most.
+
+Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than
+2 degrees beyond a constraint (-s/|a|, along the normal).  How fast a motor meets its hard stop, if one does, is reported beside it.
+Source: this project's goal; the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints
+that their forces may grow without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets
+and 2000 with forces of a client, a few minutes.
+
+A try is one arm's command: a start, three attractors, how long each is in force, and, in the part called "forced", a force in
+configuration space and one at the palm with each.  Both arms try at once, the torso is sent somewhere, a table stands in front,
+the motors are those of the published findings.  The first part of the tries is random; the rest varies and crosses the worst so
+far of every clause.  The forced tries are no part of the claim: there the client pushes with all that it may.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.arm_commands import ARMS, Command, Tried, as_numbers, from_numbers, random_command, try_commands, vary
+from experiments.kit.control_runs import COLORS, GAINS, icub_at_table
+from experiments.kit.experiment import Experiment
+from experiments.kit.options import positive_whole
+from experiments.kit.plots import new_figure
+from experiments.kit.safety_measures import clause_label, clause_violations
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import Gains
+from mobee.arrays import Array
+
+ALLOWED = 2.0  # degrees along the normal, default gains, without forces of a client
+KINDS = ("attractors", "forced")
+QUICK_TRIES = 300
+
+RANDOM = 0.3  # of the tries
+GENERATION = 100  # tries with one random generator
+BEST = 8  # commands kept of each clause
+CLAUSES = 7  # of an arm
+
+TERMS = re.compile(r"(?<!or)(?<!>) (?=or |[+-][\d.]+ [a-z])")  # where a line of a clause ends
+DASHES = {False: "-", True: ":"}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Gains and numbers of tries."""
+    parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
+    parser.add_argument("--tries", type=positive_whole, default=10_000, metavar="N", help="a gain set (default: 10000)")
+    parser.add_argument("--forced-tries", type=positive_whole, default=2_000, metavar="N", help="with forces of a client (default: 2000)")
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Each gain set without and with forces of a client."""
+    found = []
+    for gains in arguments.gains:
+        for kind, given in zip(KINDS, (arguments.tries, arguments.forced_tries), strict=True):
+            tries = min(given, QUICK_TRIES) if arguments.quick else given
+            found.append(Condition(f"{gains}-{kind}", {"gains": gains, "forced": kind == "forced", "tries": tries}, float(tries)))
+    return found
+
+
+@dataclass
+class Search:
+    """The state of a search.  Violations are degrees along the normal, the largest so far, negative inside."""
+
+    gains: str
+    forced: bool
+    seed: int
+    tries: int = 0
+    worst: float = -360.0
+    stop: float = 0.0  # deg/s, the fastest arrival at a hard stop
+    by_clause: list[float] = field(default_factory=lambda: [-360.0] * CLAUSES)
+    course: list[tuple[int, float]] = field(default_factory=list)  # tries, worst until then
+    inside: list[float] = field(default_factory=lambda: [-360.0])  # the worst of each generation, attractors inside the joint box
+    random: list[float] = field(default_factory=lambda: [-360.0])  # the worst of each generation that was random
+    elite: list[list[tuple[float, list[float]]]] = field(default_factory=lambda: [[] for _ in range(CLAUSES)])
+    worst_try: dict[str, list[float] | list[list[float]] | int] = field(default_factory=dict)  # commands, torso, seed, arm, clause
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """One search."""
+    return asdict(search(settings["gains"], settings["forced"], settings["tries"], seed))
+
+
+def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
+    """Random tries first, then variations of the worst commands of each clause."""
+    state, numbers = Search(gains, forced, seed), Gains.named(gains)
+    while state.tries < tries:
+        rng = np.random.default_rng([seed, forced, state.tries])
+        is_random = state.tries < RANDOM * tries
+        state.inside.append(-360.0)
+        if is_random:
+            state.random.append(-360.0)
+        for _ in range(min(GENERATION, tries - state.tries + 1) // len(ARMS)):
+            commands = [random_command(rng, forced) if is_random else _next(rng, state) for _ in ARMS]
+            torso, noise = rng.uniform(-1.0, 1.0, 3), int(rng.integers(2**31))
+            _learn(state, try_commands(numbers, commands, torso, noise), commands, torso.tolist(), noise, is_random)
+        state.course.append((state.tries, state.worst))
+    return state
+
+
+def _next(rng: np.random.Generator, state: Search) -> Command:
+    """A variation of a command that was bad for a clause: with probability 1/2 the clause that is violated most, else any."""
+    clause = int(np.argmax(state.by_clause)) if rng.random() < 0.5 else int(rng.integers(CLAUSES))
+    known = state.elite[clause]
+    one, other = (known[int(rng.integers(len(known)))][1] for _ in range(2))
+    return vary(rng, from_numbers(one), from_numbers(other))
+
+
+def _learn(state: Search, tried: Tried, commands: list[Command], torso: list[float], seed: int, is_random: bool) -> None:
+    violations = np.rad2deg(tried.violations)
+    for arm, command in enumerate(commands):
+        state.tries += 1
+        numbers = as_numbers(command)
+        for clause, value in enumerate(violations[arm].tolist()):
+            state.by_clause[clause] = max(state.by_clause[clause], value)
+            known = state.elite[clause]
+            if len(known) < BEST or value > known[-1][0]:
+                known.append((value, numbers))
+                known.sort(key=lambda entry: -entry[0])
+                del known[BEST:]
+        worst = float(violations[arm].max())
+        if worst > state.worst:
+            state.worst = worst
+            both = [as_numbers(each) for each in commands]
+            state.worst_try = {"commands": both, "torso": torso, "seed": seed, "arm": arm, "clause": int(violations[arm].argmax())}
+        if command.is_inside:
+            state.inside[-1] = max(state.inside[-1], worst)
+        if is_random:
+            state.random[-1] = max(state.random[-1], worst)
+    state.stop = max(state.stop, float(np.rad2deg(tried.stop.max())))
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """The largest violations of each gain set, in degrees along the normal, negative inside; of several seeds the worst search."""
+    table: dict[str, Any] = {}
+    for state in sorted(_searches(found), key=lambda state: state.worst):
+        table.setdefault(state.gains, {})[KINDS[state.forced]] = _summary(state)
+    judged = [table["default"]["attractors"]] if "attractors" in table.get("default", {}) else []
+    passed = all(part["largest_violation_deg"] < ALLOWED for part in judged) if judged else None  # the claim is about the default gains
+    return {"passed": passed, "allowed_deg": ALLOWED, **table}
+
+
+def _summary(state: Search) -> dict[str, Any]:
+    robot = icub_at_table().robot
+    return {
+        "tries": state.tries,
+        "largest_violation_deg": round(state.worst, 3),
+        "largest_with_attractors_inside_the_joint_box_deg": round(max(state.inside), 3),
+        "largest_of_random_tries_deg": round(max(state.random), 3),
+        "fastest_into_a_stop_deg_s": round(state.stop, 2),
+        "by_clause_deg": {clause_label(robot, i): round(value, 3) for i, value in enumerate(state.by_clause)},
+    }
+
+
+def _searches(found: Cells) -> list[Search]:
+    """By gain set, without forces of a client first."""
+    states = [Search(**result.values) for result in found.values()]
+    return sorted(states, key=lambda state: (GAINS.index(state.gains), state.forced, state.seed))
+
+
+def plot(found: Cells) -> Any:
+    """Three panels: worst so far against tries, worst of each clause, the worst tries over time."""
+    states = _searches(found)
+    drawing = new_figure(14.0, 4.6)
+    course, clauses, over_time = drawing.subplots(1, 3, width_ratios=(1.0, 1.35, 1.0))
+    for number, state in enumerate(states):
+        style: dict[str, Any] = {"color": COLORS[state.gains], "linestyle": DASHES[state.forced]}
+        label = f"{state.gains}{', client pushes' if state.forced else ''}"
+        course.plot(*np.transpose(state.course), label=label, **style)
+        places = np.arange(CLAUSES) + 0.2 * (number - (len(states) - 1) / 2)
+        face = "none" if state.forced else COLORS[state.gains]
+        clauses.barh(places, np.array(state.by_clause) + 60.0, 0.18, left=-60.0, facecolor=face, edgecolor=COLORS[state.gains])
+        over_time.plot(*_repeat(state), **style)
+    for line in (course.axhline, clauses.axvline, over_time.axhline):
+        line(0.0, color="0.3", linewidth=0.8)
+        line(ALLOWED, color="tab:red", linewidth=0.8, linestyle="--")
+    course.set(xlabel="tries", ylabel="largest violation so far [deg along the normal]", title="The search")
+    course.legend(fontsize=7)
+    labels = [TERMS.sub("\n", clause_label(icub_at_table().robot, i)) for i in range(CLAUSES)]
+    clauses.set_yticks(range(CLAUSES), labels, fontsize=6)
+    farthest = max(12.0, *(state.worst + 2.0 for state in states))
+    clauses.set(xlabel="largest violation [deg], red: allowed", title="By clause (open bars: client pushes)", xlim=(-60.0, farthest))
+    over_time.set(xlabel="time [s]", ylabel="violation [deg]", title="The worst tries", ylim=(-40.0, None))
+    for axes in (course, clauses, over_time):
+        axes.grid(alpha=0.2)
+    return drawing
+
+
+def _repeat(state: Search) -> tuple[Array, Array]:
+    """Run the worst try once more: times [s], and the violation of its clause [deg]."""
+    known: dict[str, Any] = state.worst_try
+    commands = [from_numbers(numbers) for numbers in known["commands"]]
+    tried = try_commands(Gains.named(state.gains), commands, np.array(known["torso"]), known["seed"])
+    column = known["arm"] * (len(icub_at_table().robot.clauses) // len(ARMS)) + known["clause"]
+    return tried.run.times, np.rad2deg(clause_violations(icub_at_table().robot, tried.run.q)[:, column])
+
+
+EXPERIMENT = Experiment(
+    name="constraint-violations",
+    claim="no command carries an arm more than 2 degrees beyond its cable rows and forearm clauses",
+    source="thesis 5.2.5, eqs. 5.14-5.17",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
+)

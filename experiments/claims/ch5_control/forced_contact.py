@@ -1,0 +1,287 @@
+"""Wall: a hand is pushed by ever more force into table, own body and joint limits, and drawn to and through singular poses.
+
+Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a
+limit; and a hand that is drawn to a target, reachable or not, through singular poses or not, never stops dead before it arrives and does
+not oscillate above 1 mm when it has come to rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
+dominate the constraint forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").
+Published: no numbers.  Run time: about six minutes.
+
+The force rises in steps, each in force for three seconds, for both gain sets.  The hand is drawn by the whole body (`mobee.Reacher`).
+Depths are of the joints' true positions.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.client_pushes import PUSHES
+from experiments.kit.control_runs import COLORS, GAINS, PERIOD, icub, icub_at_table, place, run_plant
+from experiments.kit.experiment import Experiment
+from experiments.kit.plots import new_figure
+from experiments.kit.records import Row
+from experiments.kit.safety_measures import clause_violations, deepest, limit_violations, oscillation
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import Gains
+from mobee.arrays import Array
+from mobee.control import Reacher
+from mobee.simulation import OfflinePlant
+
+SOLID, CLAUSE = 2.0, 2.0  # mm, degrees: allowed with the default gains
+OSCILLATION, DEAD = 1.0, 0.3  # mm at rest; s without motion before it is at rest
+
+LEVELS = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # N/kg at a marker; rad/s^2 at a motor; before the squash
+QUICK_LEVELS, QUICK_CASES = LEVELS[::3], 3  # walls and targets
+LEVEL_SECONDS, LEVEL_REST = 3.0, 2.0  # a level lasts; its end, in which restlessness is measured
+INSIDE = np.deg2rad(1.0)  # only motors that are so far within their limits at home are judged by them; some stand at theirs
+SAMPLING = 0.02  # s between two postures whose contacts are evaluated
+PALMS = ("left_palm", "right_palm")
+
+MARKER, ARM = "left_palm", "left_arm"
+DRAWN_SECONDS, DRAWN_REST = 60.0, 3.0  # s, the run; its end, in which oscillation is measured
+# m/s, s, m: slower than this over that time, farther than that from where it comes to rest, the hand has stopped dead.
+SLOW, WINDOW, NEAR = 2e-4, 0.5, 0.01
+
+PANELS = (
+    ("field_mm", "deepest field [mm]"),
+    ("solid_mm", "deepest solid [mm]"),
+    ("clause_deg", "violation of a constraint [deg]"),
+    ("limit_deg", "beyond the nearest limit [deg]"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """First motors of the left arm at the start [deg], and targets one after the other: from the palm at home [m], root frame."""
+
+    start: tuple[float, ...]
+    targets: tuple[tuple[float, float, float], ...]
+
+
+HOME = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)
+STRETCHED = (-70.0, 30.0, 0.0, 16.0, 0.0, -40.0, 0.0)
+ALIGNED = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)  # the axes of prosup and wrist yaw: at wrist pitch 0
+GOALS = {
+    "in-reach": Goal(HOME, ((-0.05, 0.0, 0.15),)),
+    "stretched-ahead": Goal(HOME, ((-0.5, 0.0, 0.1),)),
+    "stretched-aside": Goal(HOME, ((0.1, -0.6, 0.1),)),
+    "stretched-above": Goal(HOME, ((0.0, 0.0, 0.8),)),
+    "behind-the-robot": Goal(HOME, ((0.8, -0.1, 0.2),)),
+    "out-of-a-stretched-arm": Goal(STRETCHED, ((-0.02, 0.05, 0.05),)),
+    "stretched-and-back": Goal(HOME, ((-0.5, 0.0, 0.15), (0.0, 0.0, 0.1))),
+    "wrist-axes-aligned": Goal(ALIGNED, ((-0.05, 0.1, 0.1), (-0.05, -0.1, 0.1))),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Pressed(Row):
+    """A level of force and the worst while it lasted; angles are negative inside."""
+
+    gains: str
+    wall: str
+    force: float
+    solid_mm: float
+    field_mm: float
+    clause_deg: float
+    limit_deg: float
+    restless_mm: float
+    beside_mm: float  # solids that do not count
+    pair: str  # of solids, the deepest
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn(Row):
+    """Measures of a hand that was drawn to its targets."""
+
+    gains: str
+    target: str
+    oscillation_mm: float  # at rest
+    dead_s: float  # the longest time without motion before it was at rest
+    from_target_mm: float  # at rest
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Gains, walls and targets."""
+    walls, targets = list(PUSHES), list(GOALS)
+    parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
+    parser.add_argument("--walls", nargs="+", choices=walls, default=walls, metavar="WALL", help=f"of {', '.join(walls)}")
+    parser.add_argument("--targets", nargs="*", choices=targets, default=targets, metavar="TARGET", help=f"of {', '.join(targets)}")
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """With each gain set every wall, then every target; --quick: the first of them, with few levels of force."""
+    levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
+    found = []
+    for gains in arguments.gains:
+        for wall in arguments.walls[:cases]:
+            settings = {"gains": gains, "wall": wall, "levels": list(levels)}
+            found.append(Condition(f"{gains}-{wall}", settings, LEVEL_SECONDS * len(levels)))
+        for target in arguments.targets[:cases]:
+            found.append(Condition(f"{gains}-drawn-{target}", {"gains": gains, "target": target}, DRAWN_SECONDS))
+    return found
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Press into a wall: "pressed", a record a level; or draw the hand to a target: "drawn", and its path (times, distances)."""
+    if "wall" in settings:
+        return {"pressed": [one.record() for one in press(settings["gains"], settings["wall"], settings["levels"], seed)]}
+    drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
+    return {"drawn": drawn.record(), "times": times, "distances": distances}
+
+
+def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Pressed]:
+    """Push with one level of force after the other, from home."""
+    plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
+    robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
+    free = limit_violations(robot, robot.home[None])[0] < -INSIDE
+    found = []
+    for force in levels:
+        PUSHES[wall](plant.controller, force)
+        run = run_plant(plant, LEVEL_SECONDS)
+        depths, rest = deepest(icub_at_table(), run.q[::step]), run.last(LEVEL_REST)
+        pressed = Pressed(
+            gains,
+            wall,
+            force,
+            1e3 * depths.solid,
+            1e3 * depths.field,
+            _worst(clause_violations(robot, run.q)),
+            _worst(limit_violations(robot, run.q)[:, free]),
+            1e3 * max(oscillation(icub_at_table(), rest, marker) for marker in PALMS),
+            1e3 * depths.beside,
+            depths.pair,
+        )
+        found.append(pressed)
+    return found
+
+
+def _worst(angles: Array) -> float:
+    return float(np.rad2deg(angles.max()))
+
+
+def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
+    """Draw the hand to the targets of a goal, each for its share of the time; also times (T,) s and distances from the target (T,) m."""
+    goal, robot = GOALS[name], icub().robot
+    plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
+    start = robot.home.copy()
+    first = robot.parts[ARM].start
+    start[first : first + len(goal.start)] = np.deg2rad(goal.start)
+    place(plant, start)
+    home = icub().evaluate(robot.home).position(MARKER)
+    targets = [home + np.array(target) for target in goal.targets]
+    ticks = round(DRAWN_SECONDS / plant.dt / len(targets))
+    reacher = Reacher(plant.controller, MARKER, targets[0])
+
+    def pull(tick: int) -> None:
+        nonlocal reacher
+        q = np.concatenate([plant.measure(part) for part in robot.parts])
+        if tick and tick % ticks == 0:
+            reacher.stop(q)
+            reacher = Reacher(plant.controller, MARKER, targets[tick // ticks])
+        reacher.update(q, plant.dt)
+
+    run = run_plant(plant, ticks * plant.dt * len(targets), pull)
+    hand = icub().evaluate(run.q).position(MARKER)
+    dead = max(dead_time(hand[i * ticks : (i + 1) * ticks], plant.dt) for i in range(len(targets)))
+    distances = np.linalg.norm(hand - np.repeat(targets, ticks, axis=0), axis=1)
+    drawn = Drawn(gains, name, 1e3 * oscillation(icub(), run.last(DRAWN_REST), MARKER), dead, 1e3 * float(distances[-1]))
+    return drawn, run.times, distances
+
+
+def dead_time(hand: Array, dt: float) -> float:
+    """The longest time [s] in which the hand (T, 3) m was SLOW although it was not NEAR where it ends."""
+    window = max(1, round(WINDOW / dt))  # the play of the motors makes single ticks count for nothing
+    speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
+    stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
+    begins = np.flatnonzero(stopped & ~np.r_[False, stopped[:-1]])
+    ends = np.flatnonzero(stopped & ~np.r_[stopped[1:], False])
+    return float((ends - begins + 1).max() * dt) if len(begins) else 0.0
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """The worst of every wall, and of the hand that is drawn."""
+    pressed, drawn = _pressed(found), _drawn(found)
+    table: dict[str, Any] = {}
+    for gains in GAINS:
+        walls = {wall: mine for wall in PUSHES if (mine := [p for p in pressed if (p.gains, p.wall) == (gains, wall)])}
+        rows = {wall: _worst_of(mine) for wall, mine in walls.items()} | {
+            f"drawn: {target}": {name: max(getattr(d, name) for d in arrived) for name in ("oscillation_mm", "dead_s", "from_target_mm")}
+            for target in GOALS
+            if (arrived := [d for d in drawn if (d.gains, d.target) == (gains, target)])
+        }
+        if rows:
+            table[gains] = rows
+    safe = all(p.solid_mm <= SOLID and p.clause_deg <= CLAUSE for p in pressed if p.gains == "default")
+    calm = all(d.oscillation_mm <= OSCILLATION and d.dead_s <= DEAD for d in drawn if d.gains == "default")
+    return {"passed": safe and calm if "default" in table else None, **table}  # the claim is about the default gains
+
+
+def _worst_of(pressed: Sequence[Pressed]) -> dict[str, Any]:
+    deepest_solid = max(pressed, key=lambda p: p.solid_mm)
+    others = ("field_mm", "clause_deg", "limit_deg", "restless_mm")
+    worst = {name: max(getattr(p, name) for p in pressed) for name in others}
+    return {"solid_mm": deepest_solid.solid_mm, "pair": deepest_solid.pair or "none", **worst}
+
+
+def _pressed(found: Cells) -> list[Pressed]:
+    return [Pressed(**record) for result in found.values() for record in result.values.get("pressed", ())]
+
+
+def _drawn(found: Cells) -> list[Drawn]:
+    return [Drawn(**result.values["drawn"]) for result in found.values() if "drawn" in result.values]
+
+
+def plot(found: Cells) -> Any:
+    """Above, depth and margin against the force; below, the distance of the hand from its targets over time."""
+    drawing = new_figure(15.0, 8.0)
+    above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.1))
+    _plot_pressing(above.subplots(1, len(PANELS)), _pressed(found))
+    names = [name for name in GOALS if any(result.cell.settings.get("target") == name for result in found.values())]
+    if names:
+        panels = np.ravel(below.subplots(2, (len(names) + 1) // 2, squeeze=False))
+        for axes, name in zip(panels, names, strict=False):
+            _plot_distances(axes, name, {key: result.values for key, result in found.items() if result.cell.settings.get("target") == name})
+        for axes in panels[len(names) :]:
+            axes.set_axis_off()
+    return drawing
+
+
+def _plot_pressing(panels: Any, pressed: Sequence[Pressed]) -> None:
+    for axes, (quantity, label) in zip(panels, PANELS, strict=True):
+        for gains, wall in dict.fromkeys((p.gains, p.wall) for p in pressed):
+            mine = [p for p in pressed if (p.gains, p.wall) == (gains, wall)]
+            values = [getattr(p, quantity) for p in mine]
+            axes.plot([p.force for p in mine], values, ".-", color=COLORS[gains], alpha=0.6, linewidth=0.9)
+        axes.set_xscale("symlog", linthresh=LEVELS[1])
+        axes.set(xlabel="force before the squash [per unit mass]", ylabel=label)
+        axes.grid(alpha=0.2)
+    panels[1].set_ylim(-0.2, max(5.0, panels[1].get_ylim()[1]))
+    for axes in panels[2:]:
+        axes.axhline(0.0, color="0.3", linewidth=0.8)
+    for gains, color in COLORS.items():
+        panels[0].plot([], [], color=color, label=f"{gains}, one line a wall")
+    panels[0].legend(fontsize=7)
+
+
+def _plot_distances(axes: Any, name: str, runs: dict[str, dict[str, Any]]) -> None:
+    for values in runs.values():
+        drawn = Drawn(**values["drawn"])
+        label = f"{drawn.gains}: at rest ±{drawn.oscillation_mm:.2f} mm, dead {drawn.dead_s:.1f} s"
+        axes.plot(values["times"], values["distances"], color=COLORS[drawn.gains], label=label)
+    axes.set_title(f"drawn: {name.replace('-', ' ')}", fontsize=8)
+    axes.set(xlabel="time [s]", ylabel="from the target [m]", ylim=(0.0, None))
+    axes.legend(fontsize=6)
+    axes.grid(alpha=0.2)
+
+
+EXPERIMENT = Experiment(
+    name="forced-contact",
+    claim="no force of a client drives the robot into table, body or limits, and a hand drawn through singular poses stays calm",
+    source="thesis 5.1 and 5.2.2-5.2.4",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
+)

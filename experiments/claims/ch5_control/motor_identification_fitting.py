@@ -1,0 +1,220 @@
+"""Fits of the motor model (mobee.simulation.motors) to responses, and a check with simulated motors.
+
+Fitted are lag, delay, backlash, friction and encoder noise of every motor.
+
+The model itself is run, all motors at once: they do not influence each other in it.  Where a signal starts does not matter to the
+model, so each response is compared without its mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.sparse import csr_array
+
+from experiments.claims.ch5_control.motor_identification_recording import DT, PRELOAD, Responses, fitted_signal, held_out_signal
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from mobee.simulation.identified import FITTED
+from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
+
+SHAPED = ("lag", "backlash", "friction")  # fitted at a fixed delay, which the model rounds to substeps
+SCALE = np.array([0.05, np.deg2rad(0.2), np.deg2rad(0.2)])  # s, rad, rad/s
+START = np.array([1.0, 1.0, 0.5])  # times SCALE
+AWAY = 0.05  # times SCALE, from zero: where a fit starts, steps of a derivative being relative
+LONGEST = 0.05  # s of delay
+FLAT = 1e-6  # change of chi-square, relative, with which a fit is over
+INFORMED = 1e-3  # step of a derivative, times SCALE: shorter ones fall between the kinks of play and friction
+
+NOISE = np.deg2rad(0.1)  # rad at a tick of NOISE_PERIOD
+UNLIKELY = 5.0  # standard deviations
+UNIT = {"lag": ("s", 1.0), "delay": ("s", 1.0), "backlash": ("deg", 180.0 / np.pi), "friction": ("deg/s", 180.0 / np.pi)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Numbers a motor, (n,): values, standard deviations, and how well they explain the responses."""
+
+    parameters: MotorParameters
+    deviation: dict[str, Array]  # lag, delay s; backlash rad; friction rad/s
+    noise: Array  # rad, of the encoders at a tick of NOISE_PERIOD
+    chi_square: Array  # of the fitted responses, a degree of freedom: 1 if only encoder noise is left
+    misfit: Array  # rad, rms residual of the mean fitted response beyond the noise
+    held_out_chi_square: Array
+    held_out_misfit: Array
+
+
+def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Array]) -> Fit:
+    """`responses`: of each motor of the robot, in its order, to the same two signals."""
+    noise = np.array([_noise(each.fitted, each.held_out) for each in responses])  # at a tick of DT
+    sigma = noise / np.sqrt(responses[0].fitted[..., 0].size)  # of the mean response
+    measured, held_out = (_centred(np.array([q.mean(axis=(0, 1)) for q in kind])) for kind in zip(*map(_both, responses), strict=True))
+    problem = _Problem(robot, signals[0], measured / sigma[:, None], sigma)
+    x, delay, squares, delay_deviation = _best(problem, len(responses))
+    chi_square = squares / (measured.shape[1] - len(SHAPED) - 2)
+    excess = np.sqrt(np.maximum(chi_square, 1.0))  # what the model cannot explain makes the numbers less certain
+    deviation = dict(zip(SHAPED, (problem.deviation(delay, x) * excess[:, None]).T, strict=True))
+    parameters = _parameters(x, delay)
+    left = (held_out - _centred(respond(robot, parameters, signals[1]))) / sigma[:, None]
+    held_out_chi_square = np.square(left).mean(axis=1)
+    return Fit(
+        parameters,
+        {**deviation, "delay": delay_deviation * excess},
+        noise * np.sqrt(DT / NOISE_PERIOD),
+        chi_square,
+        sigma * np.sqrt(np.maximum(chi_square - 1.0, 0.0)),
+        held_out_chi_square,
+        sigma * np.sqrt(np.maximum(held_out_chi_square - 1.0, 0.0)),
+    )
+
+
+def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
+    """The model's encoder positions without noise, rad, (n, ticks), when every motor is commanded the signal (ticks,) rad/s."""
+    motors = Motors(robot, parameters, 0, robot.limits.mean(axis=1))
+    substeps = parameters.substeps(DT)
+    q = np.empty((len(signal), len(robot.motors)))
+    commanded = None
+    for tick, speed in enumerate(signal.tolist()):
+        q[tick] = motors.q
+        if speed != commanded:
+            motors.command(slice(None), "velocity", np.full(q.shape[1], speed))
+            commanded = speed
+        motors.move(substeps, DT / substeps)
+    return q.T
+
+
+class _Problem:
+    """Residuals of the model from mean responses, in units of their noise."""
+
+    def __init__(self, robot: Robot, signal: Array, measured: Array, sigma: Array) -> None:
+        self._robot, self._signal, self._measured, self._sigma = robot, signal, measured, sigma
+        motors, ticks = measured.shape
+        rows = np.arange(motors * ticks)
+        columns = (rows // ticks)[:, None] * len(SHAPED) + np.arange(len(SHAPED))
+        ones = np.ones(columns.size, dtype=np.int8)
+        self._sparsity = csr_array((ones, (rows.repeat(len(SHAPED)), columns.ravel())))  # a motor's rows depend on its own numbers
+
+    def solve(self, delay: float, start: Array) -> Array:
+        """Least squares at this delay from a start (n, 3) in SCALE; the same shape."""
+        motors = len(self._measured)
+        found = least_squares(
+            lambda x: self.residuals(delay, x.reshape(motors, -1)).ravel(),
+            start.ravel(),
+            bounds=(0.0, np.inf),
+            jac_sparsity=self._sparsity,
+            diff_step=INFORMED,
+            ftol=FLAT,
+        )
+        x: Array = found.x.reshape(motors, -1)
+        return x
+
+    def residuals(self, delay: float | Array, x: Array) -> Array:
+        """(n, ticks), one standard deviation of the noise is 1."""
+        predicted = _centred(respond(self._robot, _parameters(x, delay), self._signal)) / self._sigma[:, None]
+        difference: Array = predicted - self._measured
+        return difference
+
+    def deviation(self, delay: Array, x: Array) -> Array:
+        """Standard deviations at the solution, (n, 3), in s, rad, rad/s."""
+        here = self.residuals(delay, x)
+        steps = INFORMED * np.eye(len(SHAPED))
+        slopes = np.stack([(self.residuals(delay, x + step) - here) / INFORMED for step in steps], axis=-1)  # (n, ticks, 3)
+        covariance = np.linalg.inv(np.swapaxes(slopes, 1, 2) @ slopes)
+        spread: Array = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)) * SCALE
+        return spread
+
+
+def _both(responses: Responses) -> tuple[Array, Array]:
+    return responses.fitted, responses.held_out
+
+
+def _best(problem: _Problem, motors: int) -> tuple[Array, Array, Array, Array]:
+    """Of all delays the one that fits each motor best: x (n, 3), delay (n,) s, sum of squares (n,), deviation of the delay (n,) s."""
+    delays = np.arange(0.0, LONGEST + 1e-9, _substep())
+    x = np.tile(START, (motors, 1))
+    found, squares = [], []
+    for delay in delays:
+        x = problem.solve(delay, np.maximum(x, AWAY))
+        found.append(x)
+        squares.append(np.square(problem.residuals(delay, x)).sum(axis=1))
+    grid, each = np.array(squares), np.arange(motors)
+    best = grid.argmin(axis=0)
+    return np.array(found)[best, each], delays[best], grid[best, each], _delay_deviation(grid, best)
+
+
+def _parameters(x: Array, delay: float | Array) -> MotorParameters:
+    values = dict(zip(SHAPED, (x * SCALE).T, strict=True))
+    return MotorParameters(delay=np.broadcast_to(delay, len(x)).tolist(), encoder_noise=0.0, **{n: v.tolist() for n, v in values.items()})
+
+
+def _substep() -> float:
+    return DT / MotorParameters().substeps(DT)
+
+
+def _centred(q: Array) -> Array:
+    """Without the preload and without the mean of the rest, (n, ticks)."""
+    kept = q[:, PRELOAD:]
+    centred: Array = kept - kept.mean(axis=1, keepdims=True)
+    return centred
+
+
+def _noise(*responses: Array) -> float:
+    """Standard deviation of repetitions around their mean in a posture, rad, each without its own mean."""
+    squares, freedom = 0.0, 0
+    for each in responses:
+        kept = each[:, :, PRELOAD:]
+        shape = kept - kept.mean(axis=2, keepdims=True)
+        rest = shape - shape.mean(axis=1, keepdims=True)
+        squares += float(np.square(rest).sum())
+        freedom += kept.shape[0] * (kept.shape[1] - 1) * (kept.shape[2] - 1)
+    return float(np.sqrt(squares / freedom))
+
+
+def _delay_deviation(squares: Array, best: Array) -> Array:
+    """From the curvature of chi-square over the grid of delays around the best, s, (n,)."""
+    motors, middle = np.arange(squares.shape[1]), best.clip(1, len(squares) - 2)
+    curvature = squares[middle - 1, motors] + squares[middle + 1, motors] - 2.0 * squares[middle, motors]
+    deviation: Array = _substep() * np.sqrt(2.0 / curvature)
+    return deviation
+
+
+def known_motors(count: int, seed: int) -> MotorParameters:
+    """Random parameters over their whole range, every third motor without friction, every fifth without play."""
+    rng = np.random.default_rng([seed, 1])
+    lag, delay = rng.uniform(0.01, 0.1, count), 0.005 * rng.integers(0, 9, count)
+    backlash, friction = np.deg2rad(rng.uniform(0.0, 0.8, count)), np.deg2rad(rng.uniform(0.0, 2.0, count))
+    friction[::3], backlash[::5] = 0.0, 0.0
+    values = {"lag": lag, "delay": delay, "backlash": backlash, "friction": friction}
+    return MotorParameters(encoder_noise=0.0, **{name: value.tolist() for name, value in values.items()})
+
+
+def synthetic(
+    robot: Robot, parameters: MotorParameters, signals: tuple[Array, Array], shape: tuple[int, int], seed: int
+) -> list[Responses]:
+    """Responses of motors with these parameters, with encoder noise; `shape`: postures, repetitions."""
+    rng = np.random.default_rng([seed, 2])
+    sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)
+    clean = [respond(robot, parameters, signal) for signal in signals]
+    return [
+        Responses(*(each[motor] + sigma * rng.standard_normal((*shape, each.shape[1])) for each in clean))
+        for motor in range(len(robot.motors))
+    ]
+
+
+def check_method(robot: Robot, postures: int, repetitions: int, seed: int) -> dict[str, Any]:
+    """The largest errors over as many motors as the robot has, absolute and in their standard deviations."""
+    signals = fitted_signal(), held_out_signal(np.random.default_rng(seed))
+    known = known_motors(len(robot.motors), seed)
+    found = fit(robot, synthetic(robot, known, signals, (postures, repetitions), seed), signals)
+    table = {name: _errors(name, known, found) for name in FITTED}
+    return {"passed": all(row["in_deviations"] < UNLIKELY for row in table.values()), **table}
+
+
+def _errors(name: str, known: MotorParameters, found: Fit) -> dict[str, Any]:
+    unit, factor = UNIT[name]
+    error = np.abs(np.subtract(getattr(found.parameters, name), getattr(known, name)))
+    return {"largest": float(error.max() * factor), "unit": unit, "in_deviations": float((error / found.deviation[name]).max())}

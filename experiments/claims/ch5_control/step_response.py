@@ -1,0 +1,219 @@
+"""Settle: step responses, how long they last, whether they overshoot, and whether that depends on the control period.
+
+Claim: at control periods of 1 to 20 ms alike, every motor alone and whole postures go where they are sent and stay there, with the
+default gains in three and six seconds at most (steps of 20 degrees alone, of up to half a range together), without overshoot worth
+the name.  Source: thesis 5.2 (the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of
+an arm took some 9.6 s, 18 000 in two days, three agents at once (thesis 7.3).
+Run time: a few minutes.
+
+Settling time: until the joint stays within 5 % of the step around where it comes to rest.  Error: how far that is from the attractor, as
+it must be where a limit or a constraint pushes.  Measured are the joints, not the encoders; the motors have lag, delay, play and noise.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.control_runs import COLORS, GAINS, PERIOD, icub
+from experiments.kit.experiment import Experiment
+from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.plots import new_figure
+from experiments.kit.records import Row
+from experiments.kit.step_responses import motor_step, postures, run_step, step_response
+from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import Gains
+from mobee.arrays import Array
+from mobee.errors import UnknownName
+from mobee.simulation import OfflinePlant
+
+PERIODS = (1.0, 2.0, 5.0, 10.0, 20.0)  # ms
+QUICK_PERIODS = (10.0, 20.0)  # ms
+QUICK_MOTORS, QUICK_POSTURES = ("torso_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup"), 2
+OVERSHOOT, ALONE, TOGETHER = 0.05, 3.0, 6.0  # of the step; s, a motor and a posture: what is asked of the default gains
+POSTURE = "posture "  # how the name of a step of many motors begins
+
+SHOWN = QUICK_MOTORS
+SHARES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # % of a step, marked
+ASIDE = {False: 0.96, True: 1.04}  # the mark of a motor, and of a posture, stands at so many times its period
+
+
+@dataclass(frozen=True, slots=True)
+class Response(Row):
+    """A step and its measures, see `StepResponse`."""
+
+    gains: str
+    period_ms: float
+    step: str  # the motor, or "posture 3"
+    settling: float
+    overshoot: float
+    error_deg: float
+    rest_deg: float
+    is_settled: bool
+
+    @property
+    def is_posture(self) -> bool:
+        """Whether many motors stepped together."""
+        return self.step.startswith(POSTURE)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Gains, periods, postures and motors."""
+    parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
+    parser.add_argument("--periods", nargs="+", type=positive_number, default=list(PERIODS), metavar="MS", help="control periods in ms")
+    parser.add_argument("--postures", type=positive_whole, default=10, metavar="N", help="steps of torso and arms together (default: 10)")
+    parser.add_argument("--motors", nargs="+", metavar="MOTOR", help="that step alone (default: all)")
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every gain set, period and step; motors that the gain set never moves are left out.
+
+    Raises UnknownName, and InvalidValue for a period at which the law is not stable.
+    """
+    known, periods, chosen, count = icub().robot.motors, arguments.periods, arguments.motors, arguments.postures
+    if arguments.quick:
+        periods, chosen, count = [p for p in periods if p in QUICK_PERIODS], chosen or QUICK_MOTORS, min(count, QUICK_POSTURES)
+    for name in chosen or ():
+        if name not in known:
+            raise UnknownName("motor", name, known)
+    found = []
+    for gains in arguments.gains:
+        weight = Gains.named(gains).weight(known)
+        steps = [motor for i, motor in enumerate(known) if weight[i] and (chosen is None or motor in chosen)]
+        steps += [f"{POSTURE}{number}" for number in range(count)]
+        for period in periods:
+            OfflinePlant(icub(), gains=Gains.named(gains), dt=period / 1e3)  # refuses an unstable period before anything is run
+            for step in steps:
+                name = f"{gains}-{period:g}-{step.replace(' ', '-')}"
+                found.append(Condition(name, {"gains": gains, "period_ms": period, "step": step}, 1.0 / period))
+    return found
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """One step."""
+    step, gains = settings["step"], Gains.named(settings["gains"])
+    if step.startswith(POSTURE):
+        number = int(step.removeprefix(POSTURE))
+        start, end = _posture_step(settings["gains"], number, seed)
+    else:
+        number = icub().robot.motors.index(step)
+        start, end = motor_step(number)
+    measured = step_response(run_step(gains, settings["period_ms"], start, end, seed + number), start, end)
+    return Response(**settings, **asdict(measured)).record()
+
+
+def _posture_step(gains: str, number: int, seed: int) -> tuple[Array, Array]:
+    """From the posture before, or home, to a posture; motors that the gain set never moves stay at home."""
+    home, moving = icub().robot.home, Gains.named(gains).weight(icub().robot.motors) > 0
+    before, after = (_posture(n, seed) if n >= 0 else home for n in (number - 1, number))
+    return np.where(moving, before, home), np.where(moving, after, home)
+
+
+@cache
+def _posture(number: int, seed: int) -> Array:
+    return postures(number + 1, seed)[-1]
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """Median and worst of each gain set and period."""
+    responses = _responses(found)
+    table: dict[str, Any] = {}
+    for gains in GAINS:
+        for period in sorted({one.period_ms for one in responses}):
+            for kind in ("motors", "postures"):
+                mine = [one for one in responses if (one.gains, one.period_ms, one.is_posture) == (gains, period, kind == "postures")]
+                if mine:
+                    table.setdefault(gains, {})[f"{period:g} ms, {kind}"] = _summary(mine)
+    judged = [one for one in responses if one.gains == "default"]
+    return {"passed": all(map(_is_good, judged)) if judged else None, "each": "median and worst", **table}
+
+
+def _is_good(one: Response) -> bool:
+    return one.is_settled and one.overshoot <= OVERSHOOT and one.settling <= (TOGETHER if one.is_posture else ALONE)
+
+
+def _summary(responses: Sequence[Response]) -> dict[str, Any]:
+    return {
+        "steps": len(responses),
+        "never_settled": sum(not one.is_settled for one in responses),
+        "settling_time_s": _median_and_worst([one.settling for one in responses]),
+        "overshoot": _median_and_worst([one.overshoot for one in responses]),
+        "error_deg": _median_and_worst([one.error_deg for one in responses]),
+        "rest_deg": _median_and_worst([one.rest_deg for one in responses]),
+    }
+
+
+def _median_and_worst(values: Sequence[float]) -> list[float]:
+    return [round(float(np.median(values)), 4), round(max(values), 4)]
+
+
+def _responses(found: Cells) -> list[Response]:
+    return [Response(**result.values) for result in found.values()]
+
+
+def plot(found: Cells) -> Any:
+    """Settling time and overshoot against the control period, and the responses of some motors."""
+    responses = _responses(found)
+    drawing = new_figure(13.0, 4.2)
+    time, overshoot, steps = drawing.subplots(1, 3)
+    _against_period(time, responses, lambda one: one.settling)
+    time.set(ylabel="settling time to 5 % [s]", title="Settling: median, least and most")
+    time.legend(fontsize=7)
+    _against_period(overshoot, responses, lambda one: 100.0 * one.overshoot)
+    overshoot.set(ylabel="overshoot [% of the step]", title="Overshoot: median, least and most", yscale="symlog", ylim=(0.0, None))
+    overshoot.set_yticks(SHARES, [f"{share:g}" for share in SHARES])
+    _single_steps(steps, [gains for gains in GAINS if any(one.gains == gains for one in responses)])
+    for axes in (time, overshoot, steps):
+        axes.grid(alpha=0.2)
+    return drawing
+
+
+def _against_period(axes: Any, responses: Sequence[Response], value: Callable[[Response], float]) -> None:
+    periods = sorted({one.period_ms for one in responses})
+    for gains, is_posture in sorted({(one.gains, one.is_posture) for one in responses}):
+        mine = [one for one in responses if (one.gains, one.is_posture) == (gains, is_posture)]
+        at = sorted({one.period_ms for one in mine})
+        values = [[value(one) for one in mine if one.period_ms == period] for period in at]
+        low, middle, high = (np.array([of(v) for v in values]) for of in (min, np.median, max))
+        axes.errorbar(
+            np.array(at) * ASIDE[is_posture],
+            middle,
+            [middle - low, high - middle],
+            color=COLORS[gains],
+            marker="s" if is_posture else "o",
+            markersize=4.0,
+            capsize=2.0,
+            linestyle=":" if is_posture else "-",
+            label=f"{gains}, {'torso and arms' if is_posture else 'each motor alone'}",
+        )
+    axes.set(xlabel="control period [ms]", xscale="log", xlim=(periods[0] / 1.3, periods[-1] * 1.3), ylim=(0.0, None))
+    axes.set_xticks(periods, [f"{period:g}" for period in periods])
+    axes.minorticks_off()
+
+
+def _single_steps(axes: Any, sets: Sequence[str]) -> None:
+    for gains in sets:
+        for i, motor in enumerate(SHOWN):
+            joint = icub().robot.motors.index(motor)
+            start, end = motor_step(joint)
+            run = run_step(Gains.named(gains), 1e3 * PERIOD[gains], start, end, seed=i)
+            share = (run.q[:, joint] - start[joint]) / (end - start)[joint]
+            axes.plot(run.times, share, color=COLORS[gains], alpha=0.5, linewidth=1.0, label=None if i else gains)
+    axes.axhline(1.0, color="0.5", linewidth=0.8)
+    axes.set(xlabel="time [s]", ylabel="share of the step", title=", ".join(SHOWN), xlim=(0.0, 5.0))
+    axes.title.set_fontsize(9)
+    axes.legend(fontsize=7, loc="lower right")
+
+
+EXPERIMENT = Experiment(
+    name="step-response",
+    claim="motors alone and whole postures settle in seconds without overshoot, alike at control periods of 1 to 20 ms",
+    source="thesis 5.2, eq. 5.7",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
+)

@@ -1,0 +1,324 @@
+"""Lattice: what does the curious agent find out about the shoulder's constraints, and how does its planning show in its tries?
+
+Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (50-50) or 2651 (60-40); the states 24, 51
+and 78 are hard to get into because some actions that should lead there fail; the agent's tries of what can be done there dip, the
+less the farther it plans ahead; an agent that expects success (60-40) tries the failing actions most often.
+Source: thesis 7.2.2 to 7.2.5, figs. 7.4, 7.6 and 7.7; 5 runs a setting.  Run time: 1 minute on 2 cores.
+
+The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both initialisations, until
+every state-action was tried 5 times.  A state-action fails when it does not end in its goal state.  Actions are named by source
+and goal state: the numbers of state-actions in the thesis leave their order open.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import spearmanr
+
+from experiments.kit.arm_learning import arm_plant, arm_space
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.outcomes import exists_in, failures_of, uncertain_in, visits_of
+from experiments.kit.plots import draw_stacked_bars, new_figure
+from experiments.kit.statistics import (
+    decides,
+    estimate,
+    interquartile_mean,
+    interval,
+    mean_over,
+    ratio_estimate,
+    ratio_interval,
+    relative_spread,
+)
+from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
+from mobee import CuriousAgent, Lattice
+from mobee.arrays import Array, Ints
+
+DISCOUNTS = (0.5, 0.9, 0.99)
+INITIAL = ("50-50", "60-40")
+LEAST = 5  # tries
+MOST = 20_000  # transitions, should an action be beyond reach
+PUBLISHED = {"50-50": 2987, "60-40": 2651}
+TOLERANCE = 0.1  # of a published number of actions
+HARD = (24, 51, 78)  # the thesis' states that are hard to get into: pitch low, roll and yaw high, any elbow
+FAILING = ((15, 24), (42, 51), (69, 78))  # (source, goal), in red in fig. 7.4
+ENTERING = ((21, 24), (48, 51), (75, 78))  # actions into the same states that succeed
+
+NUMBERS = {
+    initial: Claim(
+        f"thesis 7.2.2, fig. {figure}", f"{initial}: every state-action tried 5 times after so many actions, within 10 %", f"{actions}"
+    )
+    for (initial, actions), figure in zip(PUBLISHED.items(), ("7.6", "7.7"), strict=True)
+}
+SOONER = Claim("thesis 7.2.2, figs. 7.6, 7.7", "60-40 takes fewer actions than 50-50: their ratio", "0.89 (2651 / 2987)")
+LEAST_VISITED = Claim("thesis 7.2.5", "the least visited states are 24, 51 and 78", "those three")
+FAIL = Claim("thesis 7.2.5, fig. 7.4", "the actions 15->24, 42->51 and 69->78 fail: share of failures", "infeasible")
+ENTER = Claim("thesis 7.2.5", "other actions into the same states, as 21->24, succeed", "succeed")
+SPIKES = Claim(
+    "thesis 7.2.5, fig. 7.6", "50-50: the actions that do enter them are tried more than others, the more the larger the discount", "spikes"
+)
+DIPS = Claim(
+    "thesis 7.2.5, fig. 7.6", "50-50: tries of actions from 24, 51, 78 are below the average, the less the larger the discount", "dips"
+)
+PEAKS = Claim(
+    "thesis 7.2.5, fig. 7.7", "60-40: the failing actions into 24, 51, 78 stand out in tries at every discount", "peaks at 80, 230, 378"
+)
+DEGREE = Claim("thesis 7.2.3", "states are visited the more often the more actions lead into them", "qualitative")
+UNIFORM = Claim("thesis 7.2.4", "tries over state-actions are fairly uniform, more so than visits over states", "qualitative")
+STOCHASTIC = Claim(
+    "thesis 7.2.5", "static constraints make outcomes uncertain: some actions sometimes fail and sometimes succeed", "qualitative"
+)
+CLAIMS = (*NUMBERS.values(), SOONER, LEAST_VISITED, FAIL, ENTER, SPIKES, DIPS, PEAKS, DEGREE, UNIFORM, STOCHASTIC)
+
+Action = tuple[int, int]  # source and goal state
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every initialisation and discount; the short version tries everything once."""
+    least, name = (1, "quick-") if arguments.quick else (LEAST, "")
+    return [
+        Condition(f"{name}{initial}-g{discount:g}", {"initial": initial, "discount": discount, "least": least})
+        for initial, discount in product(INITIAL, DISCOUNTS)
+    ]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Explore until everything was tried often enough; transitions (T, 3), tries and values (81, 8) at the end."""
+    space, plant = arm_space(), arm_plant(seed)
+    begin_anywhere(space, plant, seed)
+    agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"], initial=settings["initial"])
+    seen = explore(agent, MOST, LeastTries(settings["least"], space.state_actions))
+    return {
+        "seen": seen.astype(np.uint16),
+        "tries": agent.model.tries.astype(np.uint16),
+        "values": agent.plan()[1].astype(np.float32),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One exploration: transitions (T, 3), tries (81, 8), and the values at the end (81, 8)."""
+
+    space: Lattice
+    seen: Ints
+    tries: Ints
+    values: Array
+
+    @property
+    def transitions(self) -> float:
+        """The number of transitions."""
+        return float(len(self.seen))
+
+    @cached_property
+    def visits(self) -> Ints:
+        """The number of times each state was reached, (81,)."""
+        return visits_of(self.space, self.seen)
+
+    @cached_property
+    def failures(self) -> Ints:
+        """The number of tries of each state-action that did not end in its goal, (81, 8)."""
+        return failures_of(self.space, self.seen)
+
+    @property
+    def exists(self) -> NDArray[np.bool_]:
+        """Which entries of (81, 8) are state-actions."""
+        return exists_in(self.space)
+
+    @property
+    def hard_visits(self) -> float:
+        """Visits of the hard states over those of all, means."""
+        return float(self.visits[list(HARD)].mean() / self.visits.mean())
+
+    def share_failed(self, actions: Sequence[Action]) -> float:
+        """The share of failures in all tries of these actions."""
+        at = tuple(np.array([self.index(action) for action in actions]).T)
+        return float(self.failures[at].sum() / self.tries[at].sum())
+
+    def relative_tries(self, actions: Sequence[Action]) -> float:
+        """Tries of these actions over those of all, means."""
+        return float(np.mean([self.tries[self.index(action)] for action in actions]) / self.tries[self.exists].mean())
+
+    def index(self, action: Action) -> tuple[int, int]:
+        """Row and column of an action in (81, 8)."""
+        return action[0], int(np.flatnonzero(self.space.actions(action[0]) == action[1])[0])
+
+    @property
+    def out_of_hard(self) -> list[Action]:
+        """All actions of the hard states."""
+        return [(state, int(goal)) for state in HARD for goal in self.space.actions(state)]
+
+
+Groups = Mapping[tuple[str, float], list[Run]]  # initialisation and discount
+
+
+def groups(found: Cells) -> Groups:
+    """The runs of each setting, by seed."""
+    space = arm_space()
+    return {
+        key: [Run(space, *(result.values[name] for name in ("seen", "tries", "values"))) for result in results]
+        for key, results in sorted(grouped_by(found, "initial", "discount").items())
+    }
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """A row for each setting, and the claims if all settings were run."""
+    grouped = groups(found)
+    rows = {f"{initial}, discount {discount:g}": _row(runs) for (initial, discount), runs in grouped.items()}
+    complete = all(setting in grouped for setting in product(INITIAL, DISCOUNTS))
+    return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
+
+
+def _row(runs: list[Run]) -> dict[str, Any]:
+    low, high = interval([run.transitions for run in runs])
+    return {
+        "seeds": len(runs),
+        "actions": mean_over(runs, lambda run: run.transitions),
+        "low": low,
+        "high": high,
+        "hard_visits": mean_over(runs, lambda run: run.hard_visits),
+        "hard_tries": mean_over(runs, lambda run: run.relative_tries(run.out_of_hard)),
+        "failing_tries": mean_over(runs, lambda run: run.relative_tries(FAILING)),
+        "entering_tries": mean_over(runs, lambda run: run.relative_tries(ENTERING)),
+        "failing_fail": mean_over(runs, lambda run: run.share_failed(FAILING)),
+        "entering_fail": mean_over(runs, lambda run: run.share_failed(ENTERING)),
+        "value": mean_over(runs, lambda run: float(run.values[run.exists].mean())),
+    }
+
+
+def measured(grouped: Groups) -> list[Claim]:
+    """The claims with our numbers, of the runs of all settings."""
+    every = [run for runs in grouped.values() for run in runs]
+    return [
+        *(_number(grouped, initial) for initial in INITIAL),
+        SOONER.measured(*_sooner(_actions(grouped, "60-40"), _actions(grouped, "50-50"))),
+        _least_visited(every),
+        _share(FAIL, every, FAILING, lambda low, high: low > 0.5),
+        _share(ENTER, every, ENTERING, lambda low, high: high < 0.1),
+        _by_discount(SPIKES, grouped, lambda run: run.relative_tries(ENTERING), lambda low, high: low > 1.0),
+        _by_discount(DIPS, grouped, lambda run: run.relative_tries(run.out_of_hard), lambda low, high: high < 1.0),
+        _peaks(grouped),
+        _degree(every),
+        _uniform(every),
+        _stochastic(every),
+    ]
+
+
+def _actions(grouped: Groups, initial: str) -> list[float]:
+    return [run.transitions for discount in DISCOUNTS for run in grouped[initial, discount]]
+
+
+def _by_discounts(values: Mapping[float, list[float]], digits: int = 2) -> list[str]:
+    return [f"{estimate(mine, digits)} at discount {discount:g}" for discount, mine in values.items()]
+
+
+def _number(grouped: Groups, initial: str) -> Claim:
+    actions = {discount: [run.transitions for run in grouped[initial, discount]] for discount in DISCOUNTS}
+    strata = [discount for discount, mine in actions.items() for _ in mine]
+    span = interval(_actions(grouped, initial), strata=strata)
+    least, most = PUBLISHED[initial] * (1.0 - TOLERANCE), PUBLISHED[initial] * (1.0 + TOLERANCE)
+    return NUMBERS[initial].measured("; ".join(_by_discounts(actions, 0)), decides(span, least, most))
+
+
+def _sooner(optimistic: list[float], even: list[float]) -> tuple[str, bool]:
+    return ratio_estimate(optimistic, even), ratio_interval(optimistic, even)[1] < 1.0
+
+
+def _least_visited(every: list[Run]) -> Claim:
+    hits = [len(set(np.argsort(run.visits, kind="stable")[:3].tolist()) & set(HARD)) for run in every]
+    together = np.argsort(sum(run.visits for run in every), kind="stable")[:3].tolist()
+    text = (
+        f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a run; "
+        f"visits over the mean of all states {estimate([run.hard_visits for run in every])}"
+    )
+    return LEAST_VISITED.measured(text, set(together) == set(HARD))
+
+
+def _share(claim: Claim, every: list[Run], actions: Sequence[Action], holds: Callable[[float, float], bool]) -> Claim:
+    """Whether the share of failures of each action holds, by its interval."""
+    shares = {action: [run.share_failed([action]) for run in every] for action in actions}
+    text = ", ".join(f"{source}->{goal} {estimate(mine)}" for (source, goal), mine in shares.items())
+    return claim.measured(f"fail {text}", all(holds(*interval(mine)) for mine in shares.values()))
+
+
+def _by_discount(claim: Claim, grouped: Groups, number: Callable[[Run], float], stands_out: Callable[[float, float], bool]) -> Claim:
+    """Whether the tries stand out at the smallest discount, and grow from each discount to the next; open where the ends do not differ."""
+    values = {discount: [number(run) for run in grouped["50-50", discount]] for discount in DISCOUNTS}
+    first, *_, last = values.values()
+    means = [interquartile_mean(mine) for mine in values.values()]
+    holds = stands_out(*interval(first)) and means == sorted(means)
+    grows = decides(ratio_interval(last, first), least=1.0)
+    return claim.measured("tries over the mean of all: " + ", ".join(_by_discounts(values)), grows if holds else False)
+
+
+def _peaks(grouped: Groups) -> Claim:
+    values = {discount: [run.relative_tries(FAILING) for run in grouped["60-40", discount]] for discount in DISCOUNTS}
+    even = [run.relative_tries(FAILING) for discount in DISCOUNTS for run in grouped["50-50", discount]]
+    text = "tries over the mean of all: " + ", ".join(_by_discounts(values)) + f"; 50-50: {estimate(even)}"
+    return PEAKS.measured(text, all(interval(mine)[0] > 1.0 for mine in values.values()))
+
+
+def _degree(every: list[Run]) -> Claim:
+    goals = every[0].space.goals
+    degree = np.bincount(goals[goals >= 0], minlength=len(goals))
+    correlations = [float(spearmanr(degree, run.visits).statistic) for run in every]
+    return DEGREE.measured(f"rank correlation {estimate(correlations)}", interval(correlations)[0] > 0.5)
+
+
+def _uniform(every: list[Run]) -> Claim:
+    tries, visits = [relative_spread(run.tries[run.exists]) for run in every], [relative_spread(run.visits) for run in every]
+    text = f"standard deviation over mean: tries {estimate(tries)}, visits {estimate(visits)}"
+    return UNIFORM.measured(text, decides(ratio_interval(tries, visits), most=1.0))
+
+
+def _stochastic(every: list[Run]) -> Claim:
+    counts = [float(uncertain_in(run.space, run.seen)) for run in every]
+    text = f"{estimate(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
+    return STOCHASTIC.measured(text, interval(counts)[0] >= 1.0)
+
+
+def plot(found: Cells) -> Any:
+    """Tries and values of every state-action, as in figs. 7.6 and 7.7: a row an initialisation and discount, a colour a run."""
+    grouped = groups(found)
+    drawing = new_figure(15.0, 2.3 * len(grouped))
+    for row, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):
+        mean = np.mean([run.transitions for run in runs])
+        _bars(row[0], runs, [run.tries for run in runs])
+        row[0].set_title(f"tries, {initial}, discount {discount:g}: {len(runs)} runs of {mean:.0f} actions on average", fontsize=9)
+        _bars(row[1], runs, [np.maximum(run.values, 0.0) for run in runs])
+        row[1].set_title(f"values, {initial}, discount {discount:g}", fontsize=9)
+    for axes in row:
+        axes.set_xlabel("state-action; grey: those of states 24, 51, 78; triangles: the failing 15->24, 42->51, 69->78")
+    return drawing
+
+
+def _bars(axes: Any, runs: list[Run], given: Sequence[Any]) -> None:
+    """A bar for each state-action, by source state, with the hard states and the failing actions marked."""
+    exists = runs[0].exists
+    number = np.cumsum(exists.ravel()).reshape(exists.shape) - 1
+    heights = draw_stacked_bars(axes, [values[exists].astype(float) for values in given])
+    for state in HARD:
+        mine = number[state][exists[state]]
+        axes.axvspan(mine[0] - 0.5, mine[-1] + 0.5, color="0.8", zorder=0)
+    at = [number[runs[0].index(action)] for action in FAILING]
+    axes.plot(at, heights[at] + 0.04 * heights.max(), "kv", markersize=4)
+    axes.set_xlim(-0.5, len(heights) - 0.5)
+
+
+EXPERIMENT = Experiment(
+    name="constraint-discovery",
+    claim="81 states: three are hard to enter, since actions into them fail; who looks farther ahead minds less, "
+    "who expects success goes there",
+    source="thesis 7.2.2-7.2.5",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot),
+    claims=CLAIMS,
+)

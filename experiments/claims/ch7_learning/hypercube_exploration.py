@@ -1,0 +1,189 @@
+"""Hypercube: does the curious agent work as expected where every action succeeds?
+
+Claim: on the hypercube of 16 states and 64 actions all actions succeed, every action is tried at least 5 times after about the
+fewest transitions possible, tries and values become uniform, and the values grow with the discount factor.
+Source: thesis 7.1, figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Published number: 320 actions (64 x 5).
+Run time: 10 seconds on 2 cores.
+
+The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, 50-50 initialisation.
+Tries and values are recorded after 50 transitions and at the end.  Uniformity of early tries: their variance over that of a
+uniformly random choice among 64 actions, 1 for a random choice and 0 for equal tries (spread_early, spread_end).  uneven_value:
+standard deviation over mean of the values; value_of_limit: their mean over what earning the mean reward indefinitely is worth.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.outcomes import first_tries, goals_of
+from experiments.kit.plots import draw_stacked_bars, new_figure
+from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, relative_spread
+from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from mobee import CuriousAgent, value_iteration
+from mobee.arrays import Array
+
+DISCOUNTS = (0.5, 0.9, 0.99)
+EARLY, LEAST = 50, 5  # transitions, tries
+MOST = 5_000  # transitions, should an action be beyond reach
+TOLERANCE = 1e-9  # nats
+PUBLISHED = 320
+ALIKE = (0.5, 2.0)  # times the variance of a uniform choice: like it
+
+SUCCEED = Claim("thesis 7.1", "all actions of the hypercube bring the agent to their goal state", "all")
+ACTIONS = Claim("thesis 7.1, fig. 7.3", "every state-action has been tried at least 5 times after 320 actions", "320 (= 64 x 5)")
+UNIFORM = Claim(
+    "thesis 7.1, figs. 7.2, 7.3", "action selection is noisy like uniform sampling early, and becomes increasingly uniform", "figures only"
+)
+FLAT = Claim("thesis 7.1, figs. 7.2, 7.3", "the value function becomes uniform", "figures only")
+PROPORTIONAL = Claim("thesis 7.1, figs. 7.2, 7.3", "value is roughly proportional to the discount factor", "figures only")
+CLAIMS = (SUCCEED, ACTIONS, UNIFORM, FLAT, PROPORTIONAL)
+
+Groups = Mapping[float, list[dict[str, Any]]]  # the values of the runs of each discount
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Every discount; there is no shorter version."""
+    return [Condition(f"g{discount:g}", {"discount": discount}) for discount in DISCOUNTS]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Explore until every action was tried 5 times; tries and values (16, 4) early and at the end."""
+    space, plant = arm_space(HYPERCUBE), arm_plant(seed)
+    begin_anywhere(space, plant, seed)
+    agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"])
+    enough = LeastTries(LEAST, space.state_actions)
+    early = explore(agent, EARLY, enough)
+    values: dict[str, Any] = {"early_tries": agent.model.tries.copy(), "early_values": _values(agent)}
+    seen = np.concatenate([early, explore(agent, MOST, enough)])
+    new = first_tries(space, seen)
+    return values | {
+        "tries": agent.model.tries.copy(),
+        "values": _values(agent),
+        "rewards": agent.model.reward.copy(),
+        "seen": seen,
+        "transitions": len(seen),
+        "all_once": int(new[-1]) if len(new) == space.state_actions else None,
+        "failed": int((seen[:, 2] != goals_of(space, seen)).sum()),
+    }
+
+
+def _values(agent: CuriousAgent) -> Array:
+    """Of the actions, with a smaller tolerance than the agent's own."""
+    return value_iteration(agent.model, agent.model.reward, agent.discount, TOLERANCE)[1]
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """A row for each discount, and the claims."""
+    groups = grouped(found, "discount", DISCOUNTS)
+    rows = {f"discount {discount:g}": _row(discount, runs) for discount, runs in groups.items()}
+    return {"runs": rows, "claims": [claim.record() for claim in measured(groups)]}
+
+
+def _row(discount: float, runs: list[dict[str, Any]]) -> dict[str, Any]:
+    actions = [run["transitions"] for run in runs]
+    low, high = interval(actions)
+    return {
+        "seeds": len(runs),
+        "actions": interquartile_mean(actions),
+        "low": low,
+        "high": high,
+        "all_once": mean_over(runs, lambda run: run["all_once"] or run["transitions"]),
+        "spread_early": mean_over(runs, lambda run: dispersion(run["early_tries"])),
+        "spread_end": mean_over(runs, lambda run: dispersion(run["tries"])),
+        "uneven_value": mean_over(runs, lambda run: relative_spread(run["values"])),
+        "value_of_limit": mean_over(runs, lambda run: _share_of_limit(discount, run)),
+        "value": mean_over(runs, _mean_value),
+        "failed": sum(run["failed"] for run in runs),
+    }
+
+
+def dispersion(tries: Array) -> float:
+    """Variance of tries over that of a uniformly random choice of state-actions: 1 for a random choice, 0 for equal tries."""
+    count, total = tries.size, tries.sum()
+    return float(tries.var() / (total / count * (1.0 - 1.0 / count)))
+
+
+def _mean_value(run: Mapping[str, Any]) -> float:
+    return float(run["values"].mean())
+
+
+def _share_of_limit(discount: float, run: Mapping[str, Any]) -> float:
+    """1 where the value is that of earning the mean reward indefinitely."""
+    return float(run["values"].mean() * (1.0 - discount) / run["rewards"].mean())
+
+
+def measured(groups: Groups) -> list[Claim]:
+    """The claims with our numbers."""
+    every = [run for runs in groups.values() for run in runs]
+    return [_succeed(every), _actions(groups), _uniform(every), _flat(every), _proportional(groups)]
+
+
+def _succeed(every: list[dict[str, Any]]) -> Claim:
+    failed, total = (sum(run[name] for run in every) for name in ("failed", "transitions"))
+    return SUCCEED.measured(f"{total - failed} of {total}", failed == 0)
+
+
+def _actions(groups: Groups) -> Claim:
+    actions = {discount: [run["transitions"] for run in runs] for discount, runs in groups.items()}
+    text = "; ".join(f"{estimate(mine, 0)} at discount {discount:g}" for discount, mine in actions.items())
+    return ACTIONS.measured(text, all(interval(mine)[1] <= 1.05 * PUBLISHED for mine in actions.values()))
+
+
+def _uniform(every: list[dict[str, Any]]) -> Claim:
+    early, end = ([dispersion(run[name]) for run in every] for name in ("early_tries", "tries"))
+    (low, high), (_, end_high) = interval(early), interval(end)
+    text = f"variance of tries over a uniform choice's: {estimate(early)} after {EARLY}, {estimate(end)} at the end"
+    return UNIFORM.measured(text, ALIKE[0] <= low and high <= ALIKE[1] and end_high < low)
+
+
+def _flat(every: list[dict[str, Any]]) -> Claim:
+    early, end = (max(relative_spread(run[name]) for run in every) for name in ("early_values", "values"))
+    return FLAT.measured(f"standard deviation / mean at most {early:.2f} after {EARLY}, {end:.3f} at the end", end < min(0.1, early))
+
+
+def _proportional(groups: Groups) -> Claim:
+    """In the limit it is the mean reward / (1 - discount), which grows much faster than the discount."""
+    means = {discount: mean_over(runs, _mean_value) for discount, runs in groups.items()}
+    shares = [interquartile_mean([_share_of_limit(discount, run) for run in runs]) for discount, runs in groups.items()]
+    of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
+    low, high = min(means), max(means)
+    grown = means[high] / means[low]
+    text = (
+        f"mean value {', '.join(f'{1e3 * value:.3g}' for value in means.values())} x 1e-3 nats at {', '.join(f'{d:g}' for d in means)}: "
+        f"{of_limit} of mean reward / (1 - discount), proportional to that"
+    )
+    return PROPORTIONAL.measured(text, abs(grown / (high / low) - 1.0) < 0.5)
+
+
+COLUMNS = (("early_tries", f"tries after {EARLY} actions"), ("early_values", "value"), ("tries", "tries at the end"), ("values", "value"))
+
+
+def plot(found: Cells) -> Any:
+    """Tries and values of every state-action, early and at the end, as in figs. 7.2 and 7.3: a row a discount, a colour a run."""
+    groups = grouped(found, "discount", DISCOUNTS)
+    drawing = new_figure(14.0, 2.6 * len(groups))
+    for row, (discount, runs) in zip(drawing.subplots(len(groups), 4, squeeze=False), groups.items(), strict=True):
+        for axes, (name, title) in zip(row, COLUMNS, strict=True):
+            draw_stacked_bars(axes, [np.maximum(run[name].ravel(), 0.0) for run in runs])
+            axes.set_title(f"{title}, discount {discount:g}", fontsize=9)
+    for axes in row:
+        axes.set_xlabel("state-action")
+    return drawing
+
+
+EXPERIMENT = Experiment(
+    name="hypercube-exploration",
+    claim="on 16 states where every action succeeds, each is tried 5 times after about 320 actions, and tries and values become uniform",
+    source="thesis 7.1",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot),
+    claims=CLAIMS,
+)

@@ -1,0 +1,342 @@
+"""Rank 4: which states of a large lattice can an arm never reach, and what becomes of the actions that aim at them?
+
+Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches 60, 124, 188 and 252 and hardly ever 61,
+125, 189 and 253, though it tries hundreds of times, for the cables of the shoulder turn it away; 57->61 ends in 62, 121->125 in
+126, 249->253 in 254.  Of the lattice stretched to 12.5 and 87.5 % far more states are out of reach.  The arm often touches its
+own body, and reaches its goal nevertheless.
+Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 3 minutes on 2 cores.
+
+The left arm from a random state, 50-50 initialisation, discount 0.9.  An action touches the own body if fields of two links overlap at any
+time while it lasts.  State numbers: pitch fastest, then roll, yaw and elbow.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.claims.ch7_learning.self_contacts import SelfContact, SelfContactPlant
+from experiments.kit.arm_learning import RANK4, STRETCHED, arm_plant, arm_space
+from experiments.kit.claims import Claim
+from experiments.kit.experiment import Experiment
+from experiments.kit.exploration import begin_anywhere, explore
+from experiments.kit.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
+from experiments.kit.plots import new_figure
+from experiments.kit.statistics import estimate, interval, mean_over
+from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from mobee import CuriousAgent, Lattice
+from mobee.arrays import Array, Ints
+
+LEVELS = {"small": RANK4, "stretched": STRETCHED}
+ACTIONS = {"small": 14_597, "stretched": 26_963}
+NEVER, HARDLY = (60, 124, 188, 252), (61, 125, 189, 253)
+ASIDE = {(57, 61): 62, (121, 125): 126, (249, 253): 254}  # (source, goal): where it ends
+QUICK = 0.2  # of the transitions
+MOST_VISITS, LEAST_ASIDE, HANDFUL = 10, 100, 10
+MANY = 0.01  # of the actions, for self-contacts to be many
+
+UNREACHED = Claim("thesis 7.3, fig. 7.8", "20-80 %: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
+RARE = Claim("thesis 7.3", "20-80 %: 61, 125, 189 and 253 are reached at most 10 times each in 14 597 actions", "2, 3, 0 and 2 times")
+TURNED = Claim(
+    "thesis 7.3",
+    "57->61 ends in 62, 121->125 in 126, 249->253 in 254, at least 100 times each with a handful of exceptions",
+    "225 of 228, 238 of 244, 208 of 213",
+)
+RANDOM = Claim("thesis 7.3", "static constraints do not make outcomes deterministic: actions end in several states", "qualitative")
+STRETCH = Claim("thesis 7.3, fig. 7.9", "12.5-87.5 %: many more states are out of reach", "far too many to discuss")
+CONTACTS = Claim(
+    "thesis 7.3", "many self-collisions occur between arm and body on both lattices (more than 1 % of the actions)", "qualitative"
+)
+MORE = Claim("thesis 7.3", "the stretched lattice produces many more of them", "qualitative")
+DESPITE = Claim("thesis 7.3", "some of them do not affect the outcome: the arm is deflected and reaches its goal", "qualitative")
+CLAIMS = (UNREACHED, RARE, TURNED, RANDOM, STRETCH, CONTACTS, MORE, DESPITE)
+
+
+def conditions(arguments: argparse.Namespace) -> list[Condition]:
+    """Both lattices; the short version makes a fifth of the transitions."""
+    share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
+    return [
+        Condition(f"{name}{lattice}", {"lattice": lattice, "transitions": round(share * actions)}, actions)
+        for lattice, actions in ACTIONS.items()
+    ]
+
+
+def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Explore.
+
+    Transitions (T, 3), values (256, 8); and of each transition the pair of links and the depth [m] of its deepest self-contact,
+    -1 and 0 where there was none.
+    """
+    space, plant = arm_space(LEVELS[settings["lattice"]]), arm_plant(seed)
+    begin_anywhere(space, plant, seed)
+    recorder = SelfContactPlant(plant)
+    agent = CuriousAgent(space, recorder, seed=seed)
+    seen = explore(agent, settings["transitions"])
+    pairs, touching = _numbered(recorder.contacts)
+    return {
+        "seen": seen.astype(np.uint16),
+        "values": agent.plan()[1].astype(np.float32),
+        "pairs": pairs,
+        "touching": touching,
+        "depths": np.array([0.0 if contact is None else contact.depth for contact in recorder.contacts], dtype=np.float32),
+    }
+
+
+def _numbered(contacts: list[SelfContact | None]) -> tuple[list[str], NDArray[np.int16]]:
+    """The pairs of links that touched, and which of them did in each action, (T,)."""
+    pairs = sorted({contact.pair for contact in contacts if contact})
+    touching = [-1 if contact is None else pairs.index(contact.pair) for contact in contacts]
+    return [" and ".join(pair) for pair in pairs], np.array(touching, dtype=np.int16)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One exploration; see `trial`."""
+
+    space: Lattice
+    seen: Ints
+    values: Array
+    pairs: list[str]
+    touching: Ints
+    depths: Array
+
+    @cached_property
+    def visits(self) -> Ints:
+        """The number of times each state was reached, (256,)."""
+        return visits_of(self.space, self.seen)
+
+    @property
+    def unreached(self) -> tuple[int, ...]:
+        """States that were never reached."""
+        return tuple(np.flatnonzero(self.visits == 0).tolist())
+
+    @property
+    def succeeded(self) -> NDArray[np.bool_]:
+        """Whether each transition ended in its goal, (T,)."""
+        return np.asarray(self.seen[:, 2] == goals_of(self.space, self.seen))
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """Whether each transition touched the own body, (T,)."""
+        return np.asarray(self.touching >= 0)
+
+    @property
+    def uncertain(self) -> int:
+        """How many actions failed in 10 to 90 % of their tries."""
+        return uncertain_in(self.space, self.seen)
+
+
+def runs_of(found: Cells) -> dict[str, list[Run]]:
+    """The finished runs of each lattice."""
+    return {
+        lattice: [_run(arm_space(LEVELS[lattice]), values) for values in mine]
+        for lattice, mine in grouped(found, "lattice", (*LEVELS,)).items()
+    }
+
+
+def _run(space: Lattice, values: Mapping[str, Any]) -> Run:
+    return Run(space, values["seen"].astype(np.intp), values["values"], values["pairs"], values["touching"], values["depths"])
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """What was reached, where the actions turned aside end, self-contacts by pair; and the claims, if both lattices were explored."""
+    runs = runs_of(found)
+    whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())
+    return {
+        "lattices": {lattice: _row(mine) for lattice, mine in runs.items()},
+        "unreached": {lattice: _shares(mine) for lattice, mine in runs.items()},
+        "turned aside": {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in ASIDE} if "small" in runs else {},
+        "self-contacts": {lattice: contacts_by_pair(mine) for lattice, mine in runs.items()},
+        "claims": [claim.record() for claim in (measured(runs["small"], runs["stretched"]) if whole else CLAIMS)],
+    }
+
+
+def _row(runs: list[Run]) -> dict[str, Any]:
+    return {
+        "seeds": len(runs),
+        "actions": len(runs[0].seen),
+        "unreached": mean_over(runs, lambda run: len(run.unreached)),
+        "end_elsewhere": mean_over(runs, lambda run: float(1.0 - run.succeeded.mean())),
+        "uncertain_actions": mean_over(runs, lambda run: run.uncertain),
+        "most_outcomes": max(int(outcome_counts(run.space, run.seen).max()) for run in runs),
+        "touch_self": mean_over(runs, lambda run: float(run.touched.mean())),
+        "deepest_mm": 1e3 * max(float(run.depths.max()) for run in runs),
+    }
+
+
+def _shares(runs: list[Run]) -> dict[str, str]:
+    """In how many runs each state was never reached, those of one frequency together."""
+    by_count: dict[int, list[int]] = {}
+    for state, count in sorted(_unreached(runs).items()):
+        by_count.setdefault(count, []).append(state)
+    return {f"in {count} of {len(runs)} runs": " ".join(map(str, states)) for count, states in sorted(by_count.items(), reverse=True)}
+
+
+def _unreached(runs: list[Run]) -> Counter[int]:
+    """In how many runs each state was never reached."""
+    return Counter(state for run in runs for state in run.unreached)
+
+
+def _ends(runs: Sequence[Run], source: int, goal: int) -> dict[str, float]:
+    """Where an action ends and how often in a run, on average."""
+    counted: Counter[int] = Counter()
+    for run in runs:
+        counted.update(ends_of(run.space, run.seen, source, goal))
+    return {str(state): count / len(runs) for state, count in counted.most_common()}
+
+
+def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
+    """For each pair of links: how many actions of a run touched with it, the deepest overlap, and which share reached their goal."""
+    table: dict[str, dict[str, float]] = {}
+    for pair in sorted({pair for run in runs for pair in run.pairs}):
+        mine = [(run, run.touching == run.pairs.index(pair)) for run in runs if pair in run.pairs]
+        actions = sum(int(touched.sum()) for _, touched in mine)
+        table[pair] = {
+            "actions": actions / len(runs),
+            "deepest_mm": 1e3 * max(float(run.depths[touched].max(initial=0.0)) for run, touched in mine),
+            "succeed": sum(int(run.succeeded[touched].sum()) for run, touched in mine) / actions,
+        }
+    return dict(sorted(table.items(), key=lambda item: -item[1]["actions"]))
+
+
+def measured(small: list[Run], stretched: list[Run]) -> list[Claim]:
+    """The claims with our numbers, of the runs on both lattices."""
+    uncertain, wide = [run.uncertain for run in small], [run.uncertain for run in stretched]
+    text = f"{estimate(uncertain, 0)} actions (stretched {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
+    return [
+        _never(small),
+        _rare(small),
+        _turned(small),
+        RANDOM.measured(text, interval(uncertain)[0] >= 1.0),
+        _stretch(small, stretched),
+        *_self_contacts(small, stretched),
+    ]
+
+
+def _never(small: list[Run]) -> Claim:
+    never = sum(set(NEVER) <= set(run.unreached) for run in small)
+    too = sorted(_unreached(small).keys() - set(NEVER))
+    also = f"; in some also {', '.join(map(str, too))}" if too else ""
+    return UNREACHED.measured(f"all four unreached in {never} of {len(small)} runs{also}", never == len(small))
+
+
+def _rare(small: list[Run]) -> Claim:
+    visits = np.array([run.visits[list(HARDLY)] for run in small])
+    others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in small)
+    text = f"{estimate(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
+    return RARE.measured(text, bool(visits.max() <= MOST_VISITS))
+
+
+def _turned(small: list[Run]) -> Claim:
+    parts, holds = [], True
+    for (source, goal), end in ASIDE.items():
+        ends = [ends_of(run.space, run.seen, source, goal) for run in small]
+        aside = [found.get(end, 0) for found in ends]
+        others = [sum(found.values()) - found.get(end, 0) for found in ends]
+        parts.append(f"{source}->{goal}: {estimate(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
+        holds = holds and min(aside) >= LEAST_ASIDE and max(others) <= HANDFUL
+    return TURNED.measured("; ".join(parts), holds)
+
+
+def _stretch(small: list[Run], stretched: list[Run]) -> Claim:
+    few, many = [len(run.unreached) for run in small], [len(run.unreached) for run in stretched]
+    always = sorted(set.intersection(*(set(run.unreached) for run in stretched)))
+    text = f"{estimate(many, 0)} against {estimate(few, 0)}; in every run {' '.join(map(str, always))}"
+    return STRETCH.measured(text, interval(many)[0] > 2.0 * interval(few)[1])
+
+
+def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
+    shares = {name: [float(run.touched.mean()) for run in runs] for name, runs in (("20-80 %", small), ("stretched", stretched))}
+    text = ", ".join(f"{name}: {estimate([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
+    few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
+    reached = [float(run.succeeded[run.touched].mean()) for run in stretched if run.touched.any()]
+    despite = (
+        f"stretched: {estimate([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+    )
+    return [
+        CONTACTS.measured(text, min(few[0], many[0]) > MANY),
+        MORE.measured(text, many[0] > 2.0 * few[1]),
+        DESPITE.measured(despite, bool(reached) and interval(reached)[0] > 0.0),
+    ]
+
+
+SIDE = 16  # states along an edge of the map
+
+
+def plot(found: Cells) -> Any:
+    """A row for each lattice: outcomes, visits, tries and values as in figs. 7.8 and 7.9, and a map of the states out of reach."""
+    runs = runs_of(found)
+    drawing = new_figure(17.0, 5.8 * len(runs))
+    grid = drawing.add_gridspec(3 * len(runs), 3, width_ratios=(1.0, 1.0, 1.3))
+    for row, (lattice, mine) in enumerate(runs.items()):
+        rows = slice(3 * row, 3 * row + 3)
+        levels = ", ".join(f"{100 * level:g}" for level in LEVELS[lattice])
+        _outcomes(drawing.add_subplot(grid[rows, 0]), mine[0], f"{levels} %: where the actions of one run ended")
+        _map(drawing, drawing.add_subplot(grid[rows, 1]), mine, f"visits in {ACTIONS[lattice]} actions, mean of {len(mine)} runs")
+        _visits(drawing.add_subplot(grid[3 * row, 2]), mine)
+        exists = exists_in(mine[0].space)
+        _actions(drawing.add_subplot(grid[3 * row + 1, 2]), "tries", np.array([tries_of(run.space, run.seen)[exists] for run in mine]))
+        _actions(drawing.add_subplot(grid[3 * row + 2, 2]), "values", np.array([run.values[exists] for run in mine]))
+    return drawing
+
+
+def _outcomes(axes: Any, run: Run, title: str) -> None:
+    seen, counts = np.unique(run.seen, axis=0, return_counts=True)
+    elsewhere = seen[:, 2] != goals_of(run.space, seen)
+    states, actions = np.nonzero(exists_in(run.space))
+    axes.plot(run.space.goals[states, actions], states, "s", color="0.8", markersize=1.2, label="intended")
+    axes.scatter(
+        seen[elsewhere, 2], seen[elsewhere, 0], 1.0 + 0.3 * counts[elsewhere], "C3", linewidths=0, label="elsewhere (area: how often)"
+    )
+    for state in run.unreached:
+        axes.axhline(state, color="0.3", linewidth=0.4)
+    axes.set(
+        title=title, xlabel="state reached", ylabel="from state (lines: never reached)", xlim=(-2, 257), ylim=(257, -2), aspect="equal"
+    )
+    axes.legend(loc="lower left", fontsize=7, markerscale=2.0)
+
+
+def _map(drawing: Any, axes: Any, runs: list[Run], title: str) -> None:
+    visits = np.mean([run.visits for run in runs], axis=0).reshape(SIDE, SIDE)
+    shown = axes.imshow(np.log10(np.maximum(visits, 0.05)), cmap="viridis", origin="lower")
+    for state, count in _unreached(runs).items():
+        color = "white" if count == len(runs) else "C1"
+        axes.text(state % SIDE, state // SIDE, str(state), color=color, fontsize=6, ha="center", va="center")
+    for edge in range(4, SIDE, 4):
+        axes.axvline(edge - 0.5, color="white", linewidth=0.6)
+        axes.axhline(edge - 0.5, color="white", linewidth=0.6)
+    axes.set(title=title, xlabel="pitch (4 levels) within roll (4)", ylabel="yaw (4 levels) within elbow (4)", xticks=[], yticks=[])
+    drawing.colorbar(shown, ax=axes, shrink=0.5, label="log10 of visits; numbered: never (orange: in some)")
+
+
+def _visits(axes: Any, runs: list[Run]) -> None:
+    visits = np.array([run.visits for run in runs])
+    axes.bar(np.arange(visits.shape[1]), visits.mean(axis=0), width=1.0)
+    axes.fill_between(np.arange(visits.shape[1]), visits.min(axis=0), visits.max(axis=0), color="k", alpha=0.25, step="mid", linewidth=0)
+    axes.set(title="visits (mean, and range over the runs)", xlabel="state", xlim=(-0.5, visits.shape[1] - 0.5))
+
+
+def _actions(axes: Any, name: str, values: Array) -> None:
+    """Of every state-action, (runs, state-actions)."""
+    numbers = np.arange(values.shape[1])
+    axes.fill_between(numbers, values.min(axis=0), values.max(axis=0), color="0.75", step="mid", linewidth=0)
+    axes.plot(numbers, values.mean(axis=0), linewidth=0.6)
+    axes.set(title=f"{name} (mean, and range over the runs)", xlabel="state-action", xlim=(0, values.shape[1]), ylim=(0, None))
+
+
+EXPERIMENT = Experiment(
+    name="unreachable-states",
+    claim="256 states: some are never reached, others hardly ever, since the cables turn actions aside, "
+    "and more so when the lattice is stretched",
+    source="thesis 7.3",
+    notes=__doc__,
+    method=Sweep(conditions, trial, findings, plot),
+    claims=CLAIMS,
+)

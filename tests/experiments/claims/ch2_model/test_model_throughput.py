@@ -1,0 +1,267 @@
+from __future__ import annotations
+
+import builtins
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mobee
+import mobee.model.world
+from experiments.claims.ch2_model import model_throughput
+from experiments.claims.ch2_model.model_throughput import Flood, binned, flood_model, rates
+from experiments.claims.ch2_model.model_throughput_endurance import (
+    Editor,
+    Reference,
+    WatchedWorld,
+    endure,
+    other_objects,
+    out_of_order,
+    slope_mb_per_minute,
+    torn_table,
+    witnesses,
+)
+from experiments.claims.ch2_model.model_throughput_threads import Oscillator
+from experiments.kit.plots import MatplotlibMissing
+from experiments.kit.records import read_records
+from mobee.model.snapshot import changed
+from tests.experiments.small_run import options_of
+
+HEAD = "robot,objects,edits,seconds,evaluations\n"
+
+
+def run(folder, *options):
+    return model_throughput.EXPERIMENT.method.run(options_of(model_throughput.EXPERIMENT, "--edits", "5", *options), folder)
+
+
+def test_each_replacement_removes_one_box_and_creates_another():
+    world = mobee.World()
+    made = Flood(world, "katana", seed=1)
+    for _ in range(4):
+        made.create_object()
+    before, version = set(world.objects), world.version
+    made.replace_objects(3)
+    assert world.version == version + 6
+    assert sorted(made.names) == sorted(world.objects)
+    assert len(world.objects) == 4
+    assert 1 <= len(before - set(world.objects)) <= 3
+
+
+def test_every_motor_goes_through_its_whole_range(rng):
+    robot = mobee.load_robot("icub")
+    oscillator = Oscillator(robot, rng)
+    path = np.array([oscillator.at(t) for t in np.arange(0.0, 20.0, 0.01)])
+    low, high = robot.limits.T
+    np.testing.assert_array_less(low - 1e-12, path.min(axis=0))
+    np.testing.assert_array_less(path.max(axis=0), high + 1e-12)
+    assert (np.ptp(path, axis=0) > 0.99 * (high - low)).all()
+
+
+def test_a_flood_records_every_number_of_objects():
+    records = list(flood_model("katana", first=1, last=3, edits=5, seed=0, is_over=lambda: False))
+    assert [(r["objects"], r["edits"]) for r in records] == [(0, 0), (1, 10), (1, 0), (2, 10), (2, 0), (3, 10)]
+    assert all(r["seconds"] > 0 for r in records)
+    assert all(r["evaluations"] > 0 for r in records if not r["edits"])
+
+
+def test_what_fails_in_the_models_thread_is_not_hidden(monkeypatch):
+    def evaluate(self, q):
+        raise mobee.InvalidValue("made to fail")
+
+    monkeypatch.setattr(mobee.Model, "evaluate", evaluate)
+    with pytest.raises(mobee.InvalidValue, match="made to fail"):
+        list(flood_model("katana", first=1, last=3, edits=5, seed=0, is_over=lambda: False))
+
+
+def test_a_run_that_was_interrupted_goes_on_behind_its_records(tmp_path):
+    part = run(tmp_path, "--robots", "katana", "--objects", "2")
+    assert part["complete"]
+    assert part["katana"]["objects_reached"] == 2
+    whole = run(tmp_path, "--objects", "4")
+    assert whole["complete"]
+    with (tmp_path / "flood.csv").open() as file:
+        flooded = [(row["robot"], int(row["objects"])) for row in csv.DictReader(file) if int(row["edits"])]
+    assert flooded == [(robot, n) for robot in ("katana", "icub") for n in (1, 2, 3, 4)]
+
+
+def test_a_run_out_of_time_says_that_it_is_not_complete(tmp_path):
+    result = run(tmp_path, "--robots", "katana", "--objects", "1000", "--edits", "1", "--duration", "1e-6")
+    assert not result["complete"]
+
+
+def test_rates_weigh_records_by_their_time():
+    def record(objects, seconds, evaluations):
+        return {"robot": "icub", "objects": objects, "edits": 10, "seconds": seconds, "evaluations": evaluations}
+
+    records = [record(100, 1.0, 100), record(105, 3.0, 100), record(200, 1.0, 7), record(3, 1.0, 9)]
+    assert dict(rates(records)) == {100: 50, 200: 7}
+    assert list(binned(records, 2.0)) == [(51.5, 54.5), (105.0, pytest.approx(100 / 3))]
+
+
+def short(objects, evaluations, seconds=0.01):
+    return {"robot": "icub", "objects": objects, "edits": 200, "seconds": seconds, "evaluations": evaluations}
+
+
+def test_records_too_short_for_a_rate_are_pooled_with_the_nearest():
+    records = [short(number, 0 if number % 2 else 20) for number in range(1, 61)]
+    told = dict(rates(records))
+    assert 1 not in told and set(told.values()) <= {900, 950, 1000, 1050, 1100}
+    assert 50 in told
+
+
+def test_a_flood_too_short_in_all_has_no_rate():
+    records = [short(number, 20) for number in range(1, 6)]
+    assert not dict(rates(records))
+    assert not list(binned(records, 1.0))
+
+
+def test_a_flood_shorter_than_a_bin_is_one_point():
+    assert list(binned([short(number, 10) for number in range(1, 62)], 1.0)) == [(31.0, pytest.approx(1000.0))]
+
+
+def test_four_threads_edit_for_some_seconds_and_nothing_is_torn(tmp_path):
+    verdict = endure(tmp_path, threads=4, duration=3.0, seed=0)
+    assert verdict["torn"] == {}
+    assert verdict["exceptions"] == {}
+    assert verdict["passed"]
+    assert verdict["evaluations"] > 10
+    assert verdict["edits"] > 100
+    assert len(read_records(tmp_path / "endurance.csv", ("seconds", "evaluations", "torn"))) >= 3
+
+
+def test_a_world_whose_rows_lag_behind_its_objects_does_not_pass(tmp_path, monkeypatch):
+    monkeypatch.setattr(mobee.model.world, "changed", lambda old, new: replace(changed(old, new), rows=old.rows))
+    verdict = endure(tmp_path, threads=2, duration=0.5, seed=0)
+    assert not verdict["passed"]
+    assert "rows are not those of the objects" in verdict["torn"]
+
+
+def test_an_edit_that_raises_does_not_pass(tmp_path, monkeypatch):
+    def role(self):
+        raise RuntimeError("made to fail")
+
+    monkeypatch.setattr(Editor, "_role", role)
+    verdict = endure(tmp_path, threads=1, duration=0.5, seed=0)
+    assert not verdict["passed"]
+    assert any("made to fail" in text for text in verdict["exceptions"])
+
+
+@pytest.fixture
+def model():
+    made = mobee.Model(mobee.load_robot("katana"), WatchedWorld())
+    made.world.follow(made.evaluate(made.robot.home))
+    made.world.add("a", mobee.box(0.1, 0.2, 0.3), position=(0.1, 0.0, 0.2))
+    made.world.add("b", mobee.box(0.3, 0.3, 0.3), position=(0.0, 0.0, 0.3), role="target")
+    made.world.add("c", mobee.box(0.1, 0.1, 0.1), position=(0.0, 0.3, 0.0), role="ghost")
+    made.world.attach("a", made.robot.links[-1])
+    return made
+
+
+def test_a_sound_evaluation_is_not_complained_of(model):
+    pose = model.evaluate(model.robot.home)
+    assert pose.contacts
+    assert torn_table(model.world.seen) is None
+    assert other_objects(pose, model.world.seen) is None
+    assert Reference(model.robot).other_contacts(pose, model.world.seen) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda s: {"names": s.names[::-1]}, "names"),
+        (lambda s: {"names": s.names[:-1]}, "names"),
+        (lambda s: {"roles": s.roles[::-1]}, "roles"),
+        (lambda s: {"roles": s.roles[:-1]}, "roles"),
+        (lambda s: {"attached": ()}, "attached"),
+        (lambda s: {"rows": s.rows[:-1]}, "rows"),
+        (lambda s: {"rows": (s.rows.view(np.int64) ^ np.eye(1, s.rows.nbytes // 8, dtype=np.int64)[0]).view(s.rows.dtype)}, "rows"),
+    ],
+)
+def test_every_part_of_a_torn_snapshot_is_found(model, change, complaint):
+    snapshot = model.world.snapshot
+    assert torn_table(replace(snapshot, **change(snapshot))).startswith(complaint)
+
+
+def test_an_evaluation_of_another_world_is_found(model):
+    pose, before = model.evaluate(model.robot.home), model.world.seen
+    model.world.move("b", position=(0.0, 0.0, 0.9))
+    assert "another 'b'" in other_objects(pose, model.world.snapshot)
+    assert "contacts" in Reference(model.robot).other_contacts(pose, model.world.snapshot)
+    model.world.remove("b")
+    assert "other names" in other_objects(pose, model.world.snapshot)
+    assert other_objects(pose, before) is None
+
+
+def test_edits_seen_in_another_order_than_they_were_made_are_found():
+    world = mobee.World()
+    robot = mobee.load_robot("katana")
+    editor = Editor(world, robot, "katana", 0, 0)
+    for _ in range(1010):
+        editor._step_witnesses()
+        assert out_of_order(world.objects, 1) is None
+    first, second = witnesses(0)
+    world.move(second, position=(0.011, 0.0, 5.0))
+    assert "thread 0" in out_of_order(world.objects, 1)
+
+
+def test_a_leak_has_a_slope_and_a_first_rise_has_none():
+    seconds = np.arange(0.0, 100.0)
+    assert slope_mb_per_minute(seconds, 50.0 + seconds / 60.0) == pytest.approx(1.0)
+    assert slope_mb_per_minute(seconds, np.where(seconds < 15.0, 50.0 + seconds, 65.0)) == pytest.approx(0.0, abs=1e-9)
+    assert slope_mb_per_minute(seconds[:50], seconds[:50]) is None
+
+
+def test_the_figure_is_drawn_from_the_records(tmp_path):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "flood.csv").write_text(HEAD + "icub,0,0,0.5,500\nicub,1,2000,0.3,200\nkatana,1,2000,0.3,900\n")
+    picture = model_throughput.EXPERIMENT.method.figure(tmp_path)
+    assert picture.parent == tmp_path
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_of_an_endurance_run_its_course_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    endure(tmp_path, threads=1, duration=0.2, seed=0)
+    assert model_throughput.EXPERIMENT.method.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
+
+
+def axes_of(tmp_path, rows):
+    """The axes that are drawn of these rows."""
+    pytest.importorskip("matplotlib")
+    (tmp_path / "flood.csv").write_text(HEAD + rows)
+    return model_throughput.plot(model_throughput.read_flood(tmp_path / "flood.csv")).axes[0]
+
+
+def test_a_curve_of_one_point_has_a_marker_and_the_axis_ends_with_the_data(tmp_path):
+    axes = axes_of(tmp_path, "".join(f"icub,{n},200,0.01,10\n" for n in range(1, 61)))
+    (line,) = (line for line in axes.lines if line.get_label() == "iCub, flooded")
+    assert len(line.get_xdata()) == 1 and line.get_marker() == "s"
+    assert 60.0 < axes.get_xlim()[1] < 70.0
+    assert not axes.collections, "the thesis speaks of hundreds of objects"
+
+
+def test_the_thesis_band_ends_with_the_data(tmp_path):
+    axes = axes_of(tmp_path, "icub,300,2000,0.5,500\n")
+    (band,) = axes.collections
+    assert band.get_paths()[0].get_extents().x1 == 300.0
+
+
+def test_without_records_there_is_nothing_to_draw(tmp_path):
+    (tmp_path / "flood.csv").write_text(HEAD)
+    with pytest.raises(mobee.InvalidValue, match="no records"):
+        model_throughput.EXPERIMENT.method.figure(tmp_path)
+
+
+def test_without_matplotlib_the_error_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "flood.csv").write_text(HEAD + "icub,0,0,0.5,500\n")
+    real = builtins.__import__
+
+    def missing(name, *rest, **more):
+        if name.startswith("matplotlib"):
+            raise ImportError(name)
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(MatplotlibMissing, match=r"pip install '\.\[figures\]'"):
+        model_throughput.EXPERIMENT.method.figure(tmp_path)

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch5_control import constraint_violations
+from experiments.kit.arm_commands import PHASES, Tried, random_command, try_commands
+from experiments.kit.control_runs import PlantRun
+from experiments.kit.safety_measures import clause_violations
+from mobee import Gains, load_robot
+from tests.experiments.small_run import small_run
+
+
+@pytest.fixture
+def imagined(monkeypatch):
+    """A robot that violates its second clause the more, the farther the elbow's last attractor is from -3."""
+
+    def tried(gains, commands, torso, seed):
+        violations = np.full((2, 7), -0.5)
+        violations[:, 1] = [-0.01 * abs(command.attractors[PHASES - 1, 3] + 3.0) for command in commands]
+        return Tried(PlantRun(np.zeros((1, 1)), np.zeros((1, 1)), 0.01), violations, np.zeros(2))
+
+    monkeypatch.setattr(constraint_violations, "try_commands", tried)
+
+
+def test_the_search_gets_nearer_to_the_worst_command_than_chance(imagined) -> None:
+    state = constraint_violations.search("default", False, 1000, seed=1)
+    assert state.tries == 1000
+    assert state.worst > max(state.random) and state.worst > np.rad2deg(-0.002)
+    assert state.by_clause[1] == state.worst and state.worst_try["clause"] == 1
+
+
+def test_a_violation_of_the_default_gains_refutes_the_claim(tmp_path) -> None:
+    pytest.importorskip("matplotlib")
+    found = small_run(constraint_violations.EXPERIMENT, tmp_path, "--gains", "default", "--tries", "2", "--forced-tries", "2")
+    part = found["default"]["attractors"]
+    assert part["tries"] == 2 and part["largest_violation_deg"] == max(part["by_clause_deg"].values())
+    assert found["passed"] is (part["largest_violation_deg"] < 2.0)
+
+
+def test_a_try_is_judged_by_where_the_arms_have_been() -> None:
+    robot = load_robot("icub")
+    rng = np.random.default_rng(2)
+    tried = try_commands(Gains.default(), [random_command(rng, False), random_command(rng, False)], np.zeros(3), 0)
+    assert tried.violations.ravel() == pytest.approx(clause_violations(robot, tried.run.q).max(axis=0))
+    assert np.ptp(tried.run.q, axis=0)[robot.parts["left_arm"].slice][:5].max() > 0.1
+
+
+def test_a_client_pushes_at_motors_and_at_the_palm() -> None:
+    rng = np.random.default_rng(4)
+    still = [replace(random_command(rng, forced=False), attractors=np.zeros((PHASES, 7)), start=np.zeros(7)) for _ in range(2)]
+    pushed = [replace(command, pushes=np.tile([0.0, 0.0, 1.0], (PHASES, 1))) for command in still]
+    runs = [try_commands(Gains.default(), commands, np.zeros(3), 0).run for commands in (still, pushed)]
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() > 0.1

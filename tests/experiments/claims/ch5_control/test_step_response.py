@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+import pytest
+
+from experiments.claims.ch5_control.step_response import EXPERIMENT
+from mobee import UnknownName
+from tests.experiments.small_run import options_of, small_run
+
+OPTIONS = ("--gains", "default", "--periods", "20", "--postures", "1", "--motors")
+
+
+def test_motors_and_postures_are_summed_up_separately(tmp_path) -> None:
+    pytest.importorskip("matplotlib")
+    found = small_run(EXPERIMENT, tmp_path, *OPTIONS, "l_elbow")
+    assert found["passed"]
+    assert {kind: part["steps"] for kind, part in found["default"].items()} == {"20 ms, motors": 1, "20 ms, postures": 1}
+
+
+def test_an_unknown_motor_is_refused_before_anything_is_run(tmp_path) -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'l_elbow'"):
+        EXPERIMENT.method.run(options_of(EXPERIMENT, *OPTIONS, "l_elbw"), tmp_path)
+    assert not list(tmp_path.iterdir())

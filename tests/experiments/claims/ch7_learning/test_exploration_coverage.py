@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch7_learning.exploration_coverage import _row, first_repeat, measured, postman_floor, states_seen, trial
+from experiments.kit.arm_learning import HYPERCUBE, RANK3, RANK4, arm_space
+from mobee.errors import InvalidValue
+
+
+def values(end: float, floor: int = 100, repeats_at: int = 50):
+    new = np.concatenate([np.arange(1, repeats_at), [end]]).astype(int)
+    return {
+        "new_actions": new,
+        "new_states": np.arange(81) * 2,
+        "state_actions": len(new),
+        "floor": floor,
+        "failed": 0.0,
+        "transitions": end,
+    }
+
+
+def published(curious: int, least: int):
+    runs = {"curious": (curious, 900), "least_tried": (least, 400), "random": (9 * curious, 30)}
+    return {
+        (world, name): [values(end + seed, floor=1550, repeats_at=repeat) for seed in range(10)]
+        for world in ("constrained", "free")
+        for name, (end, repeat) in runs.items()
+    }
+
+
+def verdicts(claims) -> dict[str, str]:
+    return {claim.text[:20]: claim.verdict for claim in claims}
+
+
+def test_the_first_repeat_and_the_states_seen_are_read_from_what_was_new():
+    one = values(99.0, repeats_at=50)
+    assert first_repeat(one) == 50 and states_seen(one, 20) == 11
+
+
+def test_what_was_never_covered_is_counted():
+    one = values(99.0)
+    row = _row([one, one | {"transitions": 5000, "state_actions": 51}])
+    assert row["unfinished"] == 1 and row["high"] == 5000
+
+
+def test_half_the_time_close_to_the_floor_confirms_themeasured():
+    found = verdicts(measured(published(1590, 3200)))
+    assert found["AC has tried every a"] == "confirmed"
+    assert found["AC produces, by far,"] == "confirmed"
+    assert found["early on AC and LT t"] == "confirmed"
+    assert found["AC needs at most 1.0"] == "confirmed"
+
+
+def test_depletion_is_judged_in_both_worlds_or_not_at_all():
+    runs = published(1590, 3200)
+    runs |= {(world, name): runs[world, "curious"] for world in ("constrained", "free") for name in ("depleting", "nearest_untried")}
+    assert verdicts(measured(runs))["curiosity that deple"] == "confirmed"
+    del runs["free", "nearest_untried"]
+    assert verdicts(measured(runs))["curiosity that deple"] == "open"
+
+
+def test_other_numbers_refute_them():
+    found = verdicts(measured(published(3000, 3200)))
+    assert found["AC has tried every a"] == "refuted"
+    assert found["AC needs at most 1.0"] == "refuted"
+
+
+def test_equal_early_novelty_refutes_that_one_is_more_aggressive():
+    assert verdicts(measured(published(1590, 3200)))["before 220 transitio"] == "refuted"
+
+
+def shortest_walk(goals: np.ndarray) -> int:
+    """By trying all walks, nearest first."""
+    arcs = [(int(s), int(goals[s, a])) for s, a in zip(*np.nonzero(goals >= 0), strict=True)]
+    everything = (1 << len(arcs)) - 1
+    queue = [(0, start, 0) for start in range(len(goals))]
+    seen = set()
+    while queue:
+        steps, at, tried = heapq.heappop(queue)
+        if tried == everything:
+            return steps
+        if (at, tried) in seen:
+            continue
+        seen.add((at, tried))
+        for i, (source, goal) in enumerate(arcs):
+            if source == at:
+                heapq.heappush(queue, (steps + 1, goal, tried | 1 << i))
+    raise AssertionError("no walk")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_floor_is_the_shortest_of_all_walks(seed):
+    rng = np.random.default_rng(seed)
+    states = 4
+    ring = (np.arange(states) + 1) % states
+    goals = np.full((states, 3), -1)
+    goals[:, 0] = ring  # so that every state can be reached
+    for state in range(states):
+        for action in range(1, 3):
+            if rng.random() < 0.6:
+                goals[state, action] = rng.integers(states)
+    assert postman_floor(goals) == shortest_walk(goals)
+
+
+@pytest.mark.parametrize(("levels", "actions"), [(HYPERCUBE, 64), (RANK3, 432), (RANK4, 1536)])
+def test_equidistant_neighbours_need_no_detour(levels, actions):
+    assert postman_floor(arm_space(levels).goals) == actions
+
+
+def test_the_nearest_neighbours_need_about_a_fifth_more():
+    floors = [postman_floor(arm_space(neighbours=16, tie_seed=seed).goals) for seed in range(5)]
+    assert all(1500 <= floor <= 1620 for floor in floors)  # 1550 in the median of a reference implementation
+
+
+def test_a_space_that_falls_apart_has_no_walk():
+    with pytest.raises(InvalidValue, match="cannot be reached"):
+        postman_floor(np.array([[1], [1]]))
+
+
+def test_a_curious_agent_on_the_real_lattice_tries_everything_near_the_floor():
+    found = trial({"graph": "equidistant", "world": "free", "explorer": "curious"}, 0)
+    assert len(found["new_actions"]) == found["state_actions"] == 432 == found["floor"]
+    assert found["new_actions"][-1] == found["transitions"] <= 1.2 * 432
+    assert found["failed"] == 0.0 and len(found["new_states"]) == 81

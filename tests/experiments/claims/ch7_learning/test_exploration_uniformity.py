@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+import numpy as np
+
+from experiments.claims.ch7_learning.exploration_uniformity import EXPLORERS, measured
+from experiments.kit.outcomes import Explored
+
+EVEN, UNEVEN = np.array([10, 11, 10, 11, 10, 20]), np.array([1, 30, 2, 40, 3, 2])
+VISITS = {True: np.array([5, 5, 6]), False: np.array([1, 9, 20])}
+
+
+def runs(is_even, fails=True):
+    """Three seeds that try six actions, of which the last fails."""
+    tries = EVEN if is_even else UNEVEN
+    failures = np.where(np.arange(6) == 5, tries, 0) * fails
+    return [Explored(seed, tries, failures, VISITS[is_even], {}) for seed in range(3)]
+
+
+def verdicts(fails=True):
+    nearest = {("nearest", explorer): runs(explorer == "curious", fails) for explorer in EXPLORERS}
+    equidistant = {("equidistant", explorer): runs(explorer != "random", fails) for explorer in EXPLORERS}
+    return [claim.verdict for claim in measured(nearest | equidistant)]
+
+
+def test_even_tries_with_spikes_where_actions_fail_confirm_the_claims():
+    assert verdicts() == ["confirmed"] * 5
+
+
+def test_where_no_action_fails_spikes_are_open():
+    assert verdicts(fails=False) == ["confirmed", "confirmed", "open", "open", "confirmed"]

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from experiments.claims.ch7_learning.neighbour_count import attempt, drawn_tasks, fewest_actions, findings, trial
+from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
+from mobee import TransitionModel
+from tests.experiments.finished_cells import Cell, finished
+
+
+def test_a_sparser_graph_is_learnt_sooner_and_its_paths_are_longer():
+    cells = [Cell(f"k{graph}", 1, {"graph": graph, "budgets": [700], "tasks": 8}) for graph in (4, 16)]
+    rows = findings(finished(lambda cell: trial(cell.settings, cell.seed), cells))["runs"]
+    assert rows["4 neighbours"]["state_actions"] == 324 and rows["16 neighbours"]["state_actions"] == 1296
+    assert rows["4 neighbours"]["learned_after"] < 700 and rows["16 neighbours"]["learned_after"] is None
+    assert rows["4 neighbours"]["actions"] > rows["16 neighbours"]["actions"]
+
+
+def test_the_fewest_actions_of_a_hypercube_are_the_differing_joints():
+    space = arm_space(HYPERCUBE)
+    for start, goal in ((0, 15), (0, 8), (5, 10), (3, 7)):
+        assert fewest_actions(space, start, goal) == (start ^ goal).bit_count()
+
+
+def test_a_known_model_leads_the_arm_to_its_goal_by_the_shortest_path():
+    space = arm_space(HYPERCUBE)
+    model = TransitionModel(space)
+    for state in range(len(space)):
+        for action, goal in enumerate(space.actions(state)):
+            model.observe(state, action, int(goal))
+    found = attempt(model, arm_plant(0), 0, 15, most=12)
+    assert found.reached and found.actions == 4
+
+
+def test_an_attempt_that_takes_too_long_is_a_failure():
+    space = arm_space(HYPERCUBE)
+    found = attempt(TransitionModel(space), arm_plant(0), 0, 15, most=2)
+    assert not found.reached and found.actions == 2
+
+
+def test_tasks_are_pairs_of_different_states_and_follow_from_the_seed():
+    space = arm_space(HYPERCUBE)
+    tasks = drawn_tasks(space, 20, seed=3)
+    assert tasks == drawn_tasks(space, 20, seed=3) != drawn_tasks(space, 20, seed=4)
+    assert all(start != goal for start, goal in tasks)

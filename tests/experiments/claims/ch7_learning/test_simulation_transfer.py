@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch7_learning.simulation_transfer import measured, prediction_bound
+from experiments.kit.cells import Cell
+from experiments.kit.live_learning import learn_offline
+from experiments.kit.outcome_distance import Compared, Distance
+
+pytestmark = pytest.mark.timeout(120)
+
+
+def test_parts_learn_at_once_and_each_makes_its_number_of_transitions():
+    cell = Cell("arms-s0", 0, {"task": "arms", "transitions": 4})
+    first, again = learn_offline(cell), learn_offline(cell)
+    assert set(first) == {"seen_left_arm", "seen_right_arm"}
+    for part, rows in first.items():
+        assert rows.shape == (4, 3) and np.array_equal(rows, again[part])
+        assert np.array_equal(rows[1:, 0], rows[:-1, 2])
+
+
+def test_the_bound_is_that_of_one_more_value():
+    rng = np.random.default_rng(0)
+    draws = rng.normal(3.0, 0.5, size=(4000, 6))
+    below = [row[-1] <= prediction_bound(list(row[:-1])) for row in draws]
+    assert np.mean(below) == pytest.approx(0.95, abs=0.01)
+
+
+def test_offline_seeds_that_differ_widely_decide_nothing():
+    wide = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.05, 0.1))
+    assert measured({"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})}).verdict == "open"
+    assert measured({"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})}).verdict == "refuted"
+
+
+def test_where_nothing_was_compared_nothing_is_decided():
+    none = Distance(float("nan"), float("nan"), 0)
+    assert measured({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"
+
+
+@pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
+def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
+    offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
+    found = Compared({"pybullet": Distance(variation, agree, 300)}, offline, {})
+    assert measured({"arms": found}).verdict == verdict

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch7_learning.self_contacts import SelfContactPlant
+from experiments.claims.ch7_learning.unreachable_states import Run, contacts_by_pair
+from experiments.kit.arm_learning import LEFT, RANK4, STRETCHED, arm_plant, arm_space, robot
+
+
+def test_watching_changes_nothing():
+    watched, plain, space = SelfContactPlant(arm_plant(3)), arm_plant(3), arm_space(STRETCHED)
+    for state in (0, 5, 61, 2):  # 61 cannot be reached
+        mine, theirs = watched.act("left_arm", space.target(state)), plain.act("left_arm", space.target(state))
+        assert np.array_equal(mine.q, theirs.q)
+        assert (mine.settled, mine.duration) == (theirs.settled, theirs.duration)
+    assert len(watched.contacts) == 4
+
+
+def test_the_deepest_self_contact_of_an_action_is_named():
+    plant = SelfContactPlant(arm_plant(0))
+    target = robot().home[robot().part("left_arm").slice].copy()
+    plant.act("left_arm", target)
+    for name, degrees in zip(LEFT, (-60.0, 0.0, 70.0, 100.0), strict=True):  # the forearm across the chest
+        target[robot().part("left_arm").motors.index(name)] = np.deg2rad(degrees)
+    plant.act("left_arm", target)
+    assert plant.contacts[0] is None
+    assert plant.contacts[1] is not None
+    assert any(link.startswith("l_") for link in plant.contacts[1].pair)
+    assert plant.contacts[1].depth == pytest.approx(0.02, abs=0.02)
+
+
+SPACE = arm_space(RANK4)
+
+
+def run(seen, touching):
+    depths = np.where(np.array(touching) >= 0, 0.01, 0.0)
+    return Run(SPACE, np.array(seen), np.zeros(SPACE.goals.shape), ["arm and chest"], np.array(touching), depths)
+
+
+def test_unreached_states_are_those_without_arrival():
+    every = np.array([[0, 0, state] for state in range(256) if state != 60])
+    assert run(every, [-1] * 255).unreached == (60,)
+
+
+def test_self_contacts_are_counted_by_pair_with_their_success():
+    one = run([[0, 0, 1], [1, 0, 0], [0, 0, 0]], [0, -1, 0])
+    assert contacts_by_pair([one, run([[0, 0, 1]], [-1])]) == {
+        "arm and chest": {"actions": 1.0, "deepest_mm": pytest.approx(10.0), "succeed": 0.5}
+    }
