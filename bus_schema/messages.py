@@ -1,15 +1,21 @@
-"""The streams: one struct a message, unit and shape beside each field.
+"""The messages on the bus: one struct each, with its key and delivery class, and with the unit of each field beside it.
 
-Vectors over a part's motors are `PartVector`, over the robot's motors `RobotVector`: their lengths are checked
-on receipt.  Angles in rad, lengths in m, forces of eq. 5.7 in rad/s^2 (generalised force per unit mass), times in
-ns of the bus clock (simulated), quaternions wxyz, all poses in the root frame.
+Vectors over a part's motors are `PartVector`, over the robot's motors `RobotVector`: the receiver checks their lengths.  Angles are in
+rad, lengths in m, forces of eq. 5.7 in rad/s^2 (generalised force per unit mass), times in ns of the bus clock (simulated); quaternions
+are wxyz, and all poses are in the root frame.
+
+In every tick the control chain is three messages: `Tick` of robot_sim, `Forces` of the model, `Commands` of the controller.
+
+After a change of a struct raise VERSION (version.py) and run `python -m bus_schema.page`, which writes the tables of docs/bus.md.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct
+
+from bus_schema.stream import Stream
 
 PartVector = Annotated[list[float], Meta(extra={"length": "part"})]
 RobotVector = Annotated[list[float], Meta(extra={"length": "robot"})]
@@ -31,43 +37,80 @@ GeometryKind = Literal["sphere", "capsule", "cylinder", "box"]
 
 
 class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The header: every message on a stream carries it."""
+    """The header of every message."""
+
+    stream: ClassVar[Stream]
 
     v: int  # version of the contract
     run: Name  # id of robot_sim's run
-    src: Name  # the service that sent it
+    src: Name  # service that sent it
     seq: Count  # per publisher, from 0
-    k: Count  # tick of robot_sim's clock it belongs to
+    k: Count  # tick of robot_sim to which the message belongs
     t: Count  # ns, bus clock
     tw: int  # ns, sender's monotonic clock: for diagnosis only
 
 
 class Clock(Message, frozen=True, kw_only=True):
-    """Start of tick k; mode lock: the next one comes when everybody who takes part has answered this one."""
+    """Start of tick k.  In mode "lock" the next tick begins when all participants have answered this one."""
+
+    stream: ClassVar[Stream] = Stream("clock", "CONTROL", writer="robot_sim, every tick up to 100 a second", readers="all others")
 
     dt: Annotated[int, Meta(gt=0)]  # ns a tick
     mode: Literal["free", "lock", "paused"]
-    rate: Annotated[float, Meta(gt=0)]  # simulated seconds a second that are asked for
+    rate: Annotated[float, Meta(gt=0)]  # simulated seconds per second of real time, as configured
+
+
+class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
+    """When a part was sampled, and which command its motors follow; as in `State`."""
+
+    k: Count  # tick
+    t: Count  # ns, bus clock
+    mode: Mode  # of the command in force
+    gate: GateState
+    faults: Count  # bit field, 0 = none
+    epoch: Count  # drive epoch in force
+    cmd_seq: int  # of the command in force, -1 = none
+    cmd_age: int  # ticks since the state it answers, -1 = none
+
+
+class Tick(Clock, frozen=True, kw_only=True):
+    """Start of tick k, with the newest state of every part; each part has its own sampling time."""
+
+    stream: ClassVar[Stream] = Stream("tick", "CONTROL", writer="robot_sim, every tick", readers="model, controller, port_filter")
+
+    q: RobotVector  # rad, encoders
+    parts: dict[Name, PartStatus]  # of all parts
 
 
 class StepDone(Message, frozen=True, kw_only=True):
-    """Lockstep: all that its sender has to say to tick re_k has been put."""
+    """Lockstep: the sender has published all its messages for tick re_k."""
 
-    re_k: Count
-    ok: bool = True  # False: it lacked something, so the run cannot be repeated
-    busy: list[Name] = []  # of the controller: services with nothing to decide, every part that they own being under way
-    last: bool = False  # it takes part no longer
-    including: list[Name] = []  # others whose answers to that tick it is formed of, so that they need not say so themselves
+    stream: ClassVar[Stream] = Stream("done/{service}", "STEP", writer="lockstep: every participant", readers="robot_sim")
+
+    re_k: Count  # tick that is answered
+    ok: bool = True  # False: an input was missing, so the run is not repeatable
+    busy: list[Name] = []  # of the controller: services with nothing to decide, because every part that they own is moving
+    last: bool = False  # the sender leaves: later ticks do not wait for it
+    including: list[Name] = []  # participants whose answers to that tick were used, so that they need not send StepDone
 
 
 class Turn(Message, frozen=True, kw_only=True):
-    """Lockstep: tick k waits for one participant, which may have something to decide."""
+    """Lockstep: tick k waits for this participant, which may have an action to decide."""
+
+    stream: ClassVar[Stream] = Stream("turn/{service}", "STEP", writer="robot_sim, in lockstep", readers="that service")
 
     dt: Count  # ns a tick
 
 
 class State(Message, frozen=True, kw_only=True):
     """Motor state of a part, at the part's own sampling time t."""
+
+    stream: ClassVar[Stream] = Stream(
+        "{part}/state",
+        "CONTROL",
+        writer="robot_sim, every tick at the part's own time, if there is a subscriber",
+        readers="renderer, monitor, port_filter",
+    )
 
     q: PartVector  # rad, encoders
     dq: PartVector  # rad/s
@@ -81,7 +124,11 @@ class State(Message, frozen=True, kw_only=True):
 
 
 class Command(Message, frozen=True, kw_only=True):
-    """What a part's motors shall do, in answer to tick re_k."""
+    """Command to the motors of one part, computed from tick re_k."""
+
+    stream: ClassVar[Stream] = Stream(
+        "{part}/cmd", "CONTROL", writer="a client that drives a single part", readers="robot_sim, port_filter"
+    )
 
     epoch: Count
     re_k: Count
@@ -90,8 +137,39 @@ class Command(Message, frozen=True, kw_only=True):
     ttl: Annotated[int, Meta(gt=0, le=1000)]  # ms after which the part holds
 
 
+class Order(Struct, frozen=True, forbid_unknown_fields=True):
+    """Drive epoch and command mode of one part in `Commands`."""
+
+    epoch: Count
+    mode: Mode
+
+
+class Answer(Struct, frozen=True, forbid_unknown_fields=True):
+    """Lockstep: the content of `StepDone`, sent along with the commands."""
+
+    ok: bool
+    busy: list[Name]
+    including: list[Name]
+
+
+class Commands(Message, frozen=True, kw_only=True):
+    """Commands to the motors of several parts, computed from tick re_k; parts that are not named are not affected."""
+
+    stream: ClassVar[Stream] = Stream("commands", "CONTROL", writer="controller, every tick", readers="robot_sim, port_filter")
+
+    re_k: Count
+    parts: dict[Name, Order]
+    ref: RobotVector  # rad, rad/s or N m, by the part's mode; ignored on hold
+    ttl: Annotated[int, Meta(gt=0, le=1000)]  # ms after which these parts hold
+    answer: Answer | None  # None: the tick is not answered yet, or free mode
+
+
 class Motion(Message, frozen=True, kw_only=True):
-    """Where a part's action stands."""
+    """State of a part's action."""
+
+    stream: ClassVar[Stream] = Stream(
+        "{part}/motion", "CONTROL", writer="controller, at once after a change, else up to 100 a second", readers="agents, monitor"
+    )
 
     action_id: Text  # empty: none yet
     epoch: Count  # goal epoch in force, 0 = nobody owns the goal
@@ -106,23 +184,29 @@ class Motion(Message, frozen=True, kw_only=True):
 
 
 class Reach(Message, frozen=True, kw_only=True):
-    """How far a part's action that is a reach has come."""
+    """State of a part's reach."""
 
-    action_id: Text  # that of Motion
-    phase: ReachPhase  # the force acts; it has ended and the attractor draws back; the action has ended, with or without an outcome
+    stream: ClassVar[Stream] = Stream(
+        "{part}/reach", "CONTROL", writer="controller, at once after a change, during a reach up to 100 a second", readers="model, agents"
+    )
+
+    action_id: Text  # as in Motion
+    phase: ReachPhase  # the force acts; the attractor draws back; ended with ("over") or without ("interrupted") an outcome
     marker: Name
-    object: Name  # of the model's world, the target
-    end_k: Count  # tick at which the force ended, or now while it acts; what follows is of that tick
-    target: Vector3  # m, where it is
+    object: Name  # the target, an object of the model's world
+    end_k: Count  # tick at which the force ended, the newest tick while it acts; the fields below are of that tick
+    target: Vector3  # m, position of the target
     q: PartVector  # rad, encoders
     position: Vector3  # m, of the marker
-    missing: float  # m, from where the marker is to be
+    missing: float  # m, remaining distance of the marker to its goal
     settled: bool  # the force ended because the part had settled
     touched: list[Name]  # world objects in contact
 
 
 class Targets(Message, frozen=True, kw_only=True):
-    """Where the objects that are reached for are at tick re_k; one that is not named is not known any more."""
+    """Positions, at tick re_k, of the objects that are reached for; an object without position is not in the model's world."""
+
+    stream: ClassVar[Stream] = Stream("model/targets", "CONTROL", writer="model, every tick during a reach", readers="controller")
 
     re_k: Count
     positions: dict[Name, Vector3]  # m
@@ -139,8 +223,10 @@ class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
 class Pose(Message, frozen=True, kw_only=True):
     """Marker poses at tick re_k."""
 
+    stream: ClassVar[Stream] = Stream("model/pose", "LATEST", writer="model, every tick, if there is a subscriber", readers="monitor")
+
     re_k: Count
-    q: RobotVector  # rad, as assembled from the parts
+    q: RobotVector  # rad, assembled from the parts' samples
     markers: list[MarkerPose]
 
 
@@ -152,23 +238,32 @@ class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
     kind: Literal["solid", "field"]
     depth: float  # m
     point: Vector3  # m
-    normal: Vector3  # the way `first` must go
+    normal: Vector3  # direction in which `first` must move to end the contact
     first_link: Link
     second_link: Link
 
 
 class Forces(Message, frozen=True, kw_only=True):
-    """Terms of the law at tick re_k (thesis eqs. 5.11-5.17); of the controller: those that it has from outside."""
+    """Terms of the control law at tick re_k (thesis eqs. 5.11-5.17); the controller publishes the user-defined terms."""
+
+    stream: ClassVar[Stream] = Stream(
+        "{source}/forces",
+        "CONTROL",
+        writer="model, every tick; controller, if it has terms from outside (LATEST)",
+        readers="controller; monitor",
+    )
 
     re_k: Count
-    terms: dict[Name, RobotVector]  # rad/s^2, by name, in the order in which they are added
+    terms: dict[Name, RobotVector]  # rad/s^2, by name, in the order of addition
     part_age: dict[str, int]  # ns between the part's sample and tick re_k
     touched: dict[str, list[Name]]  # part -> world objects in contact
-    contacts: list[ContactItem] | None = None  # all at that tick, where the controller has terms that may depend on them
+    contacts: list[ContactItem] | None = None  # all contacts at that tick, if the controller has terms that may depend on them
 
 
 class Contacts(Message, frozen=True, kw_only=True):
     """All contacts at tick re_k."""
+
+    stream: ClassVar[Stream] = Stream("model/contacts", "LATEST", writer="model, every tick, if there is a subscriber", readers="monitor")
 
     re_k: Count
     contacts: list[ContactItem]
@@ -182,7 +277,9 @@ class Geometry(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class WorldObject(Message, frozen=True, kw_only=True):
-    """An object as it was perceived."""
+    """An object as perceived by vision."""
+
+    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writer="vision", readers="model, monitor")
 
     name: Name
     geometry: Geometry
@@ -190,12 +287,14 @@ class WorldObject(Message, frozen=True, kw_only=True):
     quaternion: Quaternion
     covariance: Matrix3  # m^2, of the position
     role: Role
-    t_capture: Count  # ns, when the picture was taken
-    valid_until: Count  # ns
+    t_capture: Count  # ns, time of the picture
+    valid_until: Count  # ns, time after which the model removes the object
 
 
 class Image(Message, frozen=True, kw_only=True):
     """Picture of one eye at tick k_capture: rows top to bottom, height x width x 3 bytes."""
+
+    stream: ClassVar[Stream] = Stream("vision/image/{eye}", "BULK", writer="renderer", readers="vision, monitor")
 
     eye: Literal["left", "right"]
     k_capture: Count
@@ -206,7 +305,9 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class Camera(Message, frozen=True, kw_only=True):
-    """Calibration of an eye and the posture at the picture's tick."""
+    """Calibration of an eye, and the posture of head and torso at the picture's tick."""
+
+    stream: ClassVar[Stream] = Stream("vision/camera/{eye}", "BULK", writer="renderer", readers="vision")
 
     eye: Literal["left", "right"]
     k_capture: Count
@@ -218,13 +319,15 @@ class Camera(Message, frozen=True, kw_only=True):
 class Transition(Message, frozen=True, kw_only=True):
     """One observed transition of an agent."""
 
+    stream: ClassVar[Stream] = Stream("agents/{part}/transition", "EVENTS", writer="agents", readers="monitor, launcher")
+
     agent: Name
-    n: Count  # how many the agent has observed, this one included
+    n: Count  # transitions the agent has observed, including this one
     s: Count
     a: Count
-    goal: Count  # state the action meant to reach
+    goal: Count  # intended state of the action
     s_next: Count
-    reward: float  # 'Kail' divergence, nats; of an agent that reaches 0, or the penalty of a failure
+    reward: float  # 'Kail' divergence, nats; of a reaching agent 0, or the penalty of a failure
     value: float  # V(s) before the action
     settled: bool
     duration: float  # s
@@ -232,29 +335,33 @@ class Transition(Message, frozen=True, kw_only=True):
 
 
 class Surprise(Struct, frozen=True, forbid_unknown_fields=True):
-    """An outcome of an action that was not its goal."""
+    """An outcome of an action other than its goal."""
 
     s: Count
     a: Count
     s_next: Count
-    share: Annotated[float, Meta(gt=0, le=1)]  # of the action's tries
+    share: Annotated[float, Meta(gt=0, le=1)]  # share of the action's tries with this outcome
 
 
 class Learned(Message, frozen=True, kw_only=True):
-    """What an agent knows and expects now, over its state-actions: S states with at most A actions, rows of states."""
+    """Counts, rewards and values of an agent's state-actions: matrices of S states (rows) with at most A actions (columns)."""
+
+    stream: ClassVar[Stream] = Stream("agents/{part}/learned", "NEWEST", writer="agents, at most twice a second", readers="monitor")
 
     agent: Name
     n: Count  # transitions observed
-    s: Count  # where it is
-    space: Annotated[str, Meta(max_length=1_000_000)]  # JSON of the space's settings, from which it can be made again
-    tries: bytes  # (S A) little-endian uint32; 0 too where a state has no such action
+    s: Count  # current state of the agent
+    space: Annotated[str, Meta(max_length=1_000_000)]  # JSON of the settings from which the space can be made
+    tries: bytes  # (S A) little-endian uint32; 0 also where a state has no such action
     reward: bytes  # (S A) little-endian float32, nats, or failures as in Transition; -inf where a state has no such action
     value: bytes  # (S A) little-endian float32, of the plan; -inf likewise
     surprises: list[Surprise]
 
 
 class Event(Message, frozen=True, kw_only=True):
-    """What a service has to tell a person."""
+    """A log entry for a person."""
+
+    stream: ClassVar[Stream] = Stream("event/{service}", "EVENTS", writer="all", readers="monitor, launcher")
 
     level: Literal["info", "warning", "error"]
     code: Name
@@ -265,24 +372,33 @@ class Event(Message, frozen=True, kw_only=True):
 class EStop(Message, frozen=True, kw_only=True):
     """Emergency stop: latched by robot_sim until it is reset."""
 
+    stream: ClassVar[Stream] = Stream(
+        "estop",
+        "STOP",
+        writer="any client; robot_sim repeats it while it is latched (LATEST)",
+        readers="robot_sim, controller, port_filter",
+    )
+
     set: bool
     source: Name
     reason: Text
 
 
 class ObjectTruth(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the simulator has an object."""
+    """Pose of an object in the simulator."""
 
     name: Name
-    position: Vector3
+    position: Vector3  # m
     quaternion: Quaternion
 
 
 class Truth(Message, frozen=True, kw_only=True):
-    """What only the simulator knows: for tests, figures and the monitor, never for a service of the robot."""
+    """Ground truth of the simulator: for tests, figures and the renderer, never for a service of the robot."""
+
+    stream: ClassVar[Stream] = Stream("sim/truth", "DATA", writer="robot_sim", readers="renderer, tests; never a service of the robot")
 
     q: RobotVector  # rad, joint side, without noise
-    depth: float  # m, deepest solid contact of a listed pair since the last message, 0 = none
-    pair: Text  # that pair
-    gap: float  # m, closest distance of hands and forearms to the table now, -1 = not measured
+    depth: float  # m, deepest solid contact of a watched pair since the last message, 0 = none
+    pair: Text  # names of that pair
+    gap: float  # m, smallest distance of hands and forearms to the table, -1 = not measured
     objects: list[ObjectTruth]

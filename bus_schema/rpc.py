@@ -1,7 +1,8 @@
-"""Requests and replies; a request id makes a repeated call harmless."""
+"""Requests and replies of calls, and the table of all calls; a request id makes a repeated call harmless."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -10,11 +11,11 @@ from bus_schema.messages import Aim, Count, GateState, Geometry, Name, PartVecto
 
 
 class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every request carries."""
+    """The header of every request."""
 
     v: int  # version of the contract
-    id: Name  # unique a call
-    who: Name  # the caller
+    id: Name  # unique per call: a repeated request with the same id happens once
+    who: Name  # service that calls
 
 
 class Empty(Request, frozen=True, kw_only=True):
@@ -22,15 +23,15 @@ class Empty(Request, frozen=True, kw_only=True):
 
 
 class Take(Request, frozen=True, kw_only=True):
-    """Ask for ownership; the owner loses it when its liveliness token goes."""
+    """Ask for ownership, which ends with the caller's liveliness token."""
 
-    instance: Name  # of the caller's token
+    instance: Name  # instance in the caller's token
 
 
 class WithEpoch(Request, frozen=True, kw_only=True):
-    """A call of the owner: arm, release, hold."""
+    """A call that only the owner may make."""
 
-    epoch: Count
+    epoch: Count  # as in `Taken`
 
 
 class Goal(Request, frozen=True, kw_only=True):
@@ -42,92 +43,92 @@ class Goal(Request, frozen=True, kw_only=True):
 
 
 class Force(Request, frozen=True, kw_only=True):
-    """Force a part until cleared: in joint space (f), or at a marker (eqs. 5.9, 5.10); neither clears."""
+    """Apply a force in joint space (f) or at a marker (thesis eqs. 5.9, 5.10) until it is cleared; with neither, clear both."""
 
     epoch: Count
     f: PartVector | None = None  # rad/s^2
     marker: Name | None = None
-    push: Vector3 | None = None  # unit mass times m/s^2 at the marker
+    push: Vector3 | None = None  # m/s^2 at the marker (force per unit mass)
 
 
 class ReachFor(Request, frozen=True, kw_only=True):
-    """Draw a marker to an object of the model's world, and let it go when the part has settled (thesis 8.2): an action."""
+    """Start an action that draws a marker to an object of the model's world until the part has settled (thesis 8.2)."""
 
     epoch: Count
     action_id: Name
     marker: Name
     object: Name
-    position: Vector3  # m, where it is; from then on where the model has it
+    position: Vector3  # m, of the object now; later positions come from the model
     radius: Annotated[float, Meta(gt=0)]  # m
     aim: Aim
-    normal: Vector3 | None = None  # where the marker's normal is to point
-    stay: bool = False  # the part is not drawn back
+    normal: Vector3 | None = None  # direction in which the marker's normal should point
+    stay: bool = False  # True: the part stays where the force ended, instead of being drawn back
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Put a simulated object somewhere."""
+    """Set the position of a simulated object."""
 
     name: Name
     position: Vector3  # m
 
 
 class AddObject(Request, frozen=True, kw_only=True):
-    """A new object for the model's world; replaces one of the same name."""
+    """Add an object to the model's world, or replace the one of the same name."""
 
     name: Name
     geometry: Geometry
-    position: Vector3
+    position: Vector3  # m
     quaternion: Quaternion
     role: Role
 
 
 class MoveObject(Request, frozen=True, kw_only=True):
-    """A known object's new pose."""
+    """Set the pose of an object."""
 
     name: Name
-    position: Vector3
+    position: Vector3  # m
     quaternion: Quaternion | None = None
 
 
 class SetRole(Request, frozen=True, kw_only=True):
-    """A known object's new role."""
+    """Set the role of an object."""
 
     name: Name
     role: Role
 
 
 class OneName(Request, frozen=True, kw_only=True):
-    """An object to remove or detach."""
+    """Name of an object to remove or detach."""
 
     name: Name
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """An object that moves with a link from now on."""
+    """Let an object move with a link from now on."""
 
     name: Name
     link: Name
 
 
 class JacobianAt(Request, frozen=True, kw_only=True):
-    """A marker's Jacobian at a pose; without q, at the newest one."""
+    """Ask for the Jacobian of a marker at q; without q, at the newest pose."""
 
     marker: Name
     q: RobotVector | None = None
 
 
 class Reply(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every reply carries."""
+    """The header of every reply."""
 
-    v: int
+    v: int  # version of the contract
 
 
 class Done(Reply, frozen=True, kw_only=True):
-    """It happened."""
+    """The call succeeded."""
 
 
 class Taken(Reply, frozen=True, kw_only=True):
-    """The new epoch: older ones are refused from now on."""
+    """The epoch of the new ownership; calls and commands with an older epoch are refused."""
 
     epoch: Count
 
@@ -139,13 +140,13 @@ class Driven(Reply, frozen=True, kw_only=True):
 
 
 class Started(Reply, frozen=True, kw_only=True):
-    """An action began at tick k; motion messages of later ticks tell of it."""
+    """An action began at tick k; `Motion` of later ticks reports its state."""
 
     k: Count
 
 
 class PartMeta(Reply, frozen=True, kw_only=True):
-    """What a part is made of."""
+    """Motors of a part and their limits."""
 
     part: Name
     motors: list[Name]
@@ -163,10 +164,10 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
 
     name: Name
     geometry: Geometry
-    position: Vector3
+    position: Vector3  # m
     quaternion: Quaternion
     role: Role
-    link: str  # empty: free
+    link: str  # link that the object is attached to; empty: none
 
 
 class World(Reply, frozen=True, kw_only=True):
@@ -176,15 +177,15 @@ class World(Reply, frozen=True, kw_only=True):
 
 
 class JacobianReply(Reply, frozen=True, kw_only=True):
-    """Rows: linear then angular; columns: the robot's motors; row-major."""
+    """A Jacobian: rows linear, then angular; columns are the robot's motors."""
 
     rows: Annotated[int, Meta(ge=1)]
     columns: Annotated[int, Meta(ge=1)]
-    data: list[float]
+    data: list[float]  # row-major
 
 
 class Stat(Reply, frozen=True, kw_only=True):
-    """How a service is."""
+    """Status of a service."""
 
     who: Name
     instance: Name
@@ -193,19 +194,56 @@ class Stat(Reply, frozen=True, kw_only=True):
     ready: bool
     text: Text  # one line for the status screen
     numbers: dict[str, float]
-    rejected: dict[str, int]  # refused messages and calls by reason
-    words: dict[str, Text] = {}  # what is no number, such as a hash
+    rejected: dict[str, int]  # number of refused messages and calls, by reason
+    words: dict[str, Text] = {}  # values that are not numbers, such as a hash
 
 
 class Config(Reply, frozen=True, kw_only=True):
     """A service's whole configuration as JSON."""
 
-    config: str
+    config: str  # JSON
 
 
 class Failure(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Why a call was refused."""
+    """The reply to a call that was refused."""
 
     v: int
     code: Name
     text: Text
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Keys of calls with the same request and reply, and the service that answers them; a row of the table in docs/bus.md."""
+
+    pattern: str
+    verbs: tuple[str, ...]  # for {verb} in the pattern
+    request: type[Request]
+    reply: type[Reply]
+    server: str
+
+
+CALLS = (
+    Call("{service}/rpc/{verb}", ("stat",), Empty, Stat, "every service"),
+    Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, "every service"),
+    Call("{service}/rpc/{verb}", ("config",), Empty, Config, "every service"),
+    Call("{part}/meta", (), Empty, PartMeta, "robot_sim"),
+    Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, "robot_sim"),
+    Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, "robot_sim"),
+    Call("sim/rpc/{verb}", ("reset", "pause", "resume"), Empty, Done, "robot_sim"),
+    Call("sim/rpc/{verb}", ("place",), Place, Done, "robot_sim"),
+    Call("estop/rpc/{verb}", ("reset",), Empty, Done, "robot_sim"),
+    Call("{part}/rpc/{verb}", ("take",), Take, Taken, "controller"),
+    Call("{part}/rpc/{verb}", ("release",), WithEpoch, Done, "controller"),
+    Call("{part}/rpc/{verb}", ("goal",), Goal, Started, "controller"),
+    Call("{part}/rpc/{verb}", ("force",), Force, Done, "controller"),
+    Call("{part}/rpc/{verb}", ("reach",), ReachFor, Started, "controller"),
+    Call("model/rpc/world/{verb}", ("add",), AddObject, Done, "model"),
+    Call("model/rpc/world/{verb}", ("move",), MoveObject, Done, "model"),
+    Call("model/rpc/world/{verb}", ("remove", "detach"), OneName, Done, "model"),
+    Call("model/rpc/world/{verb}", ("role",), SetRole, Done, "model"),
+    Call("model/rpc/world/{verb}", ("attach",), Attach, Done, "model"),
+    Call("model/rpc/world/{verb}", ("list",), Empty, World, "model"),
+    Call("model/rpc/{verb}", ("jacobian",), JacobianAt, JacobianReply, "model"),
+    Call("{part}/rpc/{verb}", ("waypoint",), Empty, Done, "port_filter"),
+)

@@ -21,7 +21,6 @@ import numpy as np
 
 import mobee
 import mobee_system  # noqa: F401  (puts the packages of the live system on the path)
-from bus_schema import keys
 from bus_schema.messages import State
 from services.common.config import ServiceConfig
 from services.common.service import Service
@@ -54,7 +53,7 @@ def watch(endpoint: str) -> None:
     with Service(f"client_{os.getpid()}", ServiceConfig(endpoint=endpoint), robot) as service:
         states: deque[State] = deque(maxlen=1000)
 
-        service.on_newest(keys.state("left_arm"), State, states.append, part="left_arm")
+        service.on_newest(State, states.append, "left_arm")
         service.on_clock(lambda clock: None)  # tells which run it is: messages of another one are refused
         service.spin(time.monotonic() + PATIENCE, lambda: len(states) > 0 and np.ptp([states[0].q, states[-1].q], axis=0).max() > 0.1)
         if not states:

@@ -8,12 +8,12 @@ import time
 from typing import Any
 
 from bus_schema import keys
-from bus_schema.messages import EStop
+from bus_schema.messages import EStop, State
 from bus_schema.rpc import Done, Empty
 from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
-from services.common.bus import STOP, Bus
+from services.common.bus import Bus
 from services.common.observe import Heard, listen
 
 _REPEAT, _PATIENCE = 0.1, 2.0  # s
@@ -48,8 +48,8 @@ def _stop(session: Any, reason: str) -> list[str]:
     def note(heard: Heard) -> None:
         gates[heard.key.partition("/")[0]] = heard.content()["gate"]
 
-    listen(session, keys.ALL_STATES, note)
-    publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(keys.ESTOP, EStop, STOP)
+    listen(session, State.stream.keys(), note)
+    publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(EStop)
     give_up = time.monotonic() + _PATIENCE
     while time.monotonic() < give_up:
         publisher.put(set=True, source="mobee", reason=reason[:2000])

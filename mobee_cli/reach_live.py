@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.chain import Commands, Tick
-from bus_schema.messages import Reach
+from bus_schema.messages import Commands, Reach, Tick
 from bus_schema.rpc import Config, Empty, World
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
@@ -49,9 +48,9 @@ class LivePlant(BusPlant):
         self._q: Array | None = None
         self._asked = self._begun = np.inf  # s, monotonic clock: the request, and when the controller began
         self._commands: list[tuple[float, Array]] = []  # when sent, what: the last before the request, and those after
-        service.on_newest(keys.TICK, Tick, self._note_tick)
-        service.on_each(keys.reach(part), Reach, self._note_reach, part=part)
-        service.on_each(keys.COMMANDS, Commands, self._note_commands)
+        service.on_newest(Tick, self._note_tick)
+        service.on_each(Reach, self._note_reach, part)
+        service.on_each(Commands, self._note_commands)
 
     def q(self) -> Array:
         """All motors, (n,) rad, as the encoders say."""

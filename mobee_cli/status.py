@@ -9,7 +9,7 @@ import shutil
 import time
 from typing import Any
 
-from bus_schema import keys
+from bus_schema.messages import State
 from bus_schema.rpc import Stat
 from mobee_cli.connect import add_endpoint, connected
 from services.common.exit_codes import FAILED
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Ask everybody and print."""
     states: dict[str, Heard] = {}
     with connected(arguments.endpoint) as session:
-        listen(session, keys.ALL_STATES, lambda heard: states.update({heard.key: heard}))
+        listen(session, State.stream.keys(), lambda heard: states.update({heard.key: heard}))
         begun = time.monotonic()
         present = alive(session)
         answers = stats(session, [who for who in present if who != "router"])

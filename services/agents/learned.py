@@ -8,11 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import Learned, Surprise
 from mobee import TransitionModel
 from mobee.arrays import Array
-from services.common.bus import NEWEST, Bus
+from services.common.bus import Bus
 
 PERIOD = 0.5  # s of the clock on the wall between two messages: in lockstep transitions come faster than anybody looks
 
@@ -26,7 +25,7 @@ class LearnedStream:
         """`model`: of what the agent has observed."""
         self._model, self._part = model, model.space.part
         self._space = json.dumps(model.space.settings)
-        self._stream = bus.publisher(keys.learned(self._part), Learned, NEWEST)
+        self._stream = bus.publisher(Learned, self._part)
         self._next = -np.inf  # s, monotonic clock
 
     def put(self, n: int, s: int, numbers: Callable[[], tuple[Array, Array]]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import CuriousAgent
 from mobee.robot.robot import Robot
@@ -12,7 +11,6 @@ from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
 from services.agents.learned import LearnedStream
 from services.agents.work import Work, tell
-from services.common.bus import EVENTS
 from services.common.bus_plant import BusPlant
 from services.common.service import Service
 
@@ -40,7 +38,7 @@ class AgentNode:
             goal=config.goal or None,
             goal_weight=config.goal_weight or None,
         )
-        self._stream = service.bus.publisher(keys.transition(config.part), TransitionMessage, EVENTS)
+        self._stream = service.bus.publisher(TransitionMessage, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
         self._work = Work(service, plant)
         self._mark()

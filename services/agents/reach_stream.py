@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import ReachTarget, TransitionModel
 from mobee.arrays import Array
@@ -13,7 +12,7 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Step
 from services.agents.learned import LearnedStream
 from services.agents.work import tell
-from services.common.bus import EVENTS, Bus
+from services.common.bus import Bus
 
 
 class ReachStream:
@@ -23,7 +22,7 @@ class ReachStream:
         self._agent, self._seen, self._count = agent, TransitionModel(agent.space), 0
         for step in agent.store.load() if agent.store is not None else []:
             self._note(step)
-        self._transitions = bus.publisher(keys.transition(agent.part), TransitionMessage, EVENTS)
+        self._transitions = bus.publisher(TransitionMessage, agent.part)
         self._learned = LearnedStream(bus, self._seen)
 
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:

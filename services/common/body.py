@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import State
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
@@ -15,7 +14,7 @@ class Body:
     """The newest state of each part."""
 
     def __init__(self, bus: Bus, robot: Robot) -> None:
-        self._streams = {name: bus.latest(keys.state(name), State, part=name) for name in robot.parts}
+        self._streams = {name: bus.latest(State, name) for name in robot.parts}
         self._robot = robot
         self.states: dict[str, State] = {}
 

@@ -12,28 +12,31 @@ import zenoh
 import zenoh.ext
 from zenoh.handlers import Callback, RingChannel
 
-from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
+from bus_schema import VERSION, Refused, decode, encode, encoding_of
 from bus_schema.messages import Event, Message
+from bus_schema.stream import Delivery
 
 
 @dataclass(frozen=True, slots=True)
-class Delivery:
-    """How a stream travels.  `history`: how many messages a late joiner gets; 0 = none."""
+class _Settings:
+    """Zenoh's settings of a delivery class.  `history`: how many messages a late subscriber gets; 0 = none."""
 
     congestion: zenoh.CongestionControl
     priority: zenoh.Priority
     history: int = 0
 
 
-_DROP = zenoh.CongestionControl.DROP
+_DROP, _BLOCK = zenoh.CongestionControl.DROP, zenoh.CongestionControl.BLOCK
 
-LATEST = Delivery(_DROP, zenoh.Priority.REAL_TIME)  # control: the newest value or nothing; never blocks the sender
-STEP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # control in lockstep: all, in order
-STOP = Delivery(zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME)  # emergency stop: rather late than never
-DATA = Delivery(_DROP, zenoh.Priority.DATA)  # perceived objects, ground truth
-BULK = Delivery(_DROP, zenoh.Priority.DATA_LOW)  # pictures: behind everything else
-EVENTS = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=100)  # what a person reads; late joiners get the last ones
-NEWEST = Delivery(_DROP, zenoh.Priority.DATA_LOW, history=1)  # large and slow: late joiners get the last one
+_SETTINGS: dict[Delivery, _Settings] = {  # the classes are described in bus_schema/stream.py
+    "LATEST": _Settings(_DROP, zenoh.Priority.REAL_TIME),
+    "STEP": _Settings(_BLOCK, zenoh.Priority.REAL_TIME),
+    "STOP": _Settings(_BLOCK, zenoh.Priority.REAL_TIME),
+    "DATA": _Settings(_DROP, zenoh.Priority.DATA),
+    "BULK": _Settings(_DROP, zenoh.Priority.DATA_LOW),
+    "EVENTS": _Settings(_DROP, zenoh.Priority.DATA_LOW, history=100),
+    "NEWEST": _Settings(_DROP, zenoh.Priority.DATA_LOW, history=1),
+}
 
 
 _M = TypeVar("_M", bound=Message)
@@ -46,14 +49,15 @@ class Publisher(Generic[_M]):
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
         self._is_heard: bool | None = None  # None: nobody asked yet
+        how = _SETTINGS[bus.control if delivery == "CONTROL" else delivery]
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
-            "congestion_control": delivery.congestion,
-            "priority": delivery.priority,
+            "congestion_control": how.congestion,
+            "priority": how.priority,
             "express": False,  # a burst of express messages overflows its two-batch queue and is lost
         }
-        if delivery.history:
-            cache = zenoh.ext.CacheConfig(max_samples=delivery.history)
+        if how.history:
+            cache = zenoh.ext.CacheConfig(max_samples=how.history)
             self._publisher: Any = zenoh.ext.declare_advanced_publisher(bus.session, key, cache=cache, publisher_detection=True, **settings)
         else:
             self._publisher = bus.session.declare_publisher(key, **settings)
@@ -100,6 +104,11 @@ class Latest(Generic[_M]):
         return None if sample is None else self._bus.receive(self._cls, sample, self._part)
 
 
+def part_of(cls: type[Message], name: str) -> str | None:
+    """The part whose motors a message's vectors are over; None if its key names no part."""
+    return name if cls.stream.variable == "part" and name != "*" else None
+
+
 class Bus:
     """A session, the bus clock as last heard, and the count of what was refused."""
 
@@ -110,17 +119,23 @@ class Bus:
         self.part_sizes: dict[str, int] = {}
         self.robot_size: int | None = None
         self.rejected: Counter[str] = Counter()
-        self.control = LATEST  # how the streams of control travel: STEP in lockstep
+        self.control: Delivery = "LATEST"  # how CONTROL streams travel: STEP in lockstep
         self._reported: dict[str, float] = {}
-        self._events: Publisher[Event] = self.publisher(keys.event(who), Event, EVENTS)
+        self._events: Publisher[Event] = self.publisher(Event, who)
 
-    def publisher(self, key: str, cls: type[_M], delivery: Delivery) -> Publisher[_M]:
-        """A stream to write."""
-        return Publisher(self, key, cls, delivery)
+    def publisher(self, cls: type[_M], name: str = "", delivery: Delivery | None = None) -> Publisher[_M]:
+        """A stream to write.
 
-    def latest(self, key: str, cls: type[_M], part: str | None = None) -> Latest[_M]:
-        """A stream to poll for its newest message; `part` names whose motors its vectors are over."""
-        return Latest(self, key, cls, part)
+        Args:
+            cls: the message, which says where and how it is published (`Message.stream`).
+            name: the variable in its key, such as the part.
+            delivery: another delivery class than the message's own.
+        """
+        return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
+
+    def latest(self, cls: type[_M], name: str = "*") -> Latest[_M]:
+        """A stream to poll for its newest message; `name`: the variable in its key, by default any."""
+        return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
         """The message in a sample; None if it was refused, which is counted and told.

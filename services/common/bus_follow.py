@@ -9,8 +9,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from bus_schema import keys
-from bus_schema.chain import Tick
+from bus_schema.messages import Tick
 from bus_schema.rpc import Goal
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
@@ -31,7 +30,7 @@ class BusFollower(BusPlant):
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))
         self._seen: list[tuple[float, Array]] = []  # s of the robot's clock, encoders (n,)
-        service.on_newest(keys.TICK, Tick, self._note_tick)
+        service.on_newest(Tick, self._note_tick)
 
     def q(self) -> Array:
         """All motors, (n,) rad, as the encoders say; raises MobeeError where there is no robot."""

@@ -46,7 +46,7 @@ class BusPlant:
         self._to_answer: int | None = None  # lockstep: a tick that waits for this service
         for part in parts:
             robot.part(part)
-            service.on_newest(keys.motion(part), Motion, self._noter(part), part=part)
+            service.on_newest(Motion, self._noter(part), part)
         if service.locked:
             service.on_turn(self._note_turn)
         else:

@@ -32,7 +32,7 @@ class ReachClient:
         self._is_there = False  # in the world of the model that runs now
         self._reaches: dict[str, Reach] = {}
         for part in parts:
-            service.on_newest(keys.reach(part), Reach, partial(self._note_reach, part), part=part)
+            service.on_newest(Reach, partial(self._note_reach, part), part)
         service.on_alive(self._note_alive)
 
     def present(self, target: ReachTarget | None) -> None:

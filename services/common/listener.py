@@ -11,10 +11,8 @@ import zenoh
 import zenoh.ext
 from zenoh.handlers import Callback
 
-from bus_schema import keys
-from bus_schema.chain import Tick
-from bus_schema.messages import Clock, Message, Turn
-from services.common.bus import LATEST, NO_RUN, STEP, Bus
+from bus_schema.messages import Clock, Message, Tick, Turn
+from services.common.bus import NO_RUN, Bus, part_of
 from services.common.inbox import CROWDED, Inbox, Newest
 
 _M = TypeVar("_M", bound=Message)
@@ -30,31 +28,41 @@ class Listener:
         self.bus, self.inbox, self.locked, self._direct = bus, inbox, locked, direct
         self.keeps_step = False  # a Participant of lockstep says otherwise
         self.inject_test_delay: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
-        bus.control = STEP if locked else LATEST
+        bus.control = "STEP" if locked else "LATEST"
         self._kept: list[Any] = []  # tokens die with their handles
         self._on_run: list[Callable[[], None]] = []
 
-    def on_newest(self, key: str, cls: type[_M], handler: Callable[[_M], None], part: str | None = None) -> None:
-        """Have the newest message of a stream handled; older ones waiting are overwritten."""
-        self._subscribe(key, self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
+    def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
+        """Have the newest message of a stream handled; older ones that wait are overwritten.
+
+        `name`: the variable in the message's key, such as the part; by default any.
+        """
+        part = part_of(cls, name)
+        self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
 
     def on_each(
         self,
-        key: str,
         cls: type[_M],
         handler: Callable[[_M], None],
+        name: str = "*",
         *,
-        part: str | None = None,
         history: bool = False,
         any_run: bool = False,
         crowd: int = CROWDED,
         later: bool = False,
     ) -> None:
-        """Have every message of a stream handled, with `history` also those from before this service came.
+        """Have every message of a stream handled.
 
-        `crowd`: how many may be waiting for the main thread before this stream's messages are dropped.  `later`: they wait for
-        a message of another stream, before which they are handled.
+        Args:
+            cls: the message.
+            handler: called in the main thread.
+            name: the variable in the message's key, such as the part; by default any.
+            history: also messages from before this service joined.
+            any_run: also messages of another run of robot_sim.
+            crowd: how many handlers may wait for the main thread before messages of this stream are dropped.
+            later: do not wake the main thread; they are handled just before the next message of another stream.
         """
+        key, part = cls.stream.keys(name), part_of(cls, name)
 
         def enqueue(sample: zenoh.Sample) -> None:
             offer = self.inbox.offer_later if later else self.inbox.offer
@@ -84,7 +92,7 @@ class Listener:
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
-        self._on_time(keys.CLOCK, Clock, handler)
+        self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
         """As on_clock, for who computes on the body: every tick comes with the newest state of every part."""
@@ -95,13 +103,13 @@ class Listener:
             else:
                 self.bus.reject("part", f"Tick of {', '.join(tick.parts)}: this robot has {', '.join(self.bus.part_sizes)}")
 
-        self._on_time(keys.TICK, Tick, whole)
+        self._on_time(Tick, whole)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
         """Lockstep, instead of `on_clock`: have only those ticks handled that wait for this service."""
-        self._on_time(keys.turn(self.bus.who), Turn, handler)
+        self._on_time(Turn, handler, self.bus.who)
 
-    def _on_time(self, key: str, cls: type[_T], handler: Callable[[_T], None]) -> None:
+    def _on_time(self, cls: type[_T], handler: Callable[[_T], None], name: str = "*") -> None:
         def tick(sample: zenoh.Sample) -> None:
             time = self.bus.receive(cls, sample, any_run=True)
             if time is None:
@@ -116,7 +124,7 @@ class Listener:
                     announce()
             handler(time)
 
-        self._subscribe(key, self._newest(tick))
+        self._subscribe(cls.stream.keys(name), self._newest(tick))
 
     def on_run(self, handler: Callable[[], None]) -> None:
         """Have it called at the first tick of every run."""

@@ -11,10 +11,7 @@ import random
 import time
 from collections.abc import Callable, Iterable, Sequence
 
-from bus_schema import keys
-from bus_schema.chain import Answer
-from bus_schema.messages import StepDone, Turn
-from services.common.bus import STEP
+from bus_schema.messages import Answer, StepDone, Turn
 from services.common.service import Service
 
 TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long at every tick and again before it answers
@@ -28,7 +25,7 @@ class Participant:
         self._delay = float(os.environ.get(TEST_DELAY, "0")) * 1e-3  # s
         if self._locked:
             service.inject_test_delay = self.inject_test_delay
-            self._done = service.bus.publisher(keys.done(service.who), StepDone, STEP)
+            self._done = service.bus.publisher(StepDone, service.who)
 
     def done(
         self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), told: bool = False
@@ -74,8 +71,8 @@ class Barrier:
         self._present: set[str] = set()
         self._answered: dict[str, int] = {}  # newest tick that each has answered
         self._busy: Sequence[str] = ()  # of the referee's newest answer
-        self._turns = {who: service.bus.publisher(keys.turn(who), Turn, STEP) for who in sorted(self._expected - {referee})}
-        service.on_each(keys.ALL_DONE, StepDone, self._note_done)
+        self._turns = {who: service.bus.publisher(Turn, who) for who in sorted(self._expected - {referee})}
+        service.on_each(StepDone, self._note_done)
         service.on_alive(self._note_alive)
 
     def begin(self) -> None:

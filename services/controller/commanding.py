@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from bus_schema import keys
-from bus_schema.chain import Answer, Commands, Order, Tick
-from bus_schema.messages import Forces, Motion
+from bus_schema.messages import Answer, Commands, Forces, Motion, Order, Tick
 from mobee import Controller
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
@@ -55,7 +53,7 @@ class Telling:
     def __init__(self, bus: Bus, robot: Robot, law: Controller, actions: Mapping[str, Action]) -> None:
         self._law, self._actions = law, actions
         self._where = {name: part.slice for name, part in robot.parts.items()}
-        self._streams = {part: bus.publisher(keys.motion(part), Motion, bus.control) for part in robot.parts}
+        self._streams = {part: bus.publisher(Motion, part) for part in robot.parts}
         self._told: dict[str, tuple[str, Owner | None]] = {}  # of each part's last message
 
     def tell(self, tick: Tick, q: Array, forces: Forces | None) -> None:
@@ -98,7 +96,7 @@ class Commanding:
 
     def __init__(self, service: Service, ttl: int, actions: Mapping[str, Action], drives: Drives) -> None:
         self._ttl, self._actions, self._drives = ttl, actions, drives
-        self._commands = service.bus.publisher(keys.COMMANDS, Commands, service.bus.control)
+        self._commands = service.bus.publisher(Commands)
         self._participant = Participant(service)
         self._to_answer: tuple[int, Answer] | None = None  # lockstep: a tick, and what will be said to it
         drives.answered = self._answer

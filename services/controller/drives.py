@@ -6,8 +6,7 @@ import time
 from collections.abc import Callable
 
 from bus_schema import keys
-from bus_schema.chain import PartStatus
-from bus_schema.messages import EStop
+from bus_schema.messages import EStop, PartStatus
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed

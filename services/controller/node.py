@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.chain import Order, Tick
-from bus_schema.messages import EStop, Mode, Targets
+from bus_schema.messages import EStop, Mode, Order, Targets, Tick
 from bus_schema.messages import Forces as ForcesMessage
 from bus_schema.rpc import PartMeta
 from mobee import Controller, Gains, Model
@@ -22,7 +21,6 @@ from mobee.control.forces import needs_contacts, told_terms
 from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
-from services.common.bus import LATEST
 from services.common.exit_codes import BAD_INPUT
 from services.common.inbox import CROWDED_WITH_STOPS, Timer
 from services.common.rpc import CallFailed
@@ -50,7 +48,7 @@ class ControllerNode:
         self._model = Model(robot)  # knows no world
         self._law = Controller(self._model, gains, config.modality, speed_scale=config.speed_scale, terms=load_terms(config.terms))
         self._needs_contacts = bool(self._law.terms) or needs_contacts()
-        self._own_forces = service.bus.publisher(keys.CONTROLLER_FORCES, ForcesMessage, LATEST)
+        self._own_forces = service.bus.publisher(ForcesMessage, "controller", "LATEST")
         self._actions = {part: Action(gains.settle) for part in robot.parts}
         self._drives = Drives(service, robot)
         self._forces: ForcesMessage | None = None
@@ -70,9 +68,9 @@ class ControllerNode:
         self._reaches = ReachesUnderWay(service.bus, robot, self._law, self._actions, lambda: self._q)
         self._goals = GoalDesk(service, robot, self._law, self._actions, self._reaches, self._stay, self._amend)
         service.on_run(self._new_run)
-        service.on_newest(keys.MODEL_FORCES, ForcesMessage, self._take_forces)
-        service.on_newest(keys.MODEL_TARGETS, Targets, self._reaches.aim)
-        service.on_each(keys.ESTOP, EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
+        service.on_newest(ForcesMessage, self._take_forces, "model")
+        service.on_newest(Targets, self._reaches.aim)
+        service.on_each(EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_tick(self._begin)
         if service.locked:
             service.on_alive(self._note_alive)

@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bus_schema import keys
-from bus_schema.chain import Tick
 from bus_schema.messages import Reach as ReachMessage
-from bus_schema.messages import ReachPhase, Targets
+from bus_schema.messages import ReachPhase, Targets, Tick
 from bus_schema.rpc import ReachFor
 from mobee import Controller
 from mobee.arrays import Array
@@ -49,7 +47,7 @@ class ReachesUnderWay:
         """`measured`: q (n,) rad at the newest tick."""
         self._bus, self._robot, self._law, self._actions, self._measured = bus, robot, law, actions, measured
         self._last: dict[str, Reach] = {}
-        self._streams = {part: bus.publisher(keys.reach(part), ReachMessage, bus.control) for part in robot.parts}
+        self._streams = {part: bus.publisher(ReachMessage, part) for part in robot.parts}
 
     def begin(self, part: str, asked: ReachFor) -> None:
         """Force the part from now on.  Raises InvalidValue, UnknownName for what cannot be reached for."""

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Stat
-from services.common.bus import STOP
 from services.common.exit_codes import BAD_INPUT
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -36,7 +35,7 @@ class Supervisor:
         self.stopped_robot = False  # a vital service was given up
         self.bad_settings = False  # a service was given up since it cannot use them
         self._service, self._tell, self._stopping = service, tell, False
-        self._estop = service.bus.publisher(keys.ESTOP, EStop, STOP)
+        self._estop = service.bus.publisher(EStop)
         service.on_alive(self._note_token)
 
     def begin(self) -> None:

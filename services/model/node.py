@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from bus_schema import VERSION, keys
-from bus_schema.chain import Tick
-from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets
+from bus_schema.messages import ContactItem, Contacts, Forces, MarkerPose, Pose, Reach, Targets, Tick
 from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model
 from mobee.arrays import Array
@@ -21,7 +20,6 @@ from mobee.model.hands import MAX_HANDS
 from mobee.model.pose import Pose as ModelPose
 from mobee.model.quaternion import from_matrix
 from mobee.robot.robot import Robot
-from services.common.bus import LATEST
 from services.common.lockstep import Participant
 from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
@@ -45,11 +43,11 @@ class ModelNode:
         self._q: Array = robot.home
         self._desk = WorldDesk(service, self._model)
         bus = service.bus
-        self._forces = bus.publisher(keys.MODEL_FORCES, Forces, bus.control)
+        self._forces = bus.publisher(Forces, "model")
         self._participant = Participant(service)
-        self._pose = bus.publisher(keys.MODEL_POSE, Pose, LATEST)
-        self._contacts = bus.publisher(keys.MODEL_CONTACTS, Contacts, LATEST)
-        self._targets = bus.publisher(keys.MODEL_TARGETS, Targets, bus.control)
+        self._pose = bus.publisher(Pose)
+        self._contacts = bus.publisher(Contacts)
+        self._targets = bus.publisher(Targets)
         self._reaches: dict[str, Reach] = {}  # of the parts that reach now
         self._reaching: tuple[str, ...] | None = None  # their markers
         self._last_k = -1
@@ -64,7 +62,7 @@ class ModelNode:
         service.on_run(self._new_run)
         service.on_alive(self._note_alive)
         for part in robot.parts:
-            service.on_newest(keys.reach(part), Reach, partial(self._note_reach, part), part=part)
+            service.on_newest(Reach, partial(self._note_reach, part), part)
         service.on_tick(self._tick)
         constraint_forces(self._desk.pose, self._gains, config.propagate)  # what is built once is built before the robot moves
 

@@ -33,7 +33,7 @@ class WorldDesk:
         self._expiry: dict[str, int] = {}  # of what only perception put there, ns of the bus clock
         self._presenter = ""  # the service whose target is there
         service.on_alive(self._note_alive)
-        service.on_each(keys.ALL_WORLD, WorldObject, self._perceive)
+        service.on_each(WorldObject, self._perceive)
         service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._add(w, r)))
         service.on_request(keys.world_rpc("move"), MoveObject, lambda r, _: self._edit(lambda w: self._move(w, r)))
         service.on_request(keys.world_rpc("remove"), OneName, lambda r, _: self._edit(lambda w: self._remove(w, r.name)))

@@ -38,10 +38,10 @@ class MonitorNode:
         self._service, self._output, self._stream = service, output, output.stream
         bus = service.bus
         self._body = Body(bus, robot)
-        self._motions = {part: bus.latest(keys.motion(part), Motion, part) for part in colors_of(robot.parts)}
-        self._forces = [bus.latest(key, Forces) for key in (keys.MODEL_FORCES, keys.CONTROLLER_FORCES)]
-        self._contacts = bus.latest(keys.MODEL_CONTACTS, Contacts)
-        self._images = {eye: bus.latest(keys.image(eye), Image) for eye in keys.EYES}
+        self._motions = {part: bus.latest(Motion, part) for part in colors_of(robot.parts)}
+        self._forces = [bus.latest(Forces, source) for source in ("model", "controller")]
+        self._contacts = bus.latest(Contacts)
+        self._images = {eye: bus.latest(Image, eye) for eye in keys.EYES}
         self._touching: list[ContactItem] = []
         self._offset = self._last = 0.0  # s: runs are shown one after the other
         self._time = Percentiles()
@@ -53,10 +53,10 @@ class MonitorNode:
         service.on_run(self._new_run)
         service.on_clock(self._note_clock)
         service.on_alive(self._note_alive)
-        service.on_each(keys.ALL_WORLD, WorldObject, self._see)
-        service.on_each(keys.ALL_TRANSITIONS, Transition, self._learn)
-        service.on_each(keys.ALL_LEARNED, Learned, self._know, history=True)
-        service.on_each(keys.ALL_EVENTS, Event, self._tell, history=True, any_run=True)
+        service.on_each(WorldObject, self._see)
+        service.on_each(Transition, self._learn)
+        service.on_each(Learned, self._know, history=True)
+        service.on_each(Event, self._tell, history=True, any_run=True)
         self._rate, self._image_rate, self._world_rate = Rate(1.0 / config.rate), Rate(1.0 / config.image_rate), Rate(WORLD_PERIOD)
         for rate, look in ((self._rate, self._look), (self._image_rate, self._look_out), (self._world_rate, self._ask_world)):
             self._repeat(rate, look)

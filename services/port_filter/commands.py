@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 
-from bus_schema import keys
 from bus_schema.messages import Command, Mode
 from services.common.bus import Bus
 
@@ -15,7 +14,7 @@ class Stream:
     """One stream with one numbering, and which number of the client's is behind each."""
 
     def __init__(self, bus: Bus, part: str) -> None:
-        self._stream = bus.publisher(keys.command(part), Command, bus.control)
+        self._stream = bus.publisher(Command, part)
         self._seq = 0
         self._theirs: OrderedDict[int, int] = OrderedDict()
 

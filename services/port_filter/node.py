@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bus_schema import VERSION, keys
-from bus_schema.chain import Tick
-from bus_schema.messages import Clock
+from bus_schema.messages import Clock, Tick
 from bus_schema.rpc import Done, Empty
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
@@ -31,7 +30,7 @@ class FilterNode:
         self._drives = DriveDesk(service, twin, robot, self._why_cut, self._mark)
         self._passage = Passage(service, twin, robot, self._drives.epochs, self._why_cut, self._mark)
         HandThrough(service, twin, robot)
-        self._clock = twin.bus.publisher(keys.CLOCK, Clock, twin.bus.control)
+        self._clock = twin.bus.publisher(Clock)
         self._participant = Participant(service)
         twin.keeps_step = twin.locked
         self._barrier = Barrier(

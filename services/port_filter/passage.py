@@ -7,9 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from bus_schema import keys
-from bus_schema.chain import Answer, Commands, PartStatus, Tick
-from bus_schema.messages import Command, State
+from bus_schema.messages import Answer, Command, Commands, PartStatus, State, Tick
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.service import Service
@@ -35,12 +33,12 @@ class Passage:
         self.commands = {part: Stream(service.bus, part) for part in robot.parts}
         self._moves = {part: Moves() for part in robot.parts}
         self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
-        self._streams = {part: twin.bus.publisher(keys.state(part), State, twin.bus.control) for part in robot.parts}
-        self._tick = twin.bus.publisher(keys.TICK, Tick, twin.bus.control)
-        twin.on_newest(keys.COMMANDS, Commands, self._down_all)
+        self._streams = {part: twin.bus.publisher(State, part) for part in robot.parts}
+        self._tick = twin.bus.publisher(Tick)
+        twin.on_newest(Commands, self._down_all)
         for part in robot.parts:
-            twin.on_newest(keys.command(part), Command, partial(self._down, part), part=part)
-            service.on_newest(keys.state(part), State, partial(self._up, part), part=part)
+            twin.on_newest(Command, partial(self._down, part), part)
+            service.on_newest(State, partial(self._up, part), part)
 
     def note(self, tick: Tick) -> None:
         """A tick begins, with the body as it is."""

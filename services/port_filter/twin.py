@@ -8,7 +8,6 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty, PartMeta
 from mobee.robot.robot import Robot
-from services.common.bus import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.rpc import CallFailed
 from services.common.service import CallRefused, Service
@@ -20,10 +19,10 @@ class HandThrough:
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:
         self._service, self._twin = service, twin
         self._router: dict[str, Any] = {}  # tokens by instance
-        self._down = twin.bus.publisher(keys.ESTOP, EStop, LATEST)
-        self._up = service.bus.publisher(keys.ESTOP, EStop, LATEST)
-        service.on_each(keys.ESTOP, EStop, self._stop_clients, any_run=True, crowd=CROWDED_WITH_STOPS)
-        twin.on_each(keys.ESTOP, EStop, self._stop_robot, any_run=True, crowd=CROWDED_WITH_STOPS)
+        self._down = twin.bus.publisher(EStop, delivery="LATEST")
+        self._up = service.bus.publisher(EStop, delivery="LATEST")
+        service.on_each(EStop, self._stop_clients, any_run=True, crowd=CROWDED_WITH_STOPS)
+        twin.on_each(EStop, self._stop_robot, any_run=True, crowd=CROWDED_WITH_STOPS)
         twin.on_request(keys.ESTOP_RESET, Empty, lambda request, key: self._ask(key, Done))
         for part in robot.parts:
             twin.on_request(keys.meta(part), Empty, lambda request, key: self._ask(key, PartMeta))

@@ -12,8 +12,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from bus_schema import Refused
-from bus_schema.chain import Commands
-from bus_schema.messages import Command, Mode
+from bus_schema.messages import Command, Commands, Mode
 from mobee.arrays import Array
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot

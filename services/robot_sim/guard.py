@@ -6,12 +6,10 @@ import time
 from collections.abc import Callable, Iterable
 
 from bus_schema import VERSION, Refused, keys
-from bus_schema.chain import Answer, Commands
-from bus_schema.messages import Command, EStop
+from bus_schema.messages import Answer, Command, Commands, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
-from services.common.bus import LATEST
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
 from services.robot_sim.admission import Limits, Order, orders_of, refused_as_call
@@ -32,8 +30,8 @@ class Guard:
         self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
         self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
         if not service.locked:
-            self._newest = service.bus.latest(keys.COMMANDS, Commands)
-        self._estop = service.bus.publisher(keys.ESTOP, EStop, LATEST)
+            self._newest = service.bus.latest(Commands)
+        self._estop = service.bus.publisher(EStop, delivery="LATEST")
         # Epochs grow over restarts too: what a controller holds from before never fits again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
         self._declare()
@@ -90,11 +88,11 @@ class Guard:
         for part in self.gates:
             self._listen(part)
         if service.locked:
-            service.on_each(keys.COMMANDS, Commands, self._take_commands)
+            service.on_each(Commands, self._take_commands)
         service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
         for verb in ("arm", "release", "hold"):
             service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
-        service.on_each(keys.ESTOP, EStop, self._on_estop, any_run=True, crowd=CROWDED_WITH_STOPS)
+        service.on_each(EStop, self._on_estop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_request(keys.ESTOP_RESET, Empty, self._reset_estop)
         service.on_alive(self._on_alive)
 
@@ -102,9 +100,9 @@ class Guard:
         """Who drives a single part has a stream of its own."""
         service = self._service
         if service.locked:
-            service.on_each(keys.command(part), Command, lambda command: self._wait(part, Order.of(command)), part=part, later=True)
+            service.on_each(Command, lambda command: self._wait(part, Order.of(command)), part, later=True)
         else:
-            service.on_newest(keys.command(part), Command, lambda command: self._admit_now(part, Order.of(command)), part=part)
+            service.on_newest(Command, lambda command: self._admit_now(part, Order.of(command)), part)
 
     def _take_commands(self, commands: Commands) -> None:
         for part, order in self._orders(commands):

@@ -40,7 +40,7 @@ class Node:
         self._guard = Guard(service, robot, backend, self._dt)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
-        self._clock = self._bus.publisher(keys.CLOCK, Clock, self._bus.control)
+        self._clock = self._bus.publisher(Clock)
         self._clock_period = max(1, round(1.0 / (CLOCK_RATE * self._period)))  # ticks
         self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))
         self._rate = Rate(self._period)

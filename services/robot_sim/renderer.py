@@ -15,7 +15,6 @@ from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
 from mobee.robot.robot import Robot
 from services.common.body import Body
-from services.common.bus import BULK
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.rate import Percentiles
@@ -32,9 +31,9 @@ class RendererNode:
         self._period = round(1e9 / config.frame_rate)  # ns
         self._scene = Scene(robot, config.load_world(), config.width, config.height, config.view_deg)
         self._body = Body(service.bus, robot)
-        self._truth = service.bus.latest(keys.SIM_TRUTH, Truth)
-        self._images = {eye: service.bus.publisher(keys.image(eye), Image, BULK) for eye in keys.EYES}
-        self._cameras = {eye: service.bus.publisher(keys.camera(eye), Camera, BULK) for eye in keys.EYES}
+        self._truth = service.bus.latest(Truth)
+        self._images = {eye: service.bus.publisher(Image, eye) for eye in keys.EYES}
+        self._cameras = {eye: service.bus.publisher(Camera, eye) for eye in keys.EYES}
         self._due = 0  # ns, bus clock
         self._frame_time, self._pair_time = Percentiles(), Percentiles()
         self._frame_work = Percentiles()  # without the time that others had the processor

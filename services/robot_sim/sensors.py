@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from bus_schema import VERSION, keys
-from bus_schema.chain import PartStatus, Tick
-from bus_schema.messages import State
+from bus_schema import VERSION
+from bus_schema.messages import PartStatus, State, Tick
 from bus_schema.rpc import PartMeta
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
@@ -67,8 +66,8 @@ class Sensors:
     def __init__(self, bus: Bus, robot: Robot, dt: float) -> None:
         self._bus, self._dt = bus, dt
         self._where = {name: part.slice for name, part in robot.parts.items()}
-        self._streams = {part: bus.publisher(keys.state(part), State, bus.control) for part in robot.parts}
-        self._tick = bus.publisher(keys.TICK, Tick, bus.control)
+        self._streams = {part: bus.publisher(State, part) for part in robot.parts}
+        self._tick = bus.publisher(Tick)
         n = len(robot.motors)
         self._q, self._dq, self._tau = np.zeros(n), np.zeros(n), np.zeros(n)
         self._shares = np.zeros(n)  # of the tick after which each motor was read

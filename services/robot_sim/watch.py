@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import ObjectTruth, Truth
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -16,7 +15,7 @@ from mobee.model.quaternion import from_matrix
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
-from services.common.bus import DATA, Bus
+from services.common.bus import Bus
 from services.robot_sim.counters import MOVING, Counters
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend, SolidContact
@@ -99,7 +98,7 @@ class Watch:
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
         """`truth_period`: ticks between two messages of the truth."""
         self._bus, self._robot, self._backend, self._guard = bus, robot, backend, guard
-        self._truth = bus.publisher(keys.SIM_TRUTH, Truth, DATA)
+        self._truth = bus.publisher(Truth)
         self._truth_period = truth_period
         self._deepest = SolidContact()  # since the last truth message
         self.counters = Counters()

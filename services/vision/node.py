@@ -10,7 +10,6 @@ from bus_schema import keys
 from bus_schema.messages import Camera, Geometry, Image, WorldObject
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-from services.common.bus import DATA
 from services.common.eyes import frame_at_capture
 from services.common.rate import Percentiles
 from services.common.service import Service
@@ -28,15 +27,15 @@ class VisionNode:
         self._service, self._config, self._robot = service, config, robot
         self._images: dict[str, Image] = {}
         self._cameras: dict[str, Camera] = {}
-        self._place = service.bus.publisher(keys.world(BALL), WorldObject, DATA)
+        self._place = service.bus.publisher(WorldObject, BALL)
         self._time = Percentiles()
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         service.on_run(self._forget)
         service.on_clock(lambda clock: None)  # the service keeps the run's id
         for eye in keys.EYES:
-            service.on_newest(keys.camera(eye), Camera, self._take_camera)
-            service.on_newest(keys.image(eye), Image, self._take_image)
+            service.on_newest(Camera, self._take_camera, eye)
+            service.on_newest(Image, self._take_image, eye)
 
     def _take_camera(self, camera: Camera) -> None:
         self._cameras[camera.eye] = camera

@@ -14,17 +14,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Meta, Struct
 
-from bus_schema import VERSION, Refused, chain, decode, encode, encoding_of, messages, rpc
+from bus_schema import VERSION, Refused, decode, encode, encoding_of, messages, rpc
 from bus_schema.messages import Clock, Command, Contacts, Forces, State
 
 NOT_SENT = {messages.Message, rpc.Request, rpc.Reply, messages.MarkerPose, messages.ContactItem}
-NOT_SENT |= {messages.Geometry, messages.Surprise, messages.ObjectTruth, rpc.ObjectState, chain.PartStatus, chain.Order, chain.Answer}
+NOT_SENT |= {
+    messages.Geometry,
+    messages.Surprise,
+    messages.ObjectTruth,
+    rpc.ObjectState,
+    messages.PartStatus,
+    messages.Order,
+    messages.Answer,
+}
 
 
 def sent_types() -> list[type[Struct]]:
     found = [
         cls
-        for module in (messages, chain, rpc)
+        for module in (messages, rpc)
         for _, cls in inspect.getmembers(module, inspect.isclass)
         if issubclass(cls, Struct) and cls.__module__ == module.__name__
     ]
@@ -69,7 +77,7 @@ def values(hint: Any, metas: tuple[Meta, ...] = ()) -> st.SearchStrategy[Any]:
 
 def structs(cls: type[Struct]) -> st.SearchStrategy[Struct]:
     hints = get_type_hints(cls, include_extras=True)
-    fields = {name: st.just(VERSION) if name == "v" else values(hint) for name, hint in hints.items()}
+    fields = {name: st.just(VERSION) if name == "v" else values(hint) for name, hint in hints.items() if name in cls.__struct_fields__}
     return st.builds(cls, **fields)
 
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import pytest
 
 from bus_schema import VERSION, encode, encoding_of, keys
-from bus_schema.messages import State
+from bus_schema.messages import EStop, State
 from bus_schema.rpc import Done
 from mobee_cli.__main__ import main
-from services.common.bus import LATEST, Bus
+from services.common.bus import Bus
 from services.common.observe import listen
 from services.common.session import open_router
 
@@ -26,8 +26,8 @@ class Robot:
         self.gates = {"torso": "armed", "head": "armed"}
         self.deaf: set[str] = set()
         self.over = threading.Event()
-        publishers = {part: bus.publisher(keys.state(part), State, LATEST) for part in self.gates}
-        listen(self.session, keys.ESTOP, lambda heard: self.stop())
+        publishers = {part: bus.publisher(State, part) for part in self.gates}
+        listen(self.session, EStop.stream.key(), lambda heard: self.stop())
         self.session.declare_queryable(keys.ESTOP_RESET, self.reset)
 
         def speak() -> None:

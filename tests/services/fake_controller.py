@@ -11,7 +11,6 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, Motion
 from bus_schema.rpc import Goal, Started, Take, Taken
-from services.common.bus import LATEST
 from tests.services.harness import Refusal, Rig
 
 
@@ -36,8 +35,8 @@ class FakeController:
         self._target = self.q
         self._started: dict[str, Started] = {}  # by request
         self._lock = threading.RLock()
-        self._clock = rig.bus.publisher(keys.CLOCK, Clock, LATEST)
-        self._motion = rig.bus.publisher(keys.motion(part), Motion, LATEST)
+        self._clock = rig.bus.publisher(Clock)
+        self._motion = rig.bus.publisher(Motion, part)
         rig.serve(keys.goal("*", "take"), Take, self._take)
         rig.serve(keys.goal("*", "goal"), Goal, self._goal)
         rig.token("controller", self.instance)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import zenoh
 
-from bus_schema import Refused, decode, keys
-from bus_schema.chain import Tick
-from bus_schema.messages import ContactItem, Forces
-from services.common.bus import LATEST
+from bus_schema import Refused, decode
+from bus_schema.messages import ContactItem, Forces, Tick
 from tests.services.fake_sim import FakeSim
 from tests.services.harness import Rig
 
@@ -27,8 +25,8 @@ class FakeModel:
         self.touched: dict[str, list[str]] = {}
         self.contacts: list[ContactItem] | None = []  # which only a controller with terms of its own looks at
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
-        self._forces = rig.bus.publisher(keys.MODEL_FORCES, Forces, LATEST)
-        rig.listen(keys.TICK, self._answer)
+        self._forces = rig.bus.publisher(Forces, "model")
+        rig.listen(Tick.stream.key(), self._answer)
         sim.before_tick = self._foresee
 
     def _answer(self, sample: zenoh.Sample) -> None:

@@ -13,11 +13,9 @@ import numpy as np
 import zenoh
 
 from bus_schema import VERSION, decode, keys
-from bus_schema.chain import Answer, Commands, PartStatus, Tick
-from bus_schema.messages import Clock, Command
+from bus_schema.messages import Answer, Clock, Command, Commands, PartStatus, Tick
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.arrays import Array
-from services.common.bus import LATEST
 from tests.services.harness import Refusal, Rig, wait_for
 
 
@@ -53,9 +51,9 @@ class FakeSim:
         self.before_tick: Callable[[int], None] = lambda k: None  # what others put before anybody hears of tick k, free mode
         self._measured = self.q.copy()
         self.statuses: dict[str, PartStatus] = {}
-        self._tick = rig.bus.publisher(keys.TICK, Tick, LATEST)
-        self._clock = rig.bus.publisher(keys.CLOCK, Clock, LATEST)
-        rig.listen(keys.COMMANDS, self._obey)
+        self._tick = rig.bus.publisher(Tick)
+        self._clock = rig.bus.publisher(Clock)
+        rig.listen(Commands.stream.key(), self._obey)
         rig.serve(keys.drive("*", "take"), Take, self._take)
         rig.serve(keys.drive("*", "arm"), WithEpoch, self._arm)
         self.new_run()

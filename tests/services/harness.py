@@ -147,15 +147,15 @@ class Rig:
     def listen(self, key: str, handler: Callable[[zenoh.Sample], None]) -> None:
         self._kept.append(self.session.declare_subscriber(key, self._guarded(handler)))
 
-    def record(self, key: str, cls: type[Message], part: str | None = None) -> list[Any]:
+    def record(self, cls: type[Message], name: str = "*") -> list[Any]:
         """A list that grows with the stream; everything in it has passed the codec."""
         found: list[Any] = []
-        size = None if part is None else self.bus.part_sizes[part]
+        size = self.bus.part_sizes.get(name)
 
         def note(sample: zenoh.Sample) -> None:
             found.append(decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.bus.robot_size))
 
-        self.listen(key, note)
+        self.listen(cls.stream.keys(name), note)
         return found
 
     def serve(self, key: str, cls: type[Request], handler: Callable[[Any, str], Reply]) -> None:

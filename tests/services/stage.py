@@ -21,7 +21,7 @@ from mobee.arrays import Array
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common import rpc
-from services.common.bus import DATA, LATEST, Bus, Latest, Publisher
+from services.common.bus import Bus, Latest, Publisher
 from services.common.session import open_router
 
 TICK = 10_000_000  # ns
@@ -41,15 +41,15 @@ class Stage:
         self.bus.part_sizes = {name: len(part) for name, part in self.robot.parts.items()}
         self.k = 0
         self._token = self.session.liveliness().declare_token(keys.alive("router", "stage"))
-        self._clock = self.bus.publisher(keys.CLOCK, Clock, LATEST)
-        self._states = {part: self.bus.publisher(keys.state(part), State, LATEST) for part in self.robot.parts}
-        self._truth = self.bus.publisher(keys.SIM_TRUTH, Truth, DATA)
+        self._clock = self.bus.publisher(Clock)
+        self._states = {part: self.bus.publisher(State, part) for part in self.robot.parts}
+        self._truth = self.bus.publisher(Truth)
 
-    def publisher(self, key: str, cls: type[Message]) -> Publisher[Any]:
-        return self.bus.publisher(key, cls, LATEST)
+    def publisher(self, cls: type[Message], name: str = "") -> Publisher[Any]:
+        return self.bus.publisher(cls, name, delivery="LATEST")
 
-    def latest(self, key: str, cls: type[Message], part: str | None = None) -> Latest[Any]:
-        return self.bus.latest(key, cls, part)
+    def latest(self, cls: type[Message], name: str = "*") -> Latest[Any]:
+        return self.bus.latest(cls, name)
 
     def tick(self, q: Array) -> None:
         """One tick as robot_sim has it: the clock, then every part's state."""
@@ -105,7 +105,7 @@ class Stage:
 
 def matched(stage: Stage, key: str, cls: type[Message], seconds: float = 0.3) -> bool:
     """Whether anybody subscribes to a key, as the bus itself says."""
-    publisher = stage.publisher(key, cls)
+    publisher = Publisher(stage.bus, key, cls, "LATEST")
     give_up = time.monotonic() + seconds
     while not publisher.heard and time.monotonic() < give_up:
         time.sleep(0.02)

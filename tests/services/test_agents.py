@@ -68,8 +68,8 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 @pytest.fixture
 def stage(tmp_path: Path) -> Iterator[Stage]:
     with rig(tmp_path, ROBOT) as made:
-        transitions = made.record(keys.transition("torso"), Transition)
-        events = made.record(keys.event("agent_torso"), Event)
+        transitions = made.record(Transition, "torso")
+        events = made.record(Event, "agent_torso")
         controller = FakeController(made, "torso")
         folder = tmp_path / "run"
         folder.mkdir()
@@ -233,7 +233,7 @@ def test_an_arm_has_four_joints_sixteen_neighbours_and_its_other_motors_at_rest(
     with rig(tmp_path, ROBOT) as made:
         controller = FakeController(made, "right_arm")
         try:
-            transitions = made.record(keys.transition("right_arm"), Transition)
+            transitions = made.record(Transition, "right_arm")
             made.start("services.agents", "agent_right_arm", "--part", "right_arm")
             wait_for(lambda: len(transitions) >= 3, "transitions")
         finally:
@@ -311,7 +311,7 @@ def test_it_waits_for_a_controller_and_ends_at_once_when_told(tmp_path: Path) ->
     with rig(tmp_path, ROBOT) as made:
         agent = made.start("services.agents", "agent_torso", "--part", "torso")
         assert made.stat("agent_torso").numbers["transitions"] == 0
-        transitions = made.record(keys.transition("torso"), Transition)
+        transitions = made.record(Transition, "torso")
         controller = FakeController(made, "torso")
         try:
             wait_for(lambda: transitions, "a transition")
@@ -332,7 +332,7 @@ def test_it_waits_for_a_controller_and_ends_at_once_when_told(tmp_path: Path) ->
 def test_random_bytes_do_it_no_harm(stage: Stage, rng: np.random.Generator) -> None:
     agent = stage.agent()
     stage.made(2)
-    targets = [(keys.motion("torso"), Motion), (keys.CLOCK, Clock)]
+    targets = [(Motion.stream.key("torso"), Motion), (Clock.stream.key(), Clock)]
 
     def are_refused() -> int:
         """Send more: of what comes between two looks the agent sees the newest alone, which may be a sound one."""

@@ -17,7 +17,6 @@ from bus_schema.rpc import AddObject, Done, OneName, ReachFor, Started
 from mobee import load_robot
 from mobee.reach import TARGET
 from mobee.store import STORE
-from services.common.bus import LATEST
 from tests.services.fake_controller import FakeController
 from tests.services.harness import Program, Refusal, Rig, rig, wait_for
 
@@ -32,7 +31,7 @@ class FakeReaches(FakeController):
     def __init__(self, rig: Rig, part: str) -> None:
         self.reaches: list[ReachFor] = []
         self.presented: list[list[float]] = []
-        self._reach = rig.bus.publisher(keys.reach(part), Reach, LATEST)
+        self._reach = rig.bus.publisher(Reach, part)
         rig.serve(keys.goal("*", "reach"), ReachFor, self._asked)
         rig.serve(keys.world_rpc("add"), AddObject, self._added)
         rig.serve(keys.world_rpc("remove"), OneName, lambda *_: Done(v=VERSION))
@@ -101,8 +100,8 @@ def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: t
 
 def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, FakeReaches]) -> None:
     made, _ = stage
-    transitions = made.record(keys.transition("right_arm"), Transition)
-    learned = made.record(keys.learned("right_arm"), Learned)
+    transitions = made.record(Transition, "right_arm")
+    learned = made.record(Learned, "right_arm")
     assert agent(made, "--tries", "4", "--strategy", "random").wait(60.0) == 0
     kept = [row for row in steps(made) if row["a"] >= 0]
     wait_for(lambda: len(transitions) >= len(kept) > 0 and learned, "what was done to be told")
@@ -120,7 +119,7 @@ def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, Fak
 
 def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeReaches]) -> None:
     made, controller = stage
-    events = made.record(keys.event("agent_right_arm"), Event)
+    events = made.record(Event, "agent_right_arm")
     first = agent(made)
     wait_for(lambda: len(controller.reaches) >= 3, "three reaches")
     assert first.stop(signal.SIGKILL) == -signal.SIGKILL

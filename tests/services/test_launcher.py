@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from bus_schema import keys
+from bus_schema.messages import EStop
 from services.common.observe import Heard, listen
 from services.common.session import open_client
 from tests.services.launched import Launched, is_free, mobee, toys, wait_until
@@ -92,7 +92,7 @@ def test_a_service_that_keeps_failing_is_given_up_and_the_robot_stopped(launch: 
     launched.wait_for("starts again in 0.2")
     stops: list[Heard] = []
     with open_client(endpoint) as session:
-        listen(session, keys.ESTOP, stops.append)
+        listen(session, EStop.stream.key(), stops.append)
         code, summary = launched.end(120)
         wait_until(lambda: bool(stops), 10)
     assert code == 1

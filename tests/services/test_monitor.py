@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 from bus_schema import VERSION, keys
-from bus_schema.messages import ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, Transition, WorldObject
+from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, State, Transition, Truth, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.model.kinematics import link_transforms
 from mobee.model.quaternion import to_matrix
@@ -197,11 +197,11 @@ def test_trails_follow_the_hands_and_end_with_the_run() -> None:
 
 def whole_chain(stage: Stage) -> Callable[[], None]:
     """A function that puts one message on every stream that the monitor shows."""
-    motions = {part: stage.publisher(keys.motion(part), Motion) for part in palette.PARTS}
-    forces, contacts = stage.publisher(keys.MODEL_FORCES, Forces), stage.publisher(keys.MODEL_CONTACTS, Contacts)
-    images = {eye: stage.publisher(keys.image(eye), Image) for eye in keys.EYES}
-    transitions = {part: stage.publisher(keys.transition(part), Transition) for part in palette.PARTS}
-    ball, events = stage.publisher(keys.world("ball"), WorldObject), stage.publisher(keys.event("stage"), Event)
+    motions = {part: stage.publisher(Motion, part) for part in palette.PARTS}
+    forces, contacts = stage.publisher(Forces, "model"), stage.publisher(Contacts)
+    images = {eye: stage.publisher(Image, eye) for eye in keys.EYES}
+    transitions = {part: stage.publisher(Transition, part) for part in palette.PARTS}
+    ball, events = stage.publisher(WorldObject, "ball"), stage.publisher(Event, "stage")
 
     def put() -> None:
         for part, stream in motions.items():
@@ -260,8 +260,8 @@ def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published
         own = [c for c in psutil.Process(monitor.pid).net_connections("tcp") if c.status == psutil.CONN_LISTEN]
         assert own == []
         watch.undeclare()
-    others = {keys.CLOCK, keys.SIM_TRUTH} | {keys.state(part) for part in ROBOT.parts}
-    assert heard - others <= {keys.event("monitor")}
+    others = {Clock.stream.key(), Truth.stream.key()} | {State.stream.key(part) for part in ROBOT.parts}
+    assert heard - others <= {Event.stream.key("monitor")}
 
 
 def test_a_frozen_page_does_not_stop_the_monitor(stage: Stage, ports: tuple[int, int]) -> None:

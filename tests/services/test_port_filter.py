@@ -16,7 +16,7 @@ from bus_schema.rpc import Done, Driven, Empty, PartMeta, Request, Take, Taken, 
 from mobee.arrays import Array
 from mobee.robot.load import load_robot
 from services.common import rpc
-from services.common.bus import LATEST, STOP, Bus
+from services.common.bus import Bus
 from services.common.rpc import CallFailed
 from services.common.session import open_client
 from tests.services.harness import Rig, rig, wait_for
@@ -38,13 +38,13 @@ class Client:
         self.bus, self.name = Bus(self.session, name, logging.getLogger(name)), name
         self.bus.part_sizes = {"torso": len(TORSO)}
         self.token = self.session.liveliness().declare_token(keys.alive(name, "c1"))
-        self.clock = self.session.declare_subscriber(keys.CLOCK, RingChannel(1))
-        self.states = self.bus.latest(keys.state("torso"), State, "torso")
-        self.commands = self.bus.publisher(keys.command("torso"), Command, LATEST)
+        self.clock = self.session.declare_subscriber(Clock.stream.key(), RingChannel(1))
+        self.states = self.bus.latest(State, "torso")
+        self.commands = self.bus.publisher(Command, "torso")
         self.events: list[Event] = []
         self.state: State | None = None
         self.epoch = self.sent = 0
-        self.told_of = self.session.declare_subscriber(keys.event("robot_sim"), FifoChannel(1000))
+        self.told_of = self.session.declare_subscriber(Event.stream.key("robot_sim"), FifoChannel(1000))
         wait_for(self.tick, "the clock")
         wait_for(lambda: self.tick() and self.state, "the state")
 
@@ -174,7 +174,7 @@ def test_one_program_drives_the_robot_and_its_filtered_twin(client: Callable[[st
     assert mine.state.cmd_age >= 0
     with pytest.raises(CallFailed, match="epoch"):
         mine.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=mine.epoch - 1)
-    mine.bus.publisher(keys.ESTOP, EStop, STOP).put(set=True, source="test", reason="because")
+    mine.bus.publisher(EStop).put(set=True, source="test", reason="because")
     mine.until(lambda: mine.gate == "estop", "the stop")
     mine.call(keys.ESTOP_RESET, Empty, Done)
     mine.until(lambda: mine.gate == "hold", "its end")
@@ -232,7 +232,7 @@ def test_a_robot_in_contact_that_nobody_brought_there_moves_when_somebody_answer
 
 def test_the_robot_is_released_when_the_client_dies(robot: Rig, client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
-    states = robot.record(keys.state("torso"), State, "torso")
+    states = robot.record(State, "torso")
     mine.arm()
     wait_for(lambda: states and states[-1].gate == "armed", "the robot")
     mine.close()

@@ -139,8 +139,8 @@ def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_po
         with stage.running("services.robot_sim.renderer", "renderer"):
             stage.play(DOWN, lambda: stage.k > 60)
             assert stage.stat("renderer").numbers["pairs"] == 0
-            images = {eye: stage.latest(keys.image(eye), Image) for eye in keys.EYES}
-            cameras = {eye: stage.latest(keys.camera(eye), Camera) for eye in keys.EYES}
+            images = {eye: stage.latest(Image, eye) for eye in keys.EYES}
+            cameras = {eye: stage.latest(Camera, eye) for eye in keys.EYES}
             ball = np.array([-0.33, 0.04, -0.07])
             stage.put_ball(ball)
             first = stage.k

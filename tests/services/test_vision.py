@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.chain import Commands, Tick
 from bus_schema.messages import (
     Camera,
     Clock,
     Command,
+    Commands,
     Contacts,
     Event,
     Forces,
@@ -22,6 +22,7 @@ from bus_schema.messages import (
     Motion,
     Pose,
     State,
+    Tick,
     Transition,
     Truth,
     WorldObject,
@@ -176,22 +177,22 @@ def share_seen(picture: np.ndarray, frame: tuple[np.ndarray, np.ndarray], at: np
 
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
-ALLOWED: dict[str, type[Message]] = {keys.CLOCK: Clock} | {
-    key: cls for eye in keys.EYES for key, cls in ((keys.image(eye), Image), (keys.camera(eye), Camera))
+ALLOWED: dict[str, type[Message]] = {Clock.stream.key(): Clock} | {
+    key: cls for eye in keys.EYES for key, cls in ((Image.stream.key(eye), Image), (Camera.stream.key(eye), Camera))
 }
 FORBIDDEN: dict[str, type[Message]] = {
-    **{keys.state(part): State for part in PARTS},
-    **{keys.motion(part): Motion for part in PARTS},
-    **{keys.command(part): Command for part in PARTS},
-    keys.TICK: Tick,
-    keys.COMMANDS: Commands,
-    keys.SIM_TRUTH: Truth,
-    keys.MODEL_FORCES: Forces,
-    keys.MODEL_POSE: Pose,
-    keys.MODEL_CONTACTS: Contacts,
-    keys.world("ball"): WorldObject,
-    keys.transition("torso"): Transition,
-    keys.event("stage"): Event,
+    **{State.stream.key(part): State for part in PARTS},
+    **{Motion.stream.key(part): Motion for part in PARTS},
+    **{Command.stream.key(part): Command for part in PARTS},
+    Tick.stream.key(): Tick,
+    Commands.stream.key(): Commands,
+    Truth.stream.key(): Truth,
+    Forces.stream.key("model"): Forces,
+    Pose.stream.key(): Pose,
+    Contacts.stream.key(): Contacts,
+    WorldObject.stream.key("ball"): WorldObject,
+    Transition.stream.key("torso"): Transition,
+    Event.stream.key("stage"): Event,
 }
 
 
@@ -212,7 +213,7 @@ def test_the_process_places_the_ball_of_a_pair_of_pictures(stage: Stage) -> None
     q = posture(ROBOT, LOOKING_DOWN)
     at = np.array([-0.36, 0.03, -0.07])
     with stage.running("services.vision", "vision"):
-        found = stage.latest(keys.world("ball"), WorldObject)
+        found = stage.latest(WorldObject, "ball")
         put = pair_putter(stage, q, at)
         got: list[WorldObject] = []
 
@@ -249,8 +250,8 @@ def test_pictures_of_different_ticks_are_not_paired_and_bad_ones_do_no_harm(stag
 
 def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray) -> Callable[..., None]:
     """A function that puts both eyes' pictures of a ball and their cameras, right or wrong in one way."""
-    images = {eye: stage.publisher(keys.image(eye), Image) for eye in keys.EYES}
-    cameras = {eye: stage.publisher(keys.camera(eye), Camera) for eye in keys.EYES}
+    images = {eye: stage.publisher(Image, eye) for eye in keys.EYES}
+    cameras = {eye: stage.publisher(Camera, eye) for eye in keys.EYES}
     head, torso = ROBOT.part("head"), ROBOT.part("torso")
     pictures = {}
     for eye in keys.EYES:

@@ -119,11 +119,11 @@ class Watcher:
 
     def __enter__(self) -> Watcher:
         self.session = open_client(self.endpoint)
-        self._subscriptions = [self.session.declare_subscriber(keys.CLOCK, self._note_clock)]
+        self._subscriptions = [self.session.declare_subscriber(Clock.stream.key(), self._note_clock)]
         for part in PARTS:
-            self._subscribe(keys.state(part), State, self.states[part])
-            self._subscribe(keys.motion(part), Motion, self.motions[part])
-        self._subscribe(keys.ALL_EVENTS, Event, self.events)
+            self._subscribe(State.stream.key(part), State, self.states[part])
+            self._subscribe(Motion.stream.key(part), Motion, self.motions[part])
+        self._subscribe(Event.stream.keys(), Event, self.events)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -35,10 +35,10 @@ class Listener:
         self.images: dict[tuple[str, int], Image] = {}
         self.cameras: dict[tuple[str, int], Camera] = {}
         self.places: dict[int, WorldObject] = {}
-        self._kept = [session.declare_subscriber(keys.world("ball"), self._note_ball)]
+        self._kept = [session.declare_subscriber(WorldObject.stream.key("ball"), self._note_ball)]
         for eye in keys.EYES:
-            self._kept.append(session.declare_subscriber(keys.image(eye), self._note_image))
-            self._kept.append(session.declare_subscriber(keys.camera(eye), self._note_camera))
+            self._kept.append(session.declare_subscriber(Image.stream.key(eye), self._note_image))
+            self._kept.append(session.declare_subscriber(Camera.stream.key(eye), self._note_camera))
 
     def _note_ball(self, sample: zenoh.Sample) -> None:
         ball = decode(WorldObject, sample.payload.to_bytes(), str(sample.encoding))

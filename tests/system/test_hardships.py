@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bus_schema import encoding_of, keys
-from bus_schema.messages import Clock, Command, Forces, State
+from bus_schema.messages import Clock, Command, Contacts, EStop, Event, Forces, Motion, Pose, State, Transition, Truth, WorldObject
 from mobee import load_robot
 from tests.system.live import AGENTS, PARTS, Launch, Watcher, running, transitions, until
 
@@ -65,9 +65,23 @@ def test_late_forces_make_the_robot_slow_down_and_hold_and_never_jump(live: tupl
 
 
 def stream_keys() -> list[str]:
-    streams = [make(part) for part in PARTS for make in (keys.state, keys.command, keys.motion)]
-    single = [keys.CLOCK, keys.ESTOP, keys.MODEL_FORCES, keys.MODEL_POSE, keys.MODEL_CONTACTS, keys.SIM_TRUTH]
-    return [*streams, *single, keys.world("ball"), keys.world("nothing"), keys.transition("torso"), keys.event("robot_sim")]
+    streams = [make(part) for part in PARTS for make in (State.stream.key, Command.stream.key, Motion.stream.key)]
+    single = [
+        Clock.stream.key(),
+        EStop.stream.key(),
+        Forces.stream.key("model"),
+        Pose.stream.key(),
+        Contacts.stream.key(),
+        Truth.stream.key(),
+    ]
+    return [
+        *streams,
+        *single,
+        WorldObject.stream.key("ball"),
+        WorldObject.stream.key("nothing"),
+        Transition.stream.key("torso"),
+        Event.stream.key("robot_sim"),
+    ]
 
 
 def call_keys() -> list[str]:

@@ -56,7 +56,7 @@ def test_a_map_is_played_and_when_who_reaches_is_killed_the_arm_brakes_and_the_t
         until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be given back")
         told: list[Reach] = []
         kept = watcher.session.declare_subscriber(
-            keys.reach(PART), lambda sample: told.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
+            Reach.stream.key(PART), lambda sample: told.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
         )
         argv = [sys.executable, "-m", "tests.system.reacher", "--endpoint", system.endpoint, "--in-vain"]
         reacher = subprocess.Popen(argv, cwd=ROOT, env=dict(os.environ))

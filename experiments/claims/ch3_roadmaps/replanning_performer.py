@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.chain import Commands
-from bus_schema.messages import Clock, Forces
+from bus_schema.messages import Clock, Commands, Forces
 from bus_schema.rpc import Done, Place, Request, SetRole
 from experiments.claims.ch3_roadmaps.replanning_scene import BALL, LEFT, PART, RATE, RIGHT, Acted, Crossing, Job, ball, new_map, robot
 from experiments.kit.live import append_done, read_job
@@ -145,8 +144,8 @@ class FeelingPlant(BusPlant):
         self._watcher = None if watcher is None else Participant(watcher)
         if watcher is not None:
             watcher.on_clock(self._note_watch)
-        service.on_each(keys.MODEL_FORCES, Forces, self._feel)
-        service.on_each(keys.COMMANDS, Commands, self._note_commands)
+        service.on_each(Forces, self._feel, "model")
+        service.on_each(Commands, self._note_commands)
 
     def act(self, part: str, target: Array) -> Outcome:
         """See FeelingPlant."""

@@ -28,8 +28,8 @@ class Probe:
         service.on_request(keys.goal("*", "take"), Take, lambda request, _: self._take(request), part_of_key=True)
         service.on_request(keys.service_rpc(WHO, "fail"), Empty, self._fail)
         service.on_request(keys.service_rpc(WHO, "block"), Empty, self._block)
-        service.on_each(keys.ALL_WORLD, WorldObject, lambda _: self._see(config.inject_test_delay))
-        service.on_newest(keys.MODEL_FORCES, Forces, lambda _: self._count("forces"))
+        service.on_each(WorldObject, lambda _: self._see(config.inject_test_delay))
+        service.on_newest(Forces, lambda _: self._count("forces"), "model")
         service.on_clock(self._tick)
         service.on_run(lambda: self._count("runs"))
 

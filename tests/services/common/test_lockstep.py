@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from bus_schema import VERSION, keys
-from bus_schema.messages import StepDone
+from bus_schema import VERSION
+from bus_schema.messages import StepDone, Turn
 from services.common.lockstep import Barrier
 
 
@@ -22,11 +22,11 @@ class FakeService:
         self.waits: Callable[[], None] = lambda: None  # what happens while it waits
         self.bus = SimpleNamespace(k=0, dt=20_000_000, publisher=self._publisher)
 
-    def _publisher(self, key: str, cls: Any, delivery: Any) -> Any:
-        return SimpleNamespace(put=lambda **fields: self.turns.append((key, self.bus.k)))
+    def _publisher(self, cls: Any, name: str) -> Any:
+        return SimpleNamespace(put=lambda **fields: self.turns.append((cls.stream.key(name), self.bus.k)))
 
-    def on_each(self, key: str, cls: Any, handler: Callable[[StepDone], None]) -> None:
-        assert key == keys.ALL_DONE
+    def on_each(self, cls: Any, handler: Callable[[StepDone], None]) -> None:
+        assert cls is StepDone
         self.note = handler
 
     def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
@@ -72,7 +72,7 @@ def test_who_is_not_busy_must_answer_and_is_told_that_it_is_its_turn(bench: Benc
     bench.done("model", 1)
     bench.done("controller", 1)
     assert bench.barrier.missing(1) == ["agent"]
-    assert bench.service.turns == [(keys.turn("agent"), 1)]
+    assert bench.service.turns == [(Turn.stream.key("agent"), 1)]
     bench.done("agent", 1)
     assert bench.barrier.missing(1) == []
 
@@ -132,7 +132,7 @@ def test_without_a_controller_all_are_asked(bench: Bench) -> None:
     bench.service.bus.k = 2
     bench.service.turns.clear()
     bench.barrier.wait(2)
-    assert (keys.turn("agent"), 2) in bench.service.turns
+    assert (Turn.stream.key("agent"), 2) in bench.service.turns
 
 
 def test_who_says_that_it_was_its_last_answer_is_not_missed(bench: Bench) -> None:

@@ -19,7 +19,7 @@ from bus_schema import VERSION, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Event, Forces, Geometry, WorldObject
 from bus_schema.rpc import Config, Done, Empty, Failure, Stat, Take, Taken
 from services.common import rpc
-from services.common.bus import DATA, LATEST, Bus
+from services.common.bus import Bus
 from services.common.rpc import CallFailed
 from tests.services.harness import QUICK_END, Program, Rig, free_endpoint, rig, wait_for
 
@@ -34,7 +34,7 @@ def probe(bus: Rig) -> Program:
 @pytest.fixture
 def clock(bus: Rig, probe: Program) -> Iterator[Any]:
     """Ticks of the rig's run; the probe knows it when the fixture is there."""
-    publisher = bus.bus.publisher(keys.CLOCK, Clock, LATEST)
+    publisher = bus.bus.publisher(Clock)
 
     def tick() -> int:
         bus.bus.k += 1
@@ -92,7 +92,7 @@ def test_config_is_the_whole_configuration(bus: Rig, probe: Program) -> None:
 
 
 def test_mark_zeroes_the_counters(bus: Rig, clock: Any) -> None:
-    bus.session.put(keys.MODEL_FORCES, b"nonsense", encoding=encoding_of(Forces))
+    bus.session.put(Forces.stream.key("model"), b"nonsense", encoding=encoding_of(Forces))
     wait_for(lambda: rejected(bus), "a refusal")
     before = numbers(bus)["marks"]
     bus.call(keys.service_rpc("probe", "mark"), Empty, Done)
@@ -199,42 +199,48 @@ def test_messages_of_another_run_are_refused_and_counted(bus: Rig, clock: Any) -
     stranger = Bus(bus.session, "stranger", bus.bus.log)
     stranger.run = "another"
     before = numbers(bus)["objects"]
-    ball(stranger.publisher(keys.world("ball"), WorldObject, DATA))
+    ball(stranger.publisher(WorldObject, "ball"))
     wait_for(lambda: rejected(bus).get("run") == 1, "the refusal")
-    ball(bus.bus.publisher(keys.world("ball"), WorldObject, DATA))
+    ball(bus.bus.publisher(WorldObject, "ball"))
     wait_for(lambda: numbers(bus)["objects"] == before + 1, "the object of this run")
     assert rejected(bus) == {"run": 1}
 
 
 def test_a_new_run_is_announced_once_and_its_messages_are_heard(bus: Rig, clock: Any) -> None:
     before = numbers(bus)
-    events = bus.record(keys.event("probe"), Event)
+    events = bus.record(Event, "probe")
     bus.bus.run, bus.bus.k = "r1", 0
     clock()
     clock()
     assert numbers(bus)["runs"] == before["runs"] + 1
-    ball(bus.bus.publisher(keys.world("ball"), WorldObject, DATA))
+    ball(bus.bus.publisher(WorldObject, "ball"))
     wait_for(lambda: numbers(bus)["objects"] == before["objects"] + 1, "the object of the new run")
     assert "r1" in wait_for(lambda: [e.text for e in events if e.code == "new_run"], "the event")[0]
 
 
 def test_a_refusal_is_told_on_the_bus_at_most_once_a_second(bus: Rig, clock: Any) -> None:
-    events = bus.record(keys.event("probe"), Event)
+    events = bus.record(Event, "probe")
     bus.call(keys.service_rpc("probe", "mark"), Empty, Done)
     start = time.monotonic()
     for n in range(50):
-        bus.session.put(keys.world("ball"), b"nonsense", encoding=encoding_of(Clock))
+        bus.session.put(WorldObject.stream.key("ball"), b"nonsense", encoding=encoding_of(Clock))
         wait_for(lambda n=n: rejected(bus).get("type", 0) == n + 1, "the refusal")
 
     def told() -> list[Event]:
-        bus.session.put(keys.world("ball"), b"nonsense", encoding=encoding_of(Clock))
+        bus.session.put(WorldObject.stream.key("ball"), b"nonsense", encoding=encoding_of(Clock))
         return [e for e in events if e.code == "refused" and "world/ball" in e.text]
 
     assert 1 <= len(wait_for(told, "an event")) <= 2 + time.monotonic() - start
 
 
 def test_random_bytes_on_every_key_harm_nobody(bus: Rig, clock: Any, rng: np.random.Generator) -> None:
-    streams = [keys.CLOCK, keys.MODEL_FORCES, keys.world("ball"), keys.service_rpc("probe", "stat"), keys.goal("torso", "take")]
+    streams = [
+        Clock.stream.key(),
+        Forces.stream.key("model"),
+        WorldObject.stream.key("ball"),
+        keys.service_rpc("probe", "stat"),
+        keys.goal("torso", "take"),
+    ]
     encodings = [encoding_of(Clock), encoding_of(Forces), encoding_of(WorldObject), "", encoding_of(Take)]
     before = numbers(bus)["k"]
     for _ in range(400):
@@ -309,8 +315,8 @@ def test_a_signal_ends_a_service_in_the_middle_of_a_flood(tmp_path: Path, bus: R
     """Also what a flood may not do: keep calls from being answered, or fill the memory."""
     with rig(tmp_path, bus.robot) as alone:
         program = another(alone, "--inject_test_delay", "0.0002")
-        clock = alone.bus.publisher(keys.CLOCK, Clock, LATEST)
-        publisher = alone.bus.publisher(keys.world("ball"), WorldObject, DATA)
+        clock = alone.bus.publisher(Clock)
+        publisher = alone.bus.publisher(WorldObject, "ball")
         enough = threading.Event()
 
         def flood() -> None:

@@ -108,7 +108,7 @@ class Stage:
 def staged(made: Rig, *arguments: str) -> Stage:
     sim = FakeSim(made)
     model = FakeModel(made, sim)
-    motions = {part: made.record(keys.motion(part), Motion, part) for part in PARTS}
+    motions = {part: made.record(Motion, part) for part in PARTS}
     return Stage(made, sim, model, made.start("services.controller", "controller", *arguments), motions)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema import VERSION, encode, encoding_of
 from bus_schema.messages import EStop, Event
 from tests.services.controller.stage import PARTS, ROBOT, Stage, near, refused
 from tests.services.harness import wait_for
@@ -16,7 +16,7 @@ def test_between_an_emergency_stop_and_its_reset_nothing_is_armed(run: Stage) ->
     def tell(stop: bool) -> None:
         header = {"v": VERSION, "run": "another", "src": "test", "seq": 0, "k": 0, "t": 0, "tw": 0}
         message = EStop(**header, set=stop, source="test", reason="test")
-        run.rig.session.put(keys.ESTOP, encode(message), encoding=encoding_of(EStop))
+        run.rig.session.put(EStop.stream.key(), encode(message), encoding=encoding_of(EStop))
 
     run.ticks(30)
     tell(True)
@@ -71,7 +71,7 @@ def test_while_one_part_waits_to_be_armed_the_others_get_their_commands(run: Sta
 
 
 def test_a_part_whose_state_stands_still_is_not_under_control(run: Stage) -> None:
-    events = run.rig.record(keys.event("controller"), Event)
+    events = run.rig.record(Event, "controller")
     run.sim.silent = {"right_arm"}
     run.play(lambda: run.motion("right_arm").status == "held", "the hold", ticks=30)
     assert run.motion("torso").status == "idle"

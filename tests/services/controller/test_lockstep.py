@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import pytest
 
-from bus_schema import keys
 from bus_schema.messages import Motion, StepDone
 from mobee.control import Settle
 from services.controller.action import Action, Owner, busy_owners
@@ -47,7 +46,7 @@ class Bench:
 
 def begun(made: Rig) -> Bench:
     """The controller has answered tick 0."""
-    answers = made.record(keys.done("controller"), StepDone)
+    answers = made.record(StepDone, "controller")
     bench = Bench(staged(made, "--mode", "lock"), answers)
     made.token("model", "m1")
 

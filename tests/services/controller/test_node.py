@@ -7,8 +7,7 @@ import time
 import numpy as np
 
 from bus_schema import encoding_of, keys
-from bus_schema.chain import Tick
-from bus_schema.messages import Forces
+from bus_schema.messages import Forces, Tick
 from bus_schema.rpc import Goal
 from mobee import Controller, Gains, Model
 from mobee.control import Forces as Acting
@@ -167,7 +166,7 @@ def test_a_paused_and_a_much_too_slow_clock_are_not_answered(run: Stage) -> None
 def test_random_bytes_on_every_key_move_nothing(run: Stage, rng: np.random.Generator) -> None:
     run.play(lambda: np.abs(run.motion("head").dq).max() < 1e-3, "the head to rest")
     before = run.sim.q.copy()
-    targets = [(keys.TICK, Tick), (keys.MODEL_FORCES, Forces), (keys.goal("torso", "goal"), Goal)]
+    targets = [(Tick.stream.key(), Tick), (Forces.stream.key("model"), Forces), (keys.goal("torso", "goal"), Goal)]
     for n in range(300):
         key, cls = targets[n % 3]
         payload = rng.bytes(int(rng.integers(0, 300)))
@@ -177,7 +176,7 @@ def test_random_bytes_on_every_key_move_nothing(run: Stage, rng: np.random.Gener
             run.rig.session.put(key, payload, encoding=encoding_of(cls))
         if n % 30 == 0:
             run.sim.tick()  # which may be overtaken by bytes on the same key: then it is a lost tick
-    run.rig.session.put(keys.TICK, b"the last", encoding=encoding_of(Goal))
+    run.rig.session.put(Tick.stream.key(), b"the last", encoding=encoding_of(Goal))
     wait_for(lambda: run.rig.stat("controller").rejected.get("type") == 1, "the last refusal")
     assert run.rig.stat("controller").rejected["decode"] >= 75
     run.ticks(10)

@@ -12,7 +12,6 @@ from bus_schema.messages import Reach, Targets
 from bus_schema.rpc import ReachFor, Started
 from mobee import Model
 from mobee.arrays import Array
-from services.common.bus import LATEST
 from tests.services.controller.stage import ROBOT, SETTLE, Stage, near, refused
 from tests.services.harness import wait_for
 
@@ -32,7 +31,7 @@ def reach(stage: Stage, epoch: int, position: Array, action: str = "r", **how: A
 
 @pytest.fixture
 def told(run: Stage) -> list[Reach]:
-    return run.rig.record(keys.reach("right_arm"), Reach, "right_arm")
+    return run.rig.record(Reach, "right_arm")
 
 
 def newest(told: list[Reach]) -> Reach | None:
@@ -83,7 +82,7 @@ def test_it_follows_its_target_where_the_model_has_it(run: Stage, told: list[Rea
     at = palm(run.sim.q)
     there = at + [-0.02, 0.03, 0.04]
     reach(run, epoch, at)
-    targets = run.rig.bus.publisher(keys.MODEL_TARGETS, Targets, LATEST)
+    targets = run.rig.bus.publisher(Targets)
     run.ticks(3)
     targets.put(re_k=run.rig.bus.k, positions={"another": [1.0, 1.0, 1.0]})
     targets.put(re_k=run.rig.bus.k, positions={"thing": [1e200, 0.0, 0.0]})

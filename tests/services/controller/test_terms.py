@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from bus_schema import keys
 from bus_schema.messages import ContactItem, Forces
 from mobee import InvalidValue, Model, Term, load_world
 from mobee.arrays import Array
@@ -71,7 +70,7 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 
 
 def test_a_live_controller_adds_them_and_tells_them(lifted: Stage) -> None:
-    told: list[Forces] = lifted.rig.record(keys.CONTROLLER_FORCES, Forces)
+    told: list[Forces] = lifted.rig.record(Forces, "controller")
     lifted.model.contacts = TOUCHES
     lifted.under_control()
     velocity = np.concatenate([lifted.motion(part).dq for part in ROBOT.parts])

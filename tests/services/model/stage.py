@@ -18,7 +18,6 @@ from bus_schema.rpc import (
 )
 from mobee import Model, load_robot, load_world
 from mobee.arrays import Array
-from services.common.bus import DATA
 from tests.services.fake_sim import FakeSim
 from tests.services.harness import Program, Rig, wait_for
 
@@ -66,13 +65,13 @@ class Stage:
         """As vision does; `valid_for` ticks."""
         t = self.rig.bus.t
         whole = {"name": "ball", "geometry": BALL, "quaternion": UPRIGHT, "role": "target", **fields}
-        publisher = self.rig.bus.publisher(keys.world("ball"), WorldObject, DATA)
+        publisher = self.rig.bus.publisher(WorldObject, "ball")
         publisher.put(position=position, covariance=[0.0] * 9, t_capture=t, valid_until=t + valid_for * TICK, **whole)
 
 
 def staged(made: Rig, *arguments: str) -> Stage:
     sim = FakeSim(made)
-    streams = (made.record(keys.MODEL_FORCES, Forces), made.record(keys.MODEL_POSE, Pose), made.record(keys.MODEL_CONTACTS, Contacts))
+    streams = (made.record(Forces, "model"), made.record(Pose), made.record(Contacts))
     return Stage(made, sim, made.start("services.model", "model", *arguments), *streams)
 
 

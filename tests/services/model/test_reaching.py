@@ -13,7 +13,7 @@ from bus_schema import keys
 from bus_schema.messages import Reach, Targets
 from bus_schema.rpc import AddObject, Done, MoveObject, OneName
 from mobee.reach import TARGET
-from services.common.bus import LATEST, Publisher
+from services.common.bus import Publisher
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.model.stage import BALL, UPRIGHT, Stage, library
@@ -35,7 +35,7 @@ class Reacher:
 
     def tell(self, phase: str, part: str = "left_arm", marker: str = "left_palm") -> None:
         bus = self.stage.rig.bus
-        stream = self.streams.setdefault(part, bus.publisher(keys.reach(part), Reach, LATEST))
+        stream = self.streams.setdefault(part, bus.publisher(Reach, part))
         q = [0.0] * bus.part_sizes[part]
         told = {"action_id": "a", "marker": marker, "object": TARGET, "end_k": bus.k, "target": self.at, "position": self.at}
         stream.put(phase=phase, q=q, missing=0.0, settled=False, touched=[], **told)
@@ -57,7 +57,7 @@ class Reacher:
 @pytest.fixture
 def reacher(run: Stage) -> Iterator[Reacher]:
     at = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
-    made = Reacher(run, at, run.rig.record(keys.MODEL_TARGETS, Targets))
+    made = Reacher(run, at, run.rig.record(Targets))
     run.rig.token("agent_left_arm", made.instance)
     yield made
     if run.rig.holds("agent_left_arm", made.instance):

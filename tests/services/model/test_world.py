@@ -33,7 +33,7 @@ def test_objects_to_be_perceived_are_not_known_beforehand(run: Stage) -> None:
 
 
 def test_what_is_perceived_is_known_until_it_was_not_seen_for_long_enough(run: Stage) -> None:
-    events = run.rig.record(keys.event("model"), Event)
+    events = run.rig.record(Event, "model")
     run.perceive([-0.3, 0.1, 0.0], valid_for=20)
     wait_for(lambda: "ball" in run.world(), "the ball")
     ball = run.world()["ball"]

@@ -10,7 +10,6 @@ from bus_schema import keys
 from bus_schema.messages import Clock, Command, Event, State, Truth
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.load import load_robot
-from services.common.bus import LATEST
 from tests.services.harness import Rig, wait_for
 
 ROBOT = load_robot("icub")
@@ -24,11 +23,11 @@ class Bench:
 
     def __init__(self, bus: Rig, *arguments: str) -> None:
         self.rig = bus
-        self.clocks: list[Clock] = bus.record(keys.CLOCK, Clock)
-        self.states: dict[str, list[State]] = {part: bus.record(keys.state(part), State, part) for part in ROBOT.parts}
-        self.events: list[Event] = bus.record(keys.event("robot_sim"), Event)
-        self.truths: list[Truth] = bus.record(keys.SIM_TRUTH, Truth)
-        self.commands = {part: bus.bus.publisher(keys.command(part), Command, LATEST) for part in ROBOT.parts}
+        self.clocks: list[Clock] = bus.record(Clock)
+        self.states: dict[str, list[State]] = {part: bus.record(State, part) for part in ROBOT.parts}
+        self.events: list[Event] = bus.record(Event, "robot_sim")
+        self.truths: list[Truth] = bus.record(Truth)
+        self.commands = {part: bus.bus.publisher(Command, part) for part in ROBOT.parts}
         bus.token("controller", "c1")
         self.program = bus.start("services.robot_sim", "robot_sim", "--seed", "7", *arguments)
         self.follow()

@@ -10,11 +10,9 @@ from typing import Any
 import pytest
 
 from bus_schema import keys
-from bus_schema.chain import Answer, Commands, Order
-from bus_schema.messages import Clock, Command, Event, State, StepDone
+from bus_schema.messages import Answer, Clock, Command, Commands, Event, Order, State, StepDone
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee import load_robot
-from services.common.bus import LATEST, STEP
 from tests.services.harness import Rig, rig, wait_for
 
 ROBOT = load_robot("icub")
@@ -78,11 +76,11 @@ class Bench:
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with rig(tmp_path_factory.mktemp("robot_sim"), ROBOT) as made:
         made.bus.who = "controller"
-        clocks = made.record(keys.CLOCK, Clock)
-        states, events = made.record(keys.state("torso"), State, "torso"), made.record(keys.event("robot_sim"), Event)
-        answers = made.bus.publisher(keys.done("controller"), StepDone, STEP)
-        commands = made.bus.publisher(keys.command("torso"), Command, LATEST)
-        all_commands = made.bus.publisher(keys.COMMANDS, Commands, STEP)
+        clocks = made.record(Clock)
+        states, events = made.record(State, "torso"), made.record(Event, "robot_sim")
+        answers = made.bus.publisher(StepDone, "controller")
+        commands = made.bus.publisher(Command, "torso")
+        all_commands = made.bus.publisher(Commands, delivery="STEP")
         made.token("launcher", "l1")
         flags = ("--backend", "kinematic", "--rate", "50", "--mode", "lock", "--participants", "controller", "--encoder-noise", "0.0")
         made.start("services.robot_sim", "robot_sim", *flags)

@@ -153,14 +153,14 @@ def test_a_replayed_command_is_refused(bench: Bench) -> None:
     header = {"v": VERSION, "run": bench.rig.bus.run, "src": "x", "seq": 10**6, "k": k, "t": 0, "tw": 0}
     payload = encode(Command(**header, epoch=epoch, re_k=k, mode="velocity", ref=elbow(0.0), ttl=100))
     before = bench.rejected("seq")
-    bench.rig.session.put(keys.command("left_arm"), payload, encoding=encoding_of(Command))
+    bench.rig.session.put(Command.stream.key("left_arm"), payload, encoding=encoding_of(Command))
     assert bench.rejected("seq") == before
-    bench.refuses("seq", lambda: bench.rig.session.put(keys.command("left_arm"), payload, encoding=encoding_of(Command)))
+    bench.refuses("seq", lambda: bench.rig.session.put(Command.stream.key("left_arm"), payload, encoding=encoding_of(Command)))
 
 
 def test_random_bytes_on_every_key_move_nothing_and_kill_nothing(bench: Bench, rng: np.random.Generator) -> None:
     epoch = bench.arm("left_arm")
-    streams: list[tuple[str, type[Message]]] = [(keys.command(part), Command) for part in ROBOT.parts] + [(keys.ESTOP, EStop)]
+    streams: list[tuple[str, type[Message]]] = [(Command.stream.key(part), Command) for part in ROBOT.parts] + [(EStop.stream.key(), EStop)]
     calls: list[tuple[str, type[Request]]] = [(keys.drive(part, "take"), Take) for part in ("left_arm", "*", "nobody")]
     calls += [(keys.drive("left_arm", verb), WithEpoch) for verb in ("arm", "release", "hold")] + [(keys.sim("place"), Place)]
     calls += [(keys.sim(verb), Empty) for verb in ("reset", "pause", "resume")]

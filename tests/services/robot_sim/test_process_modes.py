@@ -10,7 +10,6 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
 from mobee.model.masses import gravity_torque
-from services.common.bus import LATEST
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.robot_sim.bench import DT, ELBOW, ROBOT, Bench, elbow
@@ -48,10 +47,10 @@ def test_torque_mode_accelerates_a_motor(bench: Bench) -> None:
 
 
 def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
-    stops = bench.rig.record(keys.ESTOP, EStop)
+    stops = bench.rig.record(EStop)
     epoch = bench.arm("left_arm")
     bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.3))
-    bench.rig.bus.publisher(keys.ESTOP, EStop, LATEST).put(set=True, source="test", reason="because")
+    bench.rig.bus.publisher(EStop, delivery="LATEST").put(set=True, source="test", reason="because")
     wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
     with pytest.raises(CallFailed) as caught:
         bench.drive("left_arm", "arm", epoch)

@@ -10,17 +10,15 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.chain import Commands, Order, Tick
-from bus_schema.messages import Clock
+from bus_schema.messages import Clock, Commands, Order, Tick
 from bus_schema.rpc import Done, Empty, PartMeta, Place
-from services.common.bus import LATEST
 from services.common.rpc import CallFailed
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ARM, DT, ROBOT, Bench, elbow
 
 
 def test_a_tick_holds_what_each_part_said_last(bench: Bench) -> None:
-    ticks = bench.rig.record(keys.TICK, Tick)
+    ticks = bench.rig.record(Tick)
     wait_for(lambda: len(ticks) > 10, "ticks")
     tick = ticks[5]
     for part, states in bench.states.items():
@@ -33,7 +31,7 @@ def test_a_tick_holds_what_each_part_said_last(bench: Bench) -> None:
 
 def test_the_clock_is_told_a_hundred_times_a_second_at_most_and_every_tick_is(tmp_path: Path) -> None:
     with rig(tmp_path, ROBOT) as bus:
-        ticks, clocks = bus.record(keys.TICK, Tick), bus.record(keys.CLOCK, Clock)
+        ticks, clocks = bus.record(Tick), bus.record(Clock)
         bus.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--rate", "400")
         wait_for(lambda: len(ticks) > 100 and len(clocks) > 20, "ticks")
         assert {clock.k % 4 for clock in clocks} == {0}
@@ -42,7 +40,7 @@ def test_the_clock_is_told_a_hundred_times_a_second_at_most_and_every_tick_is(tm
 
 def test_orders_to_all_parts_come_in_one_message_and_refusals_concern_a_part(bench: Bench) -> None:
     epochs = {part: bench.arm(part) for part in ("torso", "left_arm")}
-    commands = bench.rig.bus.publisher(keys.COMMANDS, Commands, LATEST)
+    commands = bench.rig.bus.publisher(Commands)
     orders = {"torso": Order(epochs["torso"], "velocity"), "left_arm": Order(epochs["left_arm"] - 1, "velocity")}
     before = bench.rejected("epoch")
 

@@ -26,11 +26,11 @@ _M = TypeVar("_M", bound=Message)
 class PartStreams(Generic[_M]):
     """The newest message of each part; in lockstep that of the tick whose turn it is."""
 
-    def __init__(self, service: Service, robot: Robot, key: Callable[[str], str], cls: type[_M]) -> None:
+    def __init__(self, service: Service, robot: Robot, cls: type[_M]) -> None:
         self.newest: dict[str, _M] = {}
         self._parts = len(robot.parts)
         for part in robot.parts:
-            service.on_newest(key(part), cls, self._noter(part), part=part)
+            service.on_newest(cls, self._noter(part), part)
         service.on_run(self.newest.clear)
 
     def are_complete(self) -> bool:
@@ -51,8 +51,8 @@ class AtDrives:
         """`speed`: share of the motors' top speed; `note` is called with every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
         self._speed = speed * np.array([motor.max_velocity for motor in robot.motor_table])
-        self._states = PartStreams(service, robot, keys.state, State)
-        self._commands = {part: service.bus.publisher(keys.command(part), Command, service.bus.control) for part in robot.parts}
+        self._states = PartStreams(service, robot, State)
+        self._commands = {part: service.bus.publisher(Command, part) for part in robot.parts}
         self._epochs = dict.fromkeys(robot.parts, 0)
         self._retry_at = 0  # tick
         self._reference = self._target = robot.home
@@ -120,7 +120,7 @@ class AtGoals:
     def __init__(self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None]) -> None:
         """`note` is called with every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
-        self._motions = PartStreams(service, robot, keys.motion, Motion)
+        self._motions = PartStreams(service, robot, Motion)
         self._epochs: dict[str, int] = {}
         self._begin, self._number = -1, 0  # tick of the command under way, -1: none
         self._target: Array = robot.home

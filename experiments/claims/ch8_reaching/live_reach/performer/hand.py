@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.chain import Commands
-from bus_schema.messages import Clock, Geometry, Reach
+from bus_schema.messages import Clock, Commands, Geometry, Reach
 from bus_schema.rpc import AddObject, Done, MoveObject, OneName, Place, Request
 from experiments.claims.ch8_reaching.live_reach.problems import SPEED
 from experiments.kit.reaching.arm import PART
@@ -37,7 +36,7 @@ class Hand(BusPlant):
         self.asked = 0
         """Tick of the last request."""
         self._before: Array | None = None
-        service.on_each(keys.reach(PART), Reach, self._note_reach, part=PART)
+        service.on_each(Reach, self._note_reach, PART)
 
     @property
     def tick(self) -> int:
@@ -47,7 +46,7 @@ class Hand(BusPlant):
 
     def watch_commands(self) -> None:
         """Time the first motion of reaches from now on; costs time in every tick."""
-        self._link.on_each(keys.COMMANDS, Commands, self._note_commands)
+        self._link.on_each(Commands, self._note_commands)
 
     def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
         self.first = -1

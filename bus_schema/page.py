@@ -1,0 +1,113 @@
+"""Write the tables of docs/bus.md from the messages: `python -m bus_schema.page`."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from msgspec import Struct
+
+from bus_schema import messages, rpc
+from bus_schema.messages import Message
+from bus_schema.rpc import CALLS, Reply, Request
+from bus_schema.stream import DELIVERIES
+
+PAGE = Path(__file__).parents[1] / "docs" / "bus.md"
+_BASES: tuple[type[Struct], ...] = (Message, Request, Reply)
+_MARKED = re.compile(r"(<!-- begin (\w+)[^\n]*-->\n).*?(<!-- end \2 -->)", re.DOTALL)
+_FIELD = re.compile(r"    (\w+): (.+?)(?: = (.+?))?(?:  # (.*))?$")
+_BOUNDED = re.compile(r"Annotated\[(.+), Meta\((.+)\)\]$")
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+
+
+def main() -> None:
+    """Bring the page up to date."""
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def with_tables(page: str) -> str:
+    """The page with a new table between each pair of markers `begin NAME` and `end NAME`; raises KeyError for an unknown name."""
+    tables = {"deliveries": _deliveries, "streams": _streams, "calls": _calls, "messages": _messages, "requests": _requests}
+    return _MARKED.sub(lambda match: f"{match[1]}{tables[match[2]]()}{match[3]}", page)
+
+
+def structs(module: object) -> list[type[Struct]]:
+    """The messages, or requests and replies, of a module and the structs inside them, in the order of the source."""
+    found = [cls for _, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Struct) and cls not in _BASES]
+    own = [cls for cls in found if inspect.getmodule(cls) is module]
+    return sorted(own, key=lambda cls: inspect.getsourcelines(cls)[1])
+
+
+def streams() -> list[type[Message]]:
+    """All messages that have a key of their own."""
+    return [cls for cls in structs(messages) if issubclass(cls, Message)]
+
+
+def _deliveries() -> str:
+    return _table(("class", "what happens to a message"), ((name, text) for name, text in DELIVERIES.items()))
+
+
+def _streams() -> str:
+    rows = ((f"`{cls.stream.pattern}`", f"[`{cls.__name__}`](#{_anchor(cls)})", cls.stream) for cls in streams())
+    return _table(
+        ("key", "message", "writes", "reads", "delivery"), ((key, name, s.writer, s.readers, s.delivery) for key, name, s in rows)
+    )
+
+
+def _calls() -> str:
+    rows = []
+    for call in CALLS:
+        keys = [f"`{call.pattern.replace('{verb}', verb)}`" for verb in call.verbs or ("",)]
+        rows.append((", ".join(keys), f"`{call.request.__name__}`", f"`{call.reply.__name__}`", call.server))
+    return _table(("key", "request", "reply", "server"), rows)
+
+
+def _messages() -> str:
+    return _described(Message) + "".join(map(_described, structs(messages)))
+
+
+def _requests() -> str:
+    return _described(Request) + _described(Reply) + "".join(map(_described, structs(rpc)))
+
+
+def _described(cls: type[Struct]) -> str:
+    fields = _fields(cls)
+    return f"### {cls.__name__}\n\n{_docstring(cls)}\n\n" + (f"{fields}\n" if fields else "")
+
+
+def _docstring(cls: type[Struct]) -> str:
+    return " ".join((inspect.getdoc(cls) or "").split())
+
+
+def _anchor(cls: type[Struct]) -> str:
+    return cls.__name__.lower()
+
+
+def _fields(cls: type[Struct]) -> str:
+    """The fields that the class itself declares, as its source has them."""
+    rows = []
+    for line in inspect.getsource(cls).splitlines():
+        match = _FIELD.match(line)
+        if match and match[1] in cls.__struct_fields__:
+            rows.append((f"`{match[1]}`", _kind(match[2]), match[4] or ""))
+    return _table(("field", "type", "unit, meaning"), rows) if rows else ""
+
+
+def _kind(annotation: str) -> str:
+    """The type of a field, with its bounds instead of Annotated[..., Meta(...)]."""
+    match = _BOUNDED.match(annotation)
+    if match is None:
+        return annotation.replace("|", "\\|")
+    bounds = (bound.split("=") for bound in match[2].split(", "))
+    return f"{match[1]} " + ", ".join(f"{_SIGNS.get(name, name)} {value}" for name, value in bounds)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""How a message travels on the bus: its key, its delivery class, the services that write and read it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+Delivery = Literal["CONTROL", "LATEST", "STEP", "STOP", "DATA", "BULK", "EVENTS", "NEWEST"]
+
+DELIVERIES: dict[Delivery, str] = {
+    "CONTROL": "LATEST in free mode, STEP in lockstep",
+    "LATEST": "dropped rather than blocking the sender, highest priority; a receiver keeps the newest message only",
+    "STEP": "every message, in order: a full queue blocks the sender",
+    "STOP": "as STEP: an emergency stop that is late is better than none",
+    "DATA": "dropped rather than blocking the sender, lower priority than control",
+    "BULK": "as DATA, lowest priority: pictures",
+    "EVENTS": "as BULK; a subscriber that joins late gets the last 100 messages",
+    "NEWEST": "as BULK; a subscriber that joins late gets the last message",
+}
+assert tuple(DELIVERIES) == get_args(Delivery)
+
+_CHUNK = re.compile(r"[a-z0-9_]+")
+_VARIABLE = re.compile(r"\{(\w+)\}")
+
+
+def chunk(name: str) -> str:
+    """Return the name if it can be part of a key; raises ValueError for wildcards, blanks, slashes and capital letters."""
+    if not _CHUNK.fullmatch(name):
+        raise ValueError(f"{name!r} cannot be part of a key: use a-z, 0-9 and _ only")
+    return name
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """The key of a message and how it is delivered; the tables in docs/bus.md are written from these.
+
+    `pattern`: the key, with at most one variable in braces, such as "{part}/state".  `writer` and `readers`: names of services, and when
+    they write.
+    """
+
+    pattern: str
+    delivery: Delivery
+    writer: str
+    readers: str
+
+    @property
+    def variable(self) -> str:
+        """The name of the variable in the key; empty if the key is constant."""
+        found = _VARIABLE.search(self.pattern)
+        return found[1] if found else ""
+
+    def key(self, name: str = "") -> str:
+        """The key to write, with `name` for its variable; raises ValueError for a name that cannot be part of a key."""
+        return _VARIABLE.sub(lambda _: chunk(name), self.pattern)
+
+    def keys(self, name: str = "*") -> str:
+        """The key expression to read; by default it matches all values of the variable."""
+        return self.pattern if not self.variable else _VARIABLE.sub("*", self.pattern) if name == "*" else self.key(name)

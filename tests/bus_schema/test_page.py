@@ -1,0 +1,106 @@
+"""docs/bus.md and the code: the tables are current, and the services write, read and answer what the contract names."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from bus_schema import keys, messages, page, rpc
+from bus_schema.messages import Message
+from bus_schema.rpc import CALLS
+
+ROOT = Path(__file__).parents[2]
+NAMES = ("robot_sim", "renderer", "model", "controller", "port_filter", "agents", "vision", "monitor", "launcher")
+SHARED = {"bus_plant.py": "agents", "bus_reach.py": "agents"}  # files of services/common that one service uses
+MIRRORS = "port_filter"  # publishes the robot's own streams to its clients
+
+
+def test_the_tables_are_current() -> None:
+    text = page.PAGE.read_text()
+    assert page.with_tables(text) == text, "run `python -m bus_schema.page`"
+
+
+def test_an_unknown_table_is_an_error() -> None:
+    with pytest.raises(KeyError, match="nothing"):
+        page.with_tables("<!-- begin nothing -->\n<!-- end nothing -->")
+
+
+def test_bounds_of_a_field_are_written_as_signs() -> None:
+    assert page._kind("Annotated[float, Meta(gt=0, le=1)]") == "float > 0, <= 1"
+    assert page._kind("Answer | None") == "Answer \\| None"
+
+
+def test_every_field_of_a_message_has_a_row() -> None:
+    for cls in (*page.structs(messages), *page.structs(rpc)):
+        inherited = {name for base in cls.__bases__ for name in getattr(base, "__struct_fields__", ())}
+        assert all(f"| `{name}` |" in page._fields(cls) for name in cls.__struct_fields__ if name not in inherited), cls
+
+
+def test_no_two_messages_have_one_key() -> None:
+    patterns = [cls.stream.pattern for cls in page.streams()]
+    assert len(set(patterns)) == len(patterns)
+
+
+def test_every_call_has_a_function_that_makes_its_key() -> None:
+    made = {
+        keys.meta("p"), keys.ESTOP_RESET, keys.MODEL_JACOBIAN, keys.waypoint("p"),
+        *(make(*first, verb) for make, first in MAKERS for call in CALLS for verb in call.verbs),
+    }  # fmt: skip
+    for call in CALLS:
+        for verb in call.verbs or ("",):
+            key = call.pattern.format(service="s", part="p", verb=verb)
+            assert key in made, key
+
+
+MAKERS = ((keys.drive, ("p",)), (keys.goal, ("p",)), (keys.sim, ()), (keys.world_rpc, ()), (keys.service_rpc, ("s",)))
+
+
+def service_of(path: Path) -> str:
+    folder = path.relative_to(ROOT / "services").parts[0]
+    if folder == "common":
+        return SHARED.get(path.name, "")
+    return "renderer" if path.name.startswith("renderer") else folder
+
+
+def calls(tree: ast.AST) -> Iterator[tuple[str, list[ast.expr]]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            yield node.func.attr, node.args
+
+
+@cache
+def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
+    """Writers and readers of each message by the code of the services."""
+    writers, readers = defaultdict(set), defaultdict(set)
+    for path in (ROOT / "services").rglob("*.py"):
+        service, tree = service_of(path), ast.parse(path.read_text())
+        imports = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "bus_schema.messages")
+        aliases = {name.asname or name.name: name.name for node in imports for name in node.names}
+        for method, arguments in calls(tree):
+            name = aliases.get(arguments[0].id) if arguments and isinstance(arguments[0], ast.Name) else None
+            if name and service and method == "publisher":
+                writers[name].add(service)
+            elif name and service and method in ("on_newest", "on_each", "latest"):
+                readers[name].add(service)
+    return writers, readers
+
+
+def named(text: str) -> set[str]:
+    return set(re.findall(r"\w+", text)) & set(NAMES)
+
+
+@pytest.mark.parametrize("cls", page.streams(), ids=lambda cls: cls.__name__)
+def test_the_services_write_and_read_what_the_contract_says(cls: type[Message]) -> None:
+    writers, readers = (each[cls.__name__] for each in found())
+    if not named(cls.stream.writer) and not named(cls.stream.readers):
+        return  # every service, through services/common
+    assert writers - {MIRRORS} <= named(cls.stream.writer) or cls.stream.writer.startswith("any")
+    assert named(cls.stream.writer) - {"launcher"} <= writers or cls.__name__ in ("Turn", "StepDone")
+    if cls.__name__ not in ("Clock", "Tick", "State", "StepDone"):
+        assert readers - {MIRRORS} <= named(cls.stream.readers)
