@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.claims import LEAST_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.experiment import LEAST_SEEDS, Claim, open_with_few_seeds
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.claims_table import better, claims_text, finished_runs, found_in, recorded, rows, write_page
-from experiments.kit.claims import Claim, open_with_few_seeds
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment, open_with_few_seeds
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.run_folder import (
     RESULTS,

@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from experiments.kit.recorded_transitions import records
+from experiments.kit.learning.recorded_transitions import records
 from mobee.errors import MobeeError
 from mobee_cli.errors import UserError
 from mobee_cli.reach_learned import write_reaches

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.command_line import positive_number, positive_whole
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 

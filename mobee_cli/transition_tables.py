@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.recorded_transitions import Record
+from experiments.kit.learning.recorded_transitions import Record
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from experiments.bench import verdicts as requirement
 from experiments.bench.verdicts import all_passed, judged
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee.errors import MobeeError
 
 HERE = Path(__file__).resolve().parents[2]

@@ -145,7 +145,7 @@ def _chapter_8() -> Work:
 
 def _lockstep() -> Work:
     """All services, without their start."""
-    summary_of = _first("experiments.kit.live", "experiments.launched").summary_of
+    summary_of = _first("experiments.kit.live.launch", "experiments.launched").summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.live import summary_of
+from experiments.kit.live.launch import summary_of
 from mobee import CuriousAgent, Gains, Lattice, Model, OfflinePlant, load_robot, load_world, run
 from mobee.store import Transition, TransitionStore
 

@@ -15,7 +15,7 @@ from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration
 from experiments.bench.edges_workload import MARKER, palm_map
 from experiments.bench.verdicts import judged, one_core
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee.roadmap.edges import STEP, EdgeWatch, Flags, between, checked
 from mobee.roadmap.ik.problem import solid_model
 from mobee.roadmap.roadmap import Roadmap

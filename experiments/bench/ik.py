@@ -16,7 +16,7 @@ from experiments.bench.ik_solvers import RIVALS, Entrant, Tries
 from experiments.bench.ik_workload import MOTORS, scene, targets
 from experiments.bench.mink_peer import load_mink
 from experiments.bench.verdicts import judged, one_core
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 
 NES, HYBRID, WHOLE = "NES", "least squares, then NES", "NES, all 41 motors"
 FINE_NES, FINE_HYBRID = "NES, 1 mm and 1 degree", "least squares first, 1 mm"

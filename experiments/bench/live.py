@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.calibration import bare_ages
-from experiments.kit.live import summary_of
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
+from experiments.kit.live.launch import summary_of
 
 MOST = {200: 2.0, 500: 3.0, 1000: 5.0}  # ticks that the age may have at most (p99), up to that rate
 BARE = {200: 1.0, 500: 2.0, 1000: 2.0}  # ticks that the bare chain's has on the standard machine

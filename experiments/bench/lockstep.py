@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any
 
 from experiments.bench.calibration import Calibration, Crew
-from experiments.kit.live import summary_of
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
+from experiments.kit.live.launch import summary_of
 
 
 @dataclass(frozen=True, slots=True)

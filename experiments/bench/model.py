@@ -25,7 +25,7 @@ from experiments.bench.collision_peers import FclPairs, FclTrees
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.random_robots import MAKERS, MIXED, PLAIN
 from experiments.bench.verdicts import Contestant, all_passed, judged, one_core, rates
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.model.model import Model
 from mobee.robot.robot import Robot

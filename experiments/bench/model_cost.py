@@ -10,8 +10,8 @@ import numpy as np
 from experiments.bench import workload
 from experiments.bench.model import BATCH, CALL, MUJOCO, TREES, contestants
 from experiments.bench.verdicts import one_core, rates
+from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 
 BOXES = (0, 3, 10, 30, 100, 300, 1000)
 PRIMITIVES = (8, 16, 32, 64, 96, 129)

@@ -11,7 +11,7 @@ from experiments.bench.cma_peer import load_cma
 from experiments.bench.nes_workload import FUNCTIONS, STD, TARGET, trial
 from experiments.bench.verdicts import all_passed, judged
 from experiments.bench.verdicts import lines as requirement_lines
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 
 REQUIRED, BOUND = "evaluations over CMA-ES's, median of the rows", 1.05
 PUBLISHED = 10  # dimensions up to which the published form is run too

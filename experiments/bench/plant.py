@@ -14,7 +14,7 @@ from experiments.bench.calibration import Calibration
 from experiments.bench.mujoco_peer import load_mujoco, us_per_tick
 from experiments.bench.plant_workload import DT, Pace, arm_plant, one_arm, one_arm_reaching, three_agents, trajectory_hash
 from experiments.bench.verdicts import judged, one_core
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 
 # Name, which run, which number of it in the standard machine's time, at least, aim.
 REQUIREMENTS = (

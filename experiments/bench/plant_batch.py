@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.bench.plant_workload import DT, LEFT, LEVELS, SEED, robot
 from experiments.bench.verdicts import one_core, some_cores
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee import Gains, Lattice, Model, OfflinePlant, advance_together
 from mobee.robot.robot import Robot
 

@@ -8,8 +8,8 @@ from typing import Any
 from experiments.bench import workload
 from experiments.bench.plant_workload import DT, arm_plant, one_arm
 from experiments.bench.verdicts import one_core
+from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 
 TICKS = (0.001, 0.002, 0.005, 0.01, 0.02)  # s
 OBJECTS = (0, 1, 3, 10, 30, 100, 300, 1000)

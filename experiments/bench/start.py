@@ -22,8 +22,8 @@ from experiments.bench import calibration
 from experiments.bench import verdicts as requirement
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.verdicts import judged
-from experiments.kit.live import summary_of
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
+from experiments.kit.live.launch import summary_of
 
 NUMPY, IMPORT, POSE = "import numpy", "import mobee", "first pose"
 _NUMPY_SECONDS = 0.08  # of processor time, on the standard machine

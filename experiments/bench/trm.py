@@ -16,7 +16,7 @@ from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.verdicts import judged, some_cores
 from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from experiments.kit.roadmap_task import Example
 from mobee.arrays import Array
 from mobee.roadmap.building.build import LONGEST

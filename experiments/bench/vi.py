@@ -13,7 +13,7 @@ from experiments.bench import verdicts as requirement
 from experiments.bench.verdicts import Contestant, judged, one_core, rates
 from experiments.bench.vi_peers import QUANTECON, Problem, load_quantecon
 from experiments.bench.vi_workload import Tables, Work, at_random, at_work, of_size
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.learning.value_iteration import METHODS, policy_iteration, value_iteration
 

@@ -11,8 +11,8 @@ from experiments.bench.verdicts import one_core, rates
 from experiments.bench.vi import ALGORITHM_7, COLD, DISCOUNT, OBSERVING, SCIPY, WARM, contestants
 from experiments.bench.vi_peers import QUANTECON
 from experiments.bench.vi_workload import at_work, of_size
+from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 
 STATES = (100, 316, 1000, 3162, 10_000, 31_623, 100_000)
 QUICK_STATES = STATES[:5]

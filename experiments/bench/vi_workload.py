@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.kit.arm_learning import arm_space
+from experiments.kit.learning.arm import arm_space
 from mobee import CuriousAgent
 from mobee.arrays import Array, Ints
 from mobee.learning.tabular import TabularPlant, half_space

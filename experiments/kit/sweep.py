@@ -14,10 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from experiments.kit.cells import Cell, CellResult, Work, cell_path, load_cells, write_cell
-from experiments.kit.options import positive_whole
-from experiments.kit.processes import Done, in_processes
-from experiments.kit.progress import Progress
-from experiments.kit.ray_cluster import on_ray
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.engines import Done, in_processes, on_ray
 from mobee.errors import InvalidValue, MobeeError
 
 Engine = Callable[[Work, Sequence[Cell], int | None], Iterator[Done]]

@@ -19,8 +19,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.kit.options import positive_whole
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.records import Records, read_records
 from experiments.originals.checkouts import Original, find_originals
 from experiments.originals.table import COLUMNS, RECORDS, TABLE, write_table

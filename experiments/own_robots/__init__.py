@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from experiments.kit.records import Records, read_records
 from experiments.own_robots.measure import Measured, measure
 from experiments.own_robots.robots import ROBOTS, examples_folder, robot_file

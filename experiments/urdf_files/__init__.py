@@ -20,8 +20,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.options import positive_whole
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.records import Records, read_records
 from experiments.urdf_files.figure import draw
 from experiments.urdf_files.looked_at import LookedAt, look_at

@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.bench.mink_peer import MinkMissing
     from experiments.bench.mujoco_peer import MujocoMissing
     from experiments.bench.vi_peers import QuanteconMissing
-    from experiments.kit.live import LaunchFailed
+    from experiments.kit.live.launch import LaunchFailed
     from mobee.errors import NotInstalled
 
     try:

@@ -7,7 +7,7 @@ import json
 import sys
 
 from experiments.bench.against import LEAST
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import positive_whole
 from services.common.exit_codes import FAILED
 
 

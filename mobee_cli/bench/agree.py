@@ -8,7 +8,7 @@ import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import positive_whole
 from services.common.exit_codes import FAILED
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from experiments.kit.options import positive_number, positive_whole
+from experiments.kit.command_line import positive_number, positive_whole
 from services.common.exit_codes import FAILED
 
 _HIGHEST = 1000  # Hz, of robot_sim

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from experiments.kit.options import positive_number
+from experiments.kit.command_line import positive_number
 from services.common.exit_codes import FAILED
 
 

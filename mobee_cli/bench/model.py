@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import replace
 
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import positive_whole
 from mobee_cli.bench.drawn import draw_costs, picture
 from services.common.exit_codes import FAILED
 

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import replace
 
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import positive_whole
 from services.common.exit_codes import FAILED
 
 

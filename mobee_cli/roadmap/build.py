@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress
 from mobee import Model
 from mobee.roadmap.ik.ngik import METHODS
 from mobee_cli.errors import UserError

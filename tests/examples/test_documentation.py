@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.kit.live import stop
+from experiments.kit.live.launch import stop
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]

@@ -4,7 +4,7 @@ import pytest
 
 from experiments import claims_table
 from experiments.claims_table import better, claims_text, finished_runs, found_in, page, recorded, rows, stated
-from experiments.kit.claims import Claim
+from experiments.kit.experiment import Claim
 from experiments.kit.run_folder import new_run, write
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, load_experiment
 from mobee.errors import InvalidValue

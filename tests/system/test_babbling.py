@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from experiments.kit.live import stop
+from experiments.kit.live.launch import stop
 from tests.services.harness import ROOT
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]

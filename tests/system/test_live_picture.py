@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from experiments.figures.live import find_chromium
-from experiments.kit.live import stop
+from experiments.kit.live.launch import stop
 
 SIZE, DRAWN = (800, 500), 85_000  # pixels; bytes: 54 000 without the scene, 75 000 with half of it, 96 000 with all
 SCENE = (slice(60, 360), slice(0, 505))  # rows and columns of the 3D panel

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.bench.agree import AGENTS, EXACT, PATIENCE, compare, lockstep, offline
-from experiments.kit.live import summary_of
+from experiments.kit.live.launch import summary_of
 from services.common.lockstep import TEST_DELAY
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]

@@ -15,7 +15,7 @@ import pytest
 from bus_schema import decode, keys
 from bus_schema.messages import Reach
 from bus_schema.rpc import Empty, World
-from experiments.kit.live import summary_of
+from experiments.kit.live.launch import summary_of
 from mobee import Gains, Model, OfflinePlant, load_robot, load_world
 from mobee.reach import TARGET
 from mobee.roadmap.roadmap import Roadmap

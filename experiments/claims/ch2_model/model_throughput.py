@@ -24,10 +24,9 @@ import numpy as np
 
 from experiments.claims.ch2_model.model_throughput_endurance import ENDURANCE, ENDURANCE_COLUMNS, endure, plot_endurance
 from experiments.claims.ch2_model.model_throughput_threads import MovingModel, Oscillator, quick_hand_over, random_boxes
+from experiments.kit.command_line import Progress, positive_number, positive_whole
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_number, positive_whole
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 from experiments.kit.records import Records, read_records
 from mobee import Model, World, load_robot
 from mobee.errors import InvalidValue

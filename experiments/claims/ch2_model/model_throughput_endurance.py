@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch2_model.model_throughput_threads import Box, MovingModel, Oscillator, quick_hand_over, random_boxes
+from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 from experiments.kit.records import Records
 from mobee import InvalidValue, Model, World, load_robot
 from mobee.model import Geometry, WorldObject, box

@@ -21,8 +21,7 @@ import numpy as np
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.nes_workload import FUNCTIONS, MOST, STRATEGIES
 from experiments.bench.nes_workload import trial as search
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.statistics import decides, estimate, interval, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep

@@ -24,8 +24,7 @@ from experiments.bench import ik_solvers
 from experiments.bench.cma_peer import load_cma
 from experiments.bench.ik_solvers import MOST, Solve, library, rival, timed
 from experiments.bench.ik_workload import MOTORS, scene, targets
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import decides, estimate, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep

@@ -40,14 +40,11 @@ from experiments.claims.ch3_roadmaps.replanning_scene import (
     new_map,
     robot,
 )
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live import read_done, write_job
-from experiments.kit.options import positive_whole
-from experiments.kit.performer.launch import launch
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.live.launch import launch, read_done, write_job
+from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
-from experiments.kit.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.motion import Motion

@@ -13,7 +13,7 @@ from bus_schema import keys
 from bus_schema.messages import Clock, Commands, Forces
 from bus_schema.rpc import Done, Place, Request, SetRole
 from experiments.claims.ch3_roadmaps.replanning_scene import BALL, LEFT, PART, RATE, RIGHT, Acted, Crossing, Job, ball, new_map, robot
-from experiments.kit.live import append_done, read_job
+from experiments.kit.live.launch import append_done, read_job
 from mobee import ActionInterrupted, MobeeError, Walker
 from mobee.arrays import Array
 from mobee.plant import Outcome

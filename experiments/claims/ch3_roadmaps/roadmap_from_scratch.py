@@ -40,12 +40,10 @@ from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import (
     robot,
 )
 from experiments.kit.cells import load_cells
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live import TABLE
-from experiments.kit.performer.launch import launch
+from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.live.launch import TABLE, launch
+from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_touches
 from experiments.kit.plots import new_figure
-from experiments.kit.recordings import CONTACTS, POSITIONS, read_touches
 from experiments.kit.run_folder import read, write
 from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, Condition, Sweep

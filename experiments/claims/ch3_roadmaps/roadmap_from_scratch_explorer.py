@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.control_runs import place
-from experiments.kit.live import TABLE
-from experiments.kit.safety_measures import is_listed
+from experiments.kit.control.plant_runs import place
+from experiments.kit.control.safety import is_listed
+from experiments.kit.live.launch import TABLE
 from mobee import (
     AdaptiveRoadmap,
     Gains,

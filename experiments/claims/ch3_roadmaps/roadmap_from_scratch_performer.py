@@ -1,4 +1,4 @@
-"""Exploration of a map of random poses on the live robot, see `experiments.kit.performer`."""
+"""Exploration of a map of random poses on the live robot, see `experiments.kit.live.performer`."""
 
 from __future__ import annotations
 

@@ -24,8 +24,7 @@ from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, va
 from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell, CellResult, load_cells
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.experiment import Claim, Experiment, Steps
 from experiments.kit.roadmap_task import Example, Method, build
 from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, run_cells, sweep_arguments

@@ -34,11 +34,10 @@ from experiments.claims.ch4_reflex.babbling_trial import (
     run_trial,
     write_trial,
 )
+from experiments.kit.command_line import Progress, positive_number
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_number
+from experiments.kit.live.recordings import POSITIONS, Touch
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
-from experiments.kit.recordings import POSITIONS, Touch
 from mobee import load_robot
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot

@@ -15,8 +15,8 @@ import numpy as np
 from msgspec import Struct
 
 from experiments.claims.ch4_reflex.babbling_commands import COMMANDS, Commanded, Ending, moved_motors, read_commands
-from experiments.kit.live import TABLE, free_endpoint, stop
-from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
+from experiments.kit.live.launch import TABLE, free_endpoint, stop
+from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
 from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch4_reflex.shallow_contact_paths import MARKER, SPEED, Client, HandPath, Spot, Table
+from experiments.kit.command_line import positive_number, positive_whole
 from experiments.kit.experiment import Experiment
-from experiments.kit.options import positive_number, positive_whole
 from experiments.kit.plots import new_figure
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array

@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.arm_commands import ARMS, Command, Tried, as_numbers, from_numbers, random_command, try_commands, vary
-from experiments.kit.control_runs import COLORS, GAINS, icub_at_table
+from experiments.kit.command_line import positive_whole
+from experiments.kit.control.arm_commands import ARMS, Command, Tried, as_numbers, from_numbers, random_command, try_commands, vary
+from experiments.kit.control.plant_runs import COLORS, GAINS, icub_at_table
+from experiments.kit.control.safety import clause_label, clause_violations
 from experiments.kit.experiment import Experiment
-from experiments.kit.options import positive_whole
 from experiments.kit.plots import new_figure
-from experiments.kit.safety_measures import clause_label, clause_violations
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.arrays import Array

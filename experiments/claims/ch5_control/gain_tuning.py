@@ -22,11 +22,10 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch5_control.gain_tuning_criteria import WANTED, Judged, evaluate, objective
-from experiments.kit.control_runs import icub
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.control.plant_runs import icub
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_whole
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 from experiments.kit.records import Records, read_records
 from mobee import Controller, Gains
 from mobee.errors import InvalidValue

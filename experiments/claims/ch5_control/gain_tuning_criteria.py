@@ -8,12 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from experiments.kit.arm_commands import Command, random_command, try_commands
-from experiments.kit.client_pushes import PUSHES
-from experiments.kit.control_runs import icub, icub_at_table, random_posture, run_plant
+from experiments.kit.control.arm_commands import Command, random_command, try_commands
+from experiments.kit.control.plant_runs import PUSHES, icub, icub_at_table, random_posture, run_plant
+from experiments.kit.control.safety import deepest, oscillation
+from experiments.kit.control.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.records import Row
-from experiments.kit.safety_measures import deepest, oscillation
-from experiments.kit.step_responses import motor_step, postures, run_step, step_response
 from mobee import Gains
 from mobee.arrays import Array
 from mobee.simulation import MotorParameters, OfflinePlant

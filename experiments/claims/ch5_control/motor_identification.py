@@ -37,10 +37,9 @@ from experiments.claims.ch5_control.motor_identification_recording import (
     record,
     save,
 )
+from experiments.kit.command_line import Progress, positive_whole, whole_from_two
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_whole, whole_from_two
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
 from experiments.kit.run_folder import write
 from mobee import Controller, Gains, Model, MotorParameters, OfflinePlant, World, load_robot
 from mobee.arrays import Array

@@ -26,15 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import arm_plant, arm_space, robot
 from experiments.kit.cells import CellResult
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import explore
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import arm_plant, arm_space, robot
+from experiments.kit.learning.exploration import explore
+from experiments.kit.learning.truth import Truth, l1, truth_of, walk
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
-from experiments.kit.truth import Truth, l1, truth_of, walk
 from mobee import CuriousAgent, Gains, Model, MotorParameters, OfflinePlant, World, sphere
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue

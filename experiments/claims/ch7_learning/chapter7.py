@@ -18,9 +18,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.claims import open_with_few_seeds
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import positive_whole
+from experiments.kit.experiment import Experiment, Steps, open_with_few_seeds
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.run_folder import CONFIG, RESULTS, read, write
 from experiments.kit.sweep import ENGINES

@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from experiments.kit.arm_learning import arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import LeastTries, begin_anywhere, explore
-from experiments.kit.outcomes import exists_in, failures_of, uncertain_in, visits_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import arm_plant, arm_space
+from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.learning.outcomes import exists_in, failures_of, uncertain_in, visits_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
 from experiments.kit.statistics import (
     decides,

@@ -23,11 +23,10 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import shortest_path
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import LeastTries, begin_anywhere, explore
-from experiments.kit.outcomes import first_places, first_tries, goals_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
+from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.learning.outcomes import first_places, first_tries, goals_of
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import (
     decides,

@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere, explore
-from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
+from experiments.kit.learning.exploration import begin_anywhere, explore
+from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import (
     decides,

@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import LeastTries, begin_anywhere, explore
-from experiments.kit.outcomes import first_tries, goals_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
+from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.learning.outcomes import first_tries, goals_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
 from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, relative_spread
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped

@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, DT, TORSO, arm_plant, arm_space, robot, torso_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere, explore
-from experiments.kit.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, TORSO, arm_plant, arm_space, robot, torso_space
+from experiments.kit.learning.exploration import begin_anywhere, explore
+from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep

@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import Cell
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live_learning import TASKS, learn_live, learn_offline
-from experiments.kit.options import positive_whole
-from experiments.kit.outcome_distance import Compared, compared, draw_distances
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.learning.live import TASKS, learn_live, learn_offline
+from experiments.kit.learning.outcome_distance import Compared, compared, draw_distances
 from experiments.kit.sweep import run_cells, sweep_arguments
 
 ALIKE = Claim(

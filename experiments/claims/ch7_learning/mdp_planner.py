@@ -23,10 +23,9 @@ import numpy as np
 
 from experiments.claims.ch7_learning.model_arrows import draw_arrows
 from experiments.claims.ch7_learning.planned_queries import TESTS, UP, Queries, TablePlant, roadmaps
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import explore
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
+from experiments.kit.learning.exploration import explore
 from experiments.kit.plots import draw_curve, draw_points, new_figure
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by

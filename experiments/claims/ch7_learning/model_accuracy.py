@@ -22,14 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.arm_learning import RANK3, RANK4, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_nearby, explore
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import RANK3, RANK4, arm_plant, arm_space
+from experiments.kit.learning.exploration import begin_nearby, explore
+from experiments.kit.learning.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
-from experiments.kit.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
 from mobee import CuriousAgent, Lattice, Plant, TransitionModel
 from mobee.arrays import Array, Ints
 from mobee.learning.explorers import EXPLORERS

@@ -18,10 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.kit.arm_learning import arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import LeastTries, begin_anywhere, explore
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import arm_plant, arm_space
+from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.plots import draw_points, new_figure
 from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, mean_over, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by

@@ -9,10 +9,10 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import JOINTS, PART, arm_clauses, arm_plant, clear, whole
-from experiments.kit.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_goals
-from experiments.kit.control_runs import place
-from experiments.kit.rivals import PlannedOnce, Repaired, Rival
+from experiments.kit.control.plant_runs import place
+from experiments.kit.learning.arm import JOINTS, PART, arm_clauses, arm_plant, clear, whole
+from experiments.kit.learning.arm_planners import PlannedOnce, Repaired, Rival
+from experiments.kit.learning.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_goals
 from mobee import Lattice, Outcome, World, box
 from mobee.arrays import Array
 from mobee.errors import MobeeError

@@ -23,11 +23,10 @@ import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import FAILING
 from experiments.claims.ch7_learning.unreachable_states import ASIDE, HARDLY, NEVER
-from experiments.kit.arm_learning import DT, LEFT, RANK3, RANK4, arm_space, robot
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere, newest
-from experiments.kit.outcomes import ends_of, outcome_counts, visits_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import DT, LEFT, RANK3, RANK4, arm_space, robot
+from experiments.kit.learning.exploration import begin_anywhere, newest
+from experiments.kit.learning.outcomes import ends_of, outcome_counts, visits_of
 from experiments.kit.plots import new_figure
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant

@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere, explore
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
+from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped

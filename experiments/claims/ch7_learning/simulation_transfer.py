@@ -25,12 +25,10 @@ import numpy as np
 from scipy.special import stdtrit
 
 from experiments.kit.cells import Cell, load_cells
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live_learning import ROBOTS, learn_live, learn_offline
-from experiments.kit.options import positive_whole
-from experiments.kit.outcome_distance import Compared, Distance, compared, draw_distances
-from experiments.kit.progress import Progress
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.learning.live import ROBOTS, learn_live, learn_offline
+from experiments.kit.learning.outcome_distance import Compared, Distance, compared, draw_distances
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
 

@@ -53,10 +53,9 @@ from experiments.claims.ch7_learning.table_runs import (
     spaces,
     with_ghosts,
 )
-from experiments.kit.arm_learning import table_agents, table_plant
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import explore_together
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import table_agents, table_plant
+from experiments.kit.learning.exploration import explore_together
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep

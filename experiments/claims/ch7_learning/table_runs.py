@@ -13,9 +13,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
 from experiments.kit.cells import CellResult
-from experiments.kit.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
+from experiments.kit.learning.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
 from experiments.kit.sweep import Cells, grouped_by
 from mobee import Lattice, Model, World, box
 from mobee.arrays import Array, Ints

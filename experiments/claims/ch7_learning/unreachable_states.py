@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.claims.ch7_learning.self_contacts import SelfContact, SelfContactPlant
-from experiments.kit.arm_learning import RANK4, STRETCHED, arm_plant, arm_space
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere, explore
-from experiments.kit.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import RANK4, STRETCHED, arm_plant, arm_space
+from experiments.kit.learning.exploration import begin_anywhere, explore
+from experiments.kit.learning.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_clauses, arm_plant, arm_space, columns, robot, whole
-from experiments.kit.arm_roadmap import Belief
-from experiments.kit.control_runs import place
-from experiments.kit.rivals import Rival
+from experiments.kit.control.plant_runs import place
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_clauses, arm_plant, arm_space, columns, robot, whole
+from experiments.kit.learning.arm_planners import Rival
+from experiments.kit.learning.arm_roadmap import Belief
 from mobee import Lattice, Model, OfflinePlant, World, sphere
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue

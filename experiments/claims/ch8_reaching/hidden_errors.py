@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from experiments.kit.arm_learning import RIGHT
+from experiments.kit.learning.arm import RIGHT
 from experiments.kit.reaching.arm import Errors, JudgedPlant, arm_belief, arm_plant, body, space, straight_paths
 from experiments.kit.reaching.belief import PeerBelief
 from experiments.kit.reaching.targets import grid, touchable, touchable_targets

@@ -22,12 +22,11 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch8_reaching.arm_queries import BELIEFS, Scene, answer, believed, make_scene, space, world_of
-from experiments.kit.arm_learning import arm_plant
-from experiments.kit.arm_roadmap import KINDS, NEIGHBOURS, make_roadmap, with_goals
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.arm import arm_plant
+from experiments.kit.learning.arm_planners import Learned, PlannedOnce, Repaired, Rival, Straight
+from experiments.kit.learning.arm_roadmap import KINDS, NEIGHBOURS, make_roadmap, with_goals
 from experiments.kit.plots import new_figure
-from experiments.kit.rivals import Learned, PlannedOnce, Repaired, Rival, Straight
 from experiments.kit.statistics import interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice

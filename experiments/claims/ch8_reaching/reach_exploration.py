@@ -23,16 +23,14 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, STRATEGIES, Runs, runs_of
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.options import positive_number
+from experiments.kit.command_line import positive_number
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.reaching.arm import MARKER, PART, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import learn
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
+from experiments.kit.statistics import all_hold, better, changes, decides, estimate, interquartile_mean, interval, published_ratio, rises
 from experiments.kit.sweep import Cells, Condition, Sweep
-from experiments.kit.verdicts import all_hold, better, changes, published_ratio, rises
 from mobee import Model
 from mobee.arrays import Array
 from mobee.learning.reaching.predictors.predictor import SCALE

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import mobee
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, RIGHT
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.kit.reaching.arm import LEARNED, MARKER, PART
 from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent

@@ -23,9 +23,8 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import Cell, CellResult, load_cells
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.options import positive_number
+from experiments.kit.command_line import positive_number
+from experiments.kit.experiment import Claim, Experiment, Steps
 from experiments.kit.plots import new_figure
 from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations

@@ -29,15 +29,13 @@ import numpy as np
 
 from experiments.claims.ch8_reaching.hidden_errors import WRONG, Scene, make_scene
 from experiments.kit.cells import CellResult
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import PART, learned_transitions, reach_agent, space
 from experiments.kit.reaching.planner_peer import ENDS, MEMORIES, Memory, PeerTry, PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
+from experiments.kit.statistics import all_hold, decides, estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
-from experiments.kit.verdicts import all_hold
 from mobee.arrays import Array
 from mobee.learning.reaching.tries import Problems
 from mobee.reach import ReachTarget

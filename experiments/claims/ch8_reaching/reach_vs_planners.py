@@ -27,8 +27,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch8_reaching.two_arms import query
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_bars, new_figure
 from experiments.kit.reaching.arm import LEARNED, PART, JudgedPlant, arm_belief
 from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained

@@ -24,13 +24,11 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp as example
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.roadmap_task import RIGHT, build
-from experiments.kit.statistics import estimate, interquartile_mean, interval
+from experiments.kit.statistics import estimate, interquartile_mean, interval, rises
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from experiments.kit.verdicts import rises
 from mobee import MobeeError, Model, Roadmap, World, cylinder
 from mobee.arrays import Array, Ints
 from mobee.roadmap.edges import check_edges

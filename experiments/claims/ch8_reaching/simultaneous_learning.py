@@ -23,17 +23,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment
-from experiments.kit.exploration import begin_anywhere
+from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.learning.exploration import begin_anywhere
+from experiments.kit.learning.truth import Truth, l1, truth_of, walk
 from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.statistics import decides, estimate, interval
+from experiments.kit.statistics import all_hold, decides, estimate, interval, rises
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from experiments.kit.truth import Truth, l1, truth_of, walk
-from experiments.kit.verdicts import all_hold, rises
 from mobee import TransitionModel
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.reach_agent import ReachAgent

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.kit.control_runs import place
+from experiments.kit.control.plant_runs import place
 from experiments.kit.reaching.arm import body
 from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, shortened
 from mobee import Gains, Model, OfflinePlant, World, box, cylinder

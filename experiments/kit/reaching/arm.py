@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_space
-from experiments.kit.arm_learning import robot as published_robot
-from experiments.kit.exploration import begin_anywhere, explore
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_space
+from experiments.kit.learning.arm import robot as published_robot
+from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.reaching.belief import PeerBelief
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.arrays import Array

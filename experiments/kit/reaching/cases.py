@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from experiments.kit.control_runs import place
+from experiments.kit.control.plant_runs import place
 from experiments.kit.reaching.arm import MARKER, PART, arm_belief, arm_plant, hands, learned_transitions, reach_agent
 from experiments.kit.reaching.belief import PeerBelief, approach
 from experiments.kit.reaching.learning import Course

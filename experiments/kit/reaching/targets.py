@@ -20,7 +20,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from experiments.kit.arm_learning import RIGHT, robot
+from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART, arm_belief, laws
 from experiments.kit.reaching.belief import PeerBelief, goals
 from mobee import Model

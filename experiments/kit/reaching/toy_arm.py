@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.arm_learning import RIGHT, arm_space
+from experiments.kit.learning.arm import RIGHT, arm_space
 from mobee import Lattice
 from mobee.arrays import Array
 from mobee.errors import InvalidValue

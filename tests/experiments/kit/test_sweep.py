@@ -1,14 +1,22 @@
 from __future__ import annotations
 
 import argparse
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from experiments.kit.cells import Cell
-from experiments.kit.sweep import Condition, Sweep, grouped, grouped_by
+from experiments.kit.cells import Cell, load_cells
+from experiments.kit.sweep import CellsFailed, Condition, Sweep, TimeLeft, grouped, grouped_by, run_cells
 from mobee.errors import InvalidValue
 from mobee.roadmap.ompl import OmplMissing
 from tests.experiments.finished_cells import finished
+from tests.experiments.kit.toy_sweep import cells, options, useless, work
 
 
 def conditions(arguments):
@@ -56,3 +64,154 @@ def test_a_missing_package_is_named_before_anything_is_begun(tmp_path):
     with pytest.raises(OmplMissing, match="not installed"):
         sweep.run(arguments("--seeds", "1"), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+ROOT = Path(__file__).parents[3]
+
+
+def inline(folder: Path):
+    return options(str(folder), "--jobs", "1")
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_every_cell_is_worked_off_and_read_back(tmp_path, jobs):
+    run_cells(work, cells(3), tmp_path, options(str(tmp_path), "--jobs", jobs))
+    found = load_cells(tmp_path)
+    assert list(found) == ["toy-s0", "toy-s1", "toy-s2"]
+    assert found["toy-s2"].cell == Cell("toy-s2", 2, {})
+    values = found["toy-s2"].values
+    assert values["square"] == 4 and values["nested"] == {"pi": 3.5}
+    assert np.array_equal(values["row"], [0, 1])
+
+
+def test_finished_cells_are_not_repeated(tmp_path):
+    log = tmp_path / "log"
+    for count in (2, 4):
+        run_cells(work, cells(count, log=str(log)), tmp_path, inline(tmp_path))
+    assert [line.split()[0] for line in log.read_text().splitlines()] == ["toy-s0", "toy-s1", "toy-s2", "toy-s3"]
+
+
+def test_the_costly_cells_come_first(tmp_path):
+    log = tmp_path / "log"
+    mixed = [Cell(f"toy-s{seed}", seed, {"log": str(log)}, cost) for seed, cost in enumerate((1.0, 5.0, 2.0))]
+    run_cells(work, mixed, tmp_path, inline(tmp_path))
+    assert [line.split()[0] for line in log.read_text().splitlines()] == ["toy-s1", "toy-s2", "toy-s0"]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_cell_that_fails_is_named_and_the_others_are_finished(tmp_path, jobs):
+    with pytest.raises(CellsFailed, match=r"1 of 4 cells failed[\s\S]*toy-s1: ValueError: the toy is broken"):
+        run_cells(work, cells(4, fails=1), tmp_path, options(str(tmp_path), "--jobs", jobs))
+    assert set(load_cells(tmp_path)) == {"toy-s0", "toy-s2", "toy-s3"}
+    assert "the toy is broken" in (tmp_path / "cells" / "toy-s1.failed.txt").read_text()
+
+
+def test_of_many_failed_cells_the_first_are_named(tmp_path):
+    with pytest.raises(CellsFailed) as error:
+        run_cells(useless, cells(5), tmp_path, inline(tmp_path))
+    first, *named, rest = str(error.value).splitlines()
+    assert first.startswith("5 of 5 cells failed") and len(named) == 3 and rest == "  and 2 more"
+
+
+def test_a_cell_whose_process_dies_is_named_and_the_others_are_finished(tmp_path):
+    with pytest.raises(CellsFailed, match=r"toy-s0: its process died: killed by signal 9"):
+        run_cells(work, cells(4, dies=0), tmp_path, options(str(tmp_path), "--jobs", "2"))
+    assert set(load_cells(tmp_path)) == {"toy-s1", "toy-s2", "toy-s3"}
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_values_that_cannot_be_kept_fail_their_cell(tmp_path, jobs):
+    with pytest.raises(CellsFailed, match="no JSON value"):
+        run_cells(useless, cells(2), tmp_path, options(str(tmp_path), "--jobs", jobs))
+    assert not load_cells(tmp_path)
+
+
+def test_other_settings_under_a_finished_name_are_refused(tmp_path):
+    run_cells(work, cells(1, levels=(0.2, 0.4)), tmp_path, inline(tmp_path))
+    run_cells(work, cells(1, levels=(0.2, 0.4)), tmp_path, inline(tmp_path))
+    with pytest.raises(InvalidValue, match="toy-s0 with other settings"):
+        run_cells(work, cells(1, levels=(0.2, 0.5)), tmp_path, inline(tmp_path))
+
+
+def test_two_cells_of_one_name_are_refused(tmp_path):
+    with pytest.raises(InvalidValue, match="several cells are named 'toy-s0'"):
+        run_cells(work, [*cells(1), *cells(1)], tmp_path, inline(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "with space"])
+def test_a_name_that_is_no_file_name_is_refused(name):
+    with pytest.raises(InvalidValue, match="a name has"):
+        Cell(name, 0)
+
+
+def test_what_a_kill_left_half_written_is_no_cell(tmp_path):
+    run_cells(work, cells(1), tmp_path, inline(tmp_path))
+    (tmp_path / "cells" / "toy-s1.unfinished").write_bytes((tmp_path / "cells" / "toy-s0.npz").read_bytes()[:100])
+    assert set(load_cells(tmp_path)) == {"toy-s0"}
+
+
+def test_a_damaged_file_is_named(tmp_path):
+    run_cells(work, cells(1), tmp_path, inline(tmp_path))
+    path = tmp_path / "cells" / "toy-s0.npz"
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(InvalidValue, match=r"toy-s0\.npz is not a finished cell"):
+        load_cells(tmp_path)
+
+
+def sweep(folder: Path, seconds: float) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tests.experiments.kit.toy_sweep", str(folder), "--seeds", "6", "--jobs", "2"]
+    return subprocess.Popen(
+        [*command, "--seconds", str(seconds)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_sweep_that_is_killed_goes_on_behind_what_it_has_finished(tmp_path, how):
+    process = sweep(tmp_path, 0.3)
+    wait_until(lambda: len(list(tmp_path.glob("cells/*.npz"))) >= 2)
+    os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)  # a terminal's Ctrl-C goes to the whole group
+    out, err = process.communicate(timeout=20)  # its workers hold the pipe: this returns when they are gone too
+    assert process.returncode == -how or how == signal.SIGINT
+    finished = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("cells/*.npz")}
+    assert 2 <= len(finished) < 6
+    done_before = (tmp_path / "log").read_text().split()[::2]
+
+    out, err = sweep(tmp_path, 0.3).communicate(timeout=60) if how == signal.SIGKILL else resume_here(tmp_path)
+    assert (out, err) == ("", "")  # nothing is drawn in a pipe
+    assert len(load_cells(tmp_path)) == 6
+    done_after = (tmp_path / "log").read_text().split()[::2][len(done_before) :]
+    assert not {f"{name}.npz" for name in done_after} & set(finished)
+    assert all((tmp_path / "cells" / name).stat().st_mtime_ns == when for name, when in finished.items())
+
+
+def resume_here(folder: Path) -> tuple[str, str]:
+    run_cells(work, cells(6, seconds=0.3, log=str(folder / "log")), folder, inline(folder))
+    return "", ""
+
+
+def wait_until(holds, timeout: float = 30.0) -> None:
+    end = time.monotonic() + timeout
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_the_time_left_follows_the_costs_of_what_is_done_now():
+    time_left = TimeLeft([1.0, 1.0, 4.0, 4.0], [1.0, 4.0, 4.0], start=100.0)
+    assert time_left.fraction == pytest.approx(0.1)
+    time_left.finished(4.0, 140.0)
+    assert time_left.fraction == 0.5 and time_left.seconds == 50.0
+    assert str(time_left) == "50 s left"
+
+
+def test_long_times_are_told_in_minutes_and_hours():
+    time_left = TimeLeft([1.0, 100.0], [1.0, 100.0], start=0.0)
+    time_left.finished(1.0, 18.0)
+    assert str(time_left) == "30 min left"
+    time_left = TimeLeft([1.0, 100.0], [1.0, 100.0], start=0.0)
+    time_left.finished(1.0, 180.0)
+    assert str(time_left) == "5 h 00 min left"
+
+
+def test_a_sweep_without_work_is_over():
+    assert TimeLeft([1.0], [], 0.0).fraction == 1.0

@@ -49,13 +49,11 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
     train,
 )
 from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, Judged, measure, nearest_reach, read_block, write_block
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.live import TABLE, summary_of, write_job
-from experiments.kit.options import positive_whole
+from experiments.kit.command_line import Progress, positive_whole
+from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.live.launch import TABLE, summary_of, write_job
+from experiments.kit.live.recordings import POSITIONS
 from experiments.kit.plots import new_figure
-from experiments.kit.progress import Progress
-from experiments.kit.recordings import POSITIONS
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from msgspec import Struct, structs
 
-from experiments.kit.live import TABLE
+from experiments.kit.live.launch import TABLE
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.belief import PeerBelief, approach
 from experiments.kit.reaching.targets import grid

@@ -26,10 +26,10 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
     space,
     touchable,
 )
-from experiments.kit.control_runs import place
-from experiments.kit.live import read_done
+from experiments.kit.control.plant_runs import place
+from experiments.kit.live.launch import read_done
+from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_touches
 from experiments.kit.reaching.arm import MARKER, PART
-from experiments.kit.recordings import CONTACTS, POSITIONS, Touch, read_touches
 from mobee import Model, OfflinePlant
 from mobee.arrays import Array
 from mobee.reach import RADIUS, ReachTarget

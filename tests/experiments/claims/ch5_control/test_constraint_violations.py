@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch5_control import constraint_violations
-from experiments.kit.arm_commands import PHASES, Tried, random_command, try_commands
-from experiments.kit.control_runs import PlantRun
-from experiments.kit.safety_measures import clause_violations
+from experiments.kit.control.arm_commands import PHASES, Tried, random_command, try_commands
+from experiments.kit.control.plant_runs import PlantRun
+from experiments.kit.control.safety import clause_violations
 from mobee import Gains, load_robot
 from tests.experiments.small_run import small_run
 

@@ -7,7 +7,7 @@ import pytest
 from experiments.claims.ch5_control import gain_tuning
 from experiments.claims.ch5_control.gain_tuning import EXPERIMENT, TUNED, gains_with, numbers_of, read_tried, search
 from experiments.claims.ch5_control.gain_tuning_criteria import Judged, objective, press, press_targets
-from experiments.kit.control_runs import icub
+from experiments.kit.control.plant_runs import icub
 from mobee import Gains
 from tests.experiments.small_run import options_of, small_run
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch5_control import push_disturbance
-from experiments.kit.control_runs import icub_at_table
+from experiments.kit.control.plant_runs import icub_at_table
 from mobee.control.law import FRICTION, INERTIA
 from mobee.simulation import OfflinePlant
 from tests.experiments.small_run import small_run

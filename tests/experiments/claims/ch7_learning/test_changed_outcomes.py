@@ -5,8 +5,8 @@ import pytest
 
 from experiments.claims.ch7_learning import changed_outcomes
 from experiments.claims.ch7_learning.changed_outcomes import CHANGES, EVERY, SOON, Run, compare, plant_of, trial
-from experiments.kit.arm_learning import arm_space
-from experiments.kit.truth import l1, truth_of
+from experiments.kit.learning.arm import arm_space
+from experiments.kit.learning.truth import l1, truth_of
 from mobee import TransitionModel
 from mobee.errors import InvalidValue
 

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from experiments.claims.ch7_learning import chapter7
-from experiments.kit.claims import Claim
-from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.experiment import Claim, Experiment, Steps
 from experiments.kit.run_folder import new_run
 from experiments.kit.sweep import sweep_arguments
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import CLAIMS, DISCOUNTS, ENTERING, FAILING, INITIAL, findings
-from experiments.kit.arm_learning import arm_space
+from experiments.kit.learning.arm import arm_space
 from tests.experiments.finished_cells import Cell, finished
 
 SPACE = arm_space()

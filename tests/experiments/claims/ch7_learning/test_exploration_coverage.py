@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch7_learning.exploration_coverage import _row, first_repeat, measured, postman_floor, states_seen, trial
-from experiments.kit.arm_learning import HYPERCUBE, RANK3, RANK4, arm_space
+from experiments.kit.learning.arm import HYPERCUBE, RANK3, RANK4, arm_space
 from mobee.errors import InvalidValue
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.claims.ch7_learning.exploration_uniformity import EXPLORERS, measured
-from experiments.kit.outcomes import Explored
+from experiments.kit.learning.outcomes import Explored
 
 EVEN, UNEVEN = np.array([10, 11, 10, 11, 10, 20]), np.array([1, 30, 2, 40, 3, 2])
 VISITS = {True: np.array([5, 5, 6]), False: np.array([1, 9, 20])}

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.claims.ch7_learning import live_table_discovery
 from experiments.kit.cells import write_cell
-from experiments.kit.live_learning import TASKS, space
+from experiments.kit.learning.live import TASKS, space
 from mobee import load_robot
 from mobee.store import STORE, Transition, TransitionStore
 

@@ -20,8 +20,8 @@ from experiments.claims.ch7_learning.planned_queries import (
     through,
     touched_states,
 )
-from experiments.kit.arm_learning import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.cells import Cell, load_cells, write_cell
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
 from mobee import TransitionModel
 
 AFTER = [0, 1000]

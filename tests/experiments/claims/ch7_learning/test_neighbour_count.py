@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from experiments.claims.ch7_learning.neighbour_count import attempt, drawn_tasks, fewest_actions, findings, trial
-from experiments.kit.arm_learning import HYPERCUBE, arm_plant, arm_space
+from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
 from mobee import TransitionModel
 from tests.experiments.finished_cells import Cell, finished
 

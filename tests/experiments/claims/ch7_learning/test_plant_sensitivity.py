@@ -5,7 +5,7 @@ import pytest
 
 from experiments.claims.ch7_learning.plant_sensitivity import PUBLISHED, VARIANTS, Row, normalised
 from experiments.claims.ch7_learning.unreachable_states import NEVER
-from experiments.kit.arm_learning import arm_plant, robot
+from experiments.kit.learning.arm import arm_plant, robot
 
 
 def test_the_first_variant_is_the_published_plant():

@@ -5,8 +5,8 @@ import pytest
 
 from experiments.claims.ch7_learning.simulation_transfer import measured, prediction_bound
 from experiments.kit.cells import Cell
-from experiments.kit.live_learning import learn_offline
-from experiments.kit.outcome_distance import Compared, Distance
+from experiments.kit.learning.live import learn_offline
+from experiments.kit.learning.outcome_distance import Compared, Distance
 
 pytestmark = pytest.mark.timeout(120)
 

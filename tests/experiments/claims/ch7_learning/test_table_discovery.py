@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from experiments.claims.ch7_learning.table_interest import Judged, agreement, at_second_peak, autocorrelation, is_cyclic, second_peak
 from experiments.claims.ch7_learning.table_runs import is_forward, low_goals, near_table
-from experiments.kit.arm_learning import robot
+from experiments.kit.learning.arm import robot
 
 RUNS, WINDOWS, LONGEST = 6, 300, 100
 PERIOD = 30

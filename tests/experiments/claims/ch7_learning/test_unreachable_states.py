@@ -5,7 +5,7 @@ import pytest
 
 from experiments.claims.ch7_learning.self_contacts import SelfContactPlant
 from experiments.claims.ch7_learning.unreachable_states import Run, contacts_by_pair
-from experiments.kit.arm_learning import LEFT, RANK4, STRETCHED, arm_plant, arm_space, robot
+from experiments.kit.learning.arm import LEFT, RANK4, STRETCHED, arm_plant, arm_space, robot
 
 
 def test_watching_changes_nothing():

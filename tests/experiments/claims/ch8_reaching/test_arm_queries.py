@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching.arm_queries import LIMIT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
-from experiments.kit.arm_learning import whole
-from experiments.kit.rivals import Straight
+from experiments.kit.learning.arm import whole
+from experiments.kit.learning.arm_planners import Straight
 from mobee import Model, load_robot
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.kit.arm_learning import RIGHT, robot
+from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.targets import AT_CENTRE, between, counts, distances, grid, joints_of, nearest_pose, targets_at
 from mobee import Model

@@ -15,7 +15,7 @@ from experiments.claims.ch8_reaching.live_reach.performer.contestants import End
 from experiments.claims.ch8_reaching.live_reach.performer.hand import Hand, Mover
 from experiments.claims.ch8_reaching.live_reach.problems import RATE, WRIST, Problem, grid_targets, learner
 from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried
-from experiments.kit.live import append_done, read_job
+from experiments.kit.live.launch import append_done, read_job
 from experiments.kit.reaching.arm import PART
 from mobee import ActionInterrupted, load_robot
 from mobee.robot.robot import Robot

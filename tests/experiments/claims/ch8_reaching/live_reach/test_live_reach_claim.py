@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.claims.ch8_reaching.live_reach.claim import enough, measured, misses, plot, share, table
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, GRID
 from experiments.claims.ch8_reaching.live_reach.tries import Block, Judged
-from experiments.kit.recordings import Touch
+from experiments.kit.live.recordings import Touch
 
 KNOWN, LEFT = frozenset(range(20)), frozenset(range(1, 20))
 

@@ -9,8 +9,8 @@ import pytest
 
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, MARKER, PART, Problem, robot
 from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure, read_block, write_block
-from experiments.kit.live import append_done, read_done, read_job, write_job
-from experiments.kit.recordings import CONTACTS, POSITIONS
+from experiments.kit.live.launch import append_done, read_done, read_job, write_job
+from experiments.kit.live.recordings import CONTACTS, POSITIONS
 from mobee import Model
 from mobee.reach import RADIUS
 

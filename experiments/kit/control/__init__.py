@@ -1,0 +1,1 @@
+"""Shared by experiments about the control law."""

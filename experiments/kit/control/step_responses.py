@@ -1,0 +1,86 @@
+"""Step responses of one motor or of many: settling time, overshoot and remaining error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from experiments.kit.control.plant_runs import PlantRun, icub, place, random_posture, run_plant
+from experiments.kit.control.safety import clause_violations
+from mobee import Gains
+from mobee.arrays import Array
+from mobee.simulation import OfflinePlant
+
+STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, of the range: the smaller is the step of a motor alone
+BAND = 0.05  # of the step
+REST = 1.0  # s, the end of a run, in which nothing may move
+LEAST = np.deg2rad(5.0)  # a smaller step of a motor among others is not judged
+TIME_CONSTANTS = 24.0  # a run lasts so many of damping / stiffness
+MOTORS = {"torso": 3, "left_arm": 7, "right_arm": 7}  # that step together
+MIDDLE = (0.25, 0.75)  # of the range of a motor in a posture
+MARGIN = np.deg2rad(15.0)  # from every constraint, of a posture
+
+
+@dataclass(frozen=True, slots=True)
+class StepResponse:
+    """Measures of a step response."""
+
+    settling: float  # s
+    overshoot: float  # of the step
+    error_deg: float  # between rest and attractor
+    rest_deg: float  # standard deviation at rest
+    is_settled: bool
+
+
+def motor_step(motor: int) -> tuple[Array, Array]:
+    """Postures (n,) rad before and after a step of one motor: around the middle of its range, the others at home."""
+    robot = icub().robot
+    low, high = robot.limits[motor]
+    size = min(STEP, SHARE * (high - low))
+    start, end = robot.home.copy(), robot.home.copy()
+    start[motor], end[motor] = (low + high - size) / 2.0, (low + high + size) / 2.0
+    return start, end
+
+
+def postures(count: int, seed: int) -> list[Array]:
+    """Random postures (n,) rad of torso and arms; on the paths from one to the next, from home on, no field is in contact."""
+    robot, rng = icub().robot, np.random.default_rng(seed)
+    found = [robot.home]
+    while len(found) <= count:
+        q = random_posture(robot, rng, MOTORS, MIDDLE)
+        # Motors arrive at different times, so the path is not the line: the torso first, then the arms, and the reverse.
+        shares = np.linspace(0.0, 1.0, 11)[:, None, None]
+        torso = np.arange(len(q)) < robot.parts["torso"].slice.stop
+        corners = np.stack([np.where(torso, q, found[-1]), np.where(torso, found[-1], q)])
+        sides = np.stack([np.stack([found[-1], found[-1], found[-1]]), np.stack([*corners, q]), np.stack([q, q, q])])
+        path = np.concatenate([a + shares * (b - a) for a, b in pairwise(sides)]).reshape(-1, len(q))
+        if clause_violations(robot, path).max() < -MARGIN and not len(icub().evaluate(path).table):
+            found.append(q)
+    return found[1:]
+
+
+def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> PlantRun:
+    """A run that begins at rest at `start` (n,) rad, with the attractor at `end`."""
+    plant = OfflinePlant(icub(), seed, gains, dt=period_ms / 1e3)
+    place(plant, start)
+    plant.controller.attractor = end
+    return run_plant(plant, TIME_CONSTANTS * gains.damping / gains.stiffness)
+
+
+def step_response(run: PlantRun, start: Array, end: Array) -> StepResponse:
+    """Measure the joints whose step is LEAST or larger."""
+    moved = np.abs(end - start) >= LEAST
+    rest = run.last(REST).q[:, moved]
+    final = rest.mean(axis=0)
+    beyond = (run.q[:, moved] - final) / (end - start)[moved]
+    outside = np.abs(beyond) > BAND
+    settling = run.dt * max(int(np.flatnonzero(row)[-1]) + 1 if row.any() else 0 for row in outside.T)
+    return StepResponse(
+        settling,
+        overshoot=float(np.maximum(beyond, 0.0).max()),
+        error_deg=float(np.rad2deg(np.abs(end[moved] - final).max())),
+        rest_deg=float(np.rad2deg(rest.std(axis=0).max())),
+        is_settled=bool(settling <= run.times[-1] - REST),
+    )

@@ -1,0 +1,205 @@
+"""Engines that run the cells of a sweep: processes of this machine, or a Ray cluster."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from multiprocessing import connection, get_context, parent_process
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Any
+
+from experiments.kit.cells import Cell, Work
+from mobee.errors import MobeeError
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # for who is not started by mobee_cli, which sets them too
+_PATIENCE = 2.0  # s, for a process to end
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
+    """Yield the cells as they are finished, in any order; one job works in this process."""
+    count = min(jobs or cores(), len(cells))
+    if count == 1:
+        yield from (do(work, cell) for cell in cells)
+        return
+    waiting = deque(cells)
+    with ExitStack() as stack:
+        workers = {worker.answers: worker for worker in (_Worker(work) for _ in range(count))}
+        stack.callback(lambda: _end(list(workers.values())))
+        for worker in workers.values():
+            worker.give(waiting.popleft())
+        while busy := [answers for answers, worker in workers.items() if worker.cell is not None]:
+            ready = connection.wait(busy)
+            for answers in [one for one in busy if one in ready]:
+                worker = workers.pop(answers)
+                done = worker.take()
+                if not worker.is_whole and waiting:
+                    worker = _Worker(work)
+                workers[worker.answers] = worker
+                if waiting:
+                    worker.give(waiting.popleft())
+                yield done
+
+
+class _Worker:
+    """A process that works off one cell after another."""
+
+    def __init__(self, work: Work) -> None:
+        context = get_context("spawn")
+        self.answers, theirs = context.Pipe()
+        self.process: SpawnProcess = context.Process(target=_serve, args=(work, theirs), daemon=True)
+        with _undisturbed():
+            self.process.start()
+        theirs.close()
+        self.cell: Cell | None = None
+        self.is_whole = True
+
+    def give(self, cell: Cell) -> None:
+        """Start a cell."""
+        self.cell = cell
+        try:
+            self.answers.send(cell)
+        except OSError:  # it has died; `take` says how
+            self.is_whole = False
+
+    def take(self) -> Done:
+        """The cell that has ended."""
+        cell, self.cell = self.cell, None
+        if cell is None:
+            raise RuntimeError("no cell is under way in this process")
+        try:
+            done: Done = self.answers.recv()
+            return done
+        except (EOFError, OSError):
+            self.is_whole = False
+            self.process.join(_PATIENCE)
+            return Done(cell, 0.0, None, f"its process died: {_how(self.process.exitcode)}")
+
+
+def _serve(work: Work, cells: Connection) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            cell = cells.recv()
+        except EOFError:
+            return
+        done = do(work, cell)
+        try:
+            cells.send(done)
+        except (TypeError, ValueError, AttributeError) as error:  # values that cannot be sent
+            cells.send(Done(cell, done.seconds, None, f"what it returned cannot be sent to another process: {error}"))
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _how(code: int | None) -> str:
+    if code is not None and code < 0:
+        return f"killed by signal {-code} ({signal.Signals(-code).name}); short of memory? Then use fewer --jobs"
+    return f"exit code {code}"
+
+
+def _end(workers: Sequence[_Worker]) -> None:
+    for worker in workers:
+        worker.process.terminate()
+    for worker in workers:
+        worker.process.join(_PATIENCE)
+        if worker.process.is_alive():
+            worker.process.kill()
+            worker.process.join()
+        worker.answers.close()
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Processes started meanwhile leave Ctrl-C to this one, and use one thread each for linear algebra."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A cell that was worked off: its values, or what went wrong."""
+
+    cell: Cell
+    seconds: float
+    values: dict[str, Any] | None
+    error: str = ""  # a traceback, or how its process died
+
+    @property
+    def reason(self) -> str:
+        """The last line of the error."""
+        return self.error.strip().rpartition("\n")[2]
+
+
+def do(work: Work, cell: Cell) -> Done:
+    """Work a cell off, whatever happens."""
+    start = time.monotonic()
+    try:
+        values = work(cell)
+    except Exception:  # of the experiment's own code: it is reported with the cell's name, and the others go on
+        return Done(cell, time.monotonic() - start, None, traceback.format_exc())
+    return Done(cell, time.monotonic() - start, values)
+
+
+class RayMissing(MobeeError):
+    """Raised when Ray is asked for and not installed."""
+
+
+def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
+    """Yield the cells as they are finished, in any order; MoBeE must be installed on all machines of the cluster."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is reported to anybody
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # what Ray will do by itself one day; silences its warning
+    try:
+        import ray
+    except ImportError:
+        raise RayMissing("--engine ray needs Ray, which is not installed: pip install '.[cluster]' in MoBeE's folder") from None
+    try:
+        ray.init(address="auto", log_to_driver=False, logging_level=logging.ERROR)
+    except ConnectionError:
+        ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
+    try:
+        remote = ray.remote(max_retries=0)(do)
+        waiting = deque(cells)
+        running: dict[Any, Cell] = {}
+        room = jobs or max(1, int(ray.cluster_resources().get("CPU", 1)))
+        while waiting or running:
+            while waiting and len(running) < room:
+                cell = waiting.popleft()
+                running[remote.remote(work, cell)] = cell
+            (ready, *_), _ = ray.wait(list(running))
+            cell = running.pop(ready)
+            try:
+                yield ray.get(ready)
+            except ray.exceptions.RayError as error:
+                yield Done(cell, 0.0, None, f"its process died: {str(error).strip().splitlines()[0]}")
+    finally:
+        ray.shutdown()

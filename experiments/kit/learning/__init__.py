@@ -1,0 +1,1 @@
+"""Shared by experiments about learning the outcomes of actions."""

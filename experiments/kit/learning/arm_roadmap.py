@@ -1,0 +1,181 @@
+"""A roadmap of the published arm by what a planner believes: sound poses and motions, shortest paths, OMPL's PRM or the lattice.
+
+The left arm of the published robot, four joints; the planners of `experiments.kit.learning.arm_planners` follow such roadmaps.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.kit.learning.arm import clear, columns, robot
+from mobee import Gains, Lattice, Model
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.roadmap.ompl import grown
+from mobee.robot.robot import Clause
+
+STEP = 0.02  # of a joint's range, between two poses of a motion that are checked
+MILESTONES, NEIGHBOURS = 300, 10  # of OMPL's roadmap; the second is its default
+KINDS = ("OMPL", "lattice")
+
+
+Edge = tuple[int, int]  # vertices, the smaller first
+
+
+class Belief:
+    """A robot in its world as believed; a pose of the arm is sound if it is clear of contacts and cables.
+
+    Args:
+        model: the robot in the world, as believed.
+        turns: (4,) rad, believed minus measured joint angles.
+        clauses: the known constraints of the cables.
+    """
+
+    def __init__(self, model: Model, turns: Array, clauses: Sequence[Clause]) -> None:
+        self._model, self._turns, self._clauses = model, turns, clauses
+        limits = robot().limits[columns()]
+        self.limits: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
+        """(4, 2) rad between which the joint limits exert no force."""
+        self.span: Array = np.ptp(limits, axis=1)
+        """(4,) rad, the joints' ranges."""
+        self.checked = 0
+        """How many poses were checked."""
+
+    def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
+        """Which of the poses (P, 4) rad are sound, (P,); `cables`: whether they count."""
+        self.checked += len(q)
+        return clear(self._model, q + self._turns, self._clauses if cables else ())
+
+    def is_sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
+        """Whether the straight path between two poses (4,) rad is sound; its start does not count, for the robot is there."""
+        count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
+        shares = np.arange(1, count + 1)[:, None] / count
+        return bool(self.sound(start + shares * (end - start), cables).all())
+
+
+class Roadmap:
+    """An undirected graph of V vertices, poses of the arm (V, 4) rad.
+
+    A motion costs as much as an action, 1, and its length in fractions of the joints' ranges.
+    """
+
+    def __init__(self, vertices: Array, edges: Iterable[Edge], belief: Belief) -> None:
+        self.vertices, self.belief = vertices, belief
+        if not len(vertices):
+            raise InvalidValue("a roadmap without vertices: no sample was believed to be sound.")
+        self._costs: list[dict[int, float]] = [{} for _ in vertices]
+        for first, second in edges:
+            self._join(first, second)
+
+    @property
+    def edges(self) -> int:
+        """How many there are."""
+        return sum(len(costs) for costs in self._costs) // 2
+
+    def pose(self, vertex: int) -> Array:
+        """Of a vertex, (4,) rad."""
+        pose: Array = self.vertices[vertex]
+        return pose
+
+    def add(self, pose: Array, neighbours: int) -> int:
+        """Add a vertex and its motions to and from the nearest ones that are `reachable`; returns its number."""
+        joined = self.reachable(pose, neighbours)
+        self.vertices = np.concatenate([self.vertices, pose[None]])
+        self._costs.append({})
+        for vertex in joined:
+            self._join(len(self.vertices) - 1, vertex)
+        return len(self.vertices) - 1
+
+    def nearest(self, pose: Array, count: int) -> list[int]:
+        """The nearest vertices, by the distance in fractions of the ranges."""
+        return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
+
+    def reachable(self, pose: Array, neighbours: int) -> list[int]:
+        """Those of the nearest vertices to which the straight motion is sound; if there are none, is free of contacts; else all."""
+        near = self.nearest(pose, neighbours)
+        for cables in (True, False):  # a pose that violates the cables' constraints may be reached all the same
+            found = [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v], cables)]
+            if found:
+                return found
+        return near
+
+    def path(self, starts: dict[int, float], goal: int, blocked: Collection[Edge]) -> list[int] | None:
+        """The vertices of the cheapest path from one of the starts (with the cost to reach it) to the goal; None if there is none."""
+        best, before = dict(starts), dict.fromkeys(starts, -1)
+        queue = [(cost, vertex) for vertex, cost in starts.items()]
+        heapq.heapify(queue)
+        while queue:
+            cost, vertex = heapq.heappop(queue)
+            if vertex == goal:
+                path = [vertex]
+                while before[path[-1]] >= 0:
+                    path.append(before[path[-1]])
+                return path[::-1]
+            if cost > best[vertex]:
+                continue
+            for other, more in self._costs[vertex].items():
+                if cost + more < best.get(other, np.inf) and edge(vertex, other) not in blocked:
+                    best[other], before[other] = cost + more, vertex
+                    heapq.heappush(queue, (cost + more, other))
+        return None
+
+    def cost(self, pose: Array, vertex: int) -> float:
+        """Of the motion from a pose to a vertex."""
+        return 1.0 + float(np.linalg.norm((self.vertices[vertex] - pose) / self.belief.span))
+
+    def _lengths(self, pose: Array) -> Array:
+        lengths: Array = np.linalg.norm((self.vertices - pose) / self.belief.span, axis=1)
+        return lengths
+
+    def _join(self, first: int, second: int) -> None:
+        cost = self.cost(self.vertices[first], second)
+        self._costs[first][second] = self._costs[second][first] = cost
+
+
+def edge(first: int, second: int) -> Edge:
+    """The edge between two vertices, in either direction."""
+    return (first, second) if first < second else (second, first)
+
+
+def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
+    """A roadmap of one of the KINDS, every motion of which is believed to be sound."""
+    if kind == "OMPL":
+        return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
+    samples = np.flatnonzero(belief.sound(lattice.samples))
+    vertex = {int(state): number for number, state in enumerate(samples)}
+    wanted = {edge(vertex[s], vertex[int(g)]) for s in vertex for g in lattice.actions(s) if int(g) in vertex}
+    poses = lattice.samples[samples]
+    return Roadmap(poses, [(v, w) for v, w in sorted(wanted) if belief.is_sound_motion(poses[v], poses[w])], belief)
+
+
+def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
+    """Add the samples of goal states that are no vertices yet; returns the vertex of each state."""
+    found = {}
+    for state in sorted({int(goal) for goal in goals}):
+        sample = lattice.samples[state]
+        here = roadmap.nearest(sample, 1)[0]
+        found[state] = here if np.array_equal(roadmap.vertices[here], sample) else roadmap.add(sample, NEIGHBOURS)
+    return found
+
+
+class _Believed:
+    """A Judge by a belief, within the limits that exert no force."""
+
+    def __init__(self, belief: Belief) -> None:
+        self.low, self.span, self.box = belief.limits[:, 0], belief.span, belief.limits
+        self.sound_motion = belief.is_sound_motion
+        self._belief = belief
+
+    def sound(self, q: Array) -> NDArray[np.bool_]:
+        """See Judge."""
+        return self._belief.sound(q)
+
+
+def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
+    """Grow a PRM over the arm's four joints, in fractions of their ranges; raises OmplMissing."""
+    found = grown("PRM", _Believed(belief), milestones, neighbours, seed, resolution=STEP)
+    return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)

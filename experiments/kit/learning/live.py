@@ -1,0 +1,145 @@
+"""The same agents offline, and on the live processes in lockstep; finished transitions stay on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.cells import Cell
+from experiments.kit.learning.exploration import explore_together
+from experiments.kit.live.launch import LaunchFailed, summary_of
+from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, load_robot, load_world
+from mobee.plant import Plant
+from mobee.robot.robot import Robot
+from mobee.store import STORE, TransitionStore
+
+ROBOT, GAINS, RATE = "icub", "published_2014", 50  # of the robot that PyBullet simulates; Hz
+JOINTS = {
+    "torso": ("torso_yaw", "torso_roll", "torso_pitch"),
+    "left_arm": ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"),
+    "right_arm": ("r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"),
+}
+ROBOTS = {  # settings of robot_sim; PyBullet has physics of its own, its motors are what was identified
+    "pybullet": {"backend": "pybullet", "motors": "published"},
+    "kinematic": {"backend": "kinematic", "motors": "identified"},
+}
+PIECE = 200  # transitions a part of one launch
+_ACTION = 7.0  # s of robot time, a little more than the torso's take on average at the table
+_TRIES = 3  # launches without a single new transition
+
+_SCENARIO = """# Written by the experiment `simulation-transfer`.
+title = "Learning on {robot}, to be compared with the offline plant"
+
+[shared]
+robot = "{model}"
+world = "{world}"
+gains = "{gains}"
+seed = {seed}
+mode = "lock"
+
+[services.robot_sim]
+backend = "{backend}"
+motors = "{motors}"
+rate = {rate}
+
+[services.model]
+[services.controller]
+"""
+_AGENT = """
+[services.agent_{part}]
+joints = {joints}
+neighbours = {neighbours}
+seed = {agent_seed}
+run_dir = "{folder}"
+transitions = {transitions}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """The parts that learn, each with its number of actions a state, and their world."""
+
+    world: str
+    neighbours: Mapping[str, int]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts that learn."""
+        return tuple(self.neighbours)
+
+
+TASKS = {
+    "arms": Task(str(Path(__file__).with_name("empty.xml")), {"left_arm": 4, "right_arm": 4}),
+    "table": Task("table", {"torso": 4, "left_arm": 4, "right_arm": 4}),
+    "published": Task("table", {"torso": 8, "left_arm": 16, "right_arm": 16}),
+}
+
+
+def space(robot: Robot, task: Task, part: str) -> Lattice:
+    """The lattice of rank 3 of a part."""
+    return Lattice(robot, JOINTS[part], neighbours=task.neighbours[part])
+
+
+def offline_plant(task: Task, seed: int) -> OfflinePlant:
+    """The whole robot, with the motors that were identified on PyBullet."""
+    model = Model(load_robot(ROBOT), load_world(task.world))
+    return OfflinePlant(model, seed, Gains.named(GAINS), MotorParameters.identified(ROBOT), 1.0 / RATE)
+
+
+def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
+    """An agent for each part, as services.agents makes them."""
+    return [CuriousAgent(space(plant.robot, task, part), plant, seed=seed) for part in task.parts]
+
+
+def learn_offline(cell: Cell) -> dict[str, Any]:
+    """The work of a cell with the settings `task` and `transitions`: learn offline; the transitions of each part, (T, 3)."""
+    task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
+    plant = offline_plant(task, cell.seed)
+    logs = explore_together(agents(task, plant, cell.seed), plant, number)
+    return {f"seen_{part}": np.array(log.seen[:number], dtype=np.int32) for part, log in logs.items()}
+
+
+def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path, report: Callable[[int], None], piece: int = PIECE) -> None:
+    """Let every part of a task make that many transitions on one of the ROBOTS; goes on where an earlier call was broken off.
+
+    `report`: called with the number that the slowest part has, before each launch of `piece` transitions a part.  Raises LaunchFailed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    idle = 0
+    while (slowest := min((made := _made(folder, task)).values())) < transitions:
+        report(slowest)
+        more = min(transitions - slowest, piece)
+        scenario = folder / "scenario.toml"
+        # Each part makes as many more, also one that has enough: a part without work would end before the run begins, and be waited for.
+        scenario.write_text(_scenario(task, robot, seed, {part: made[part] + more for part in made}, slowest, folder.resolve()))
+        summary_of(str(scenario), ticks=round(_ACTION * RATE * more), runs=folder / "launches")
+        idle = 0 if min(_made(folder, task).values()) > slowest else idle + 1
+        if idle == _TRIES:
+            raise LaunchFailed(f"{folder}: {_TRIES} launches in a row made no transition; see their logs in {folder / 'launches'}")
+
+
+def _made(folder: Path, task: str) -> dict[str, int]:
+    """The number of transitions of each part in the store."""
+    path = folder / STORE
+    if not path.exists():
+        return dict.fromkeys(TASKS[task].parts, 0)
+    with TransitionStore(path, "", read_only=True) as store:
+        return {part: len(store.load(part)) for part in TASKS[task].parts}
+
+
+def _scenario(task: str, robot: str, seed: int, goals: Mapping[str, int], slowest: int, folder: Path) -> str:
+    """The seed of robot and encoders differs from piece to piece, that of the agents, which their store holds, does not."""
+    wanted = TASKS[task]
+    text = _SCENARIO.format(
+        robot=robot, model=ROBOT, world=wanted.world, gains=GAINS, rate=RATE, seed=1000 * seed + slowest, **ROBOTS[robot]
+    )
+    for part in wanted.parts:
+        joints = str(list(JOINTS[part])).replace("'", '"')
+        text += _AGENT.format(
+            part=part, joints=joints, neighbours=wanted.neighbours[part], agent_seed=seed, folder=folder, transitions=goals[part]
+        )
+    return text

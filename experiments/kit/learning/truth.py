@@ -1,0 +1,159 @@
+"""True outcomes of the actions of a plant, measured by many tries, and the error of transition models beside them.
+
+The end of an action depends on the pose in its cell, and the momentum, with which the part arrived.  So the tries are those of a walk
+through the states, which begins each action at the end of the last one, as an agent does: half of its steps go to a random
+neighbour, half towards actions that lack tries.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.learning.exploration import begin_nearby
+from mobee import Plant, TransitionModel, run_batch, value_iteration
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.learning.explorers import choose
+from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
+from mobee.learning.value_iteration import OutcomeModel
+
+ANYWHERE = 0.5  # share of a walk's steps that go to a random neighbour
+DISCOUNT, TOLERANCE = 0.9, 0.01
+CERTAIN = 0.9  # probability of the most likely outcome, below which an action is stochastic
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Frequencies of the outcomes of each action, as an OutcomeModel.
+
+    `outcomes`, `probabilities`: (S, A, B); no probability where there is no action or no try.  `tries`: (S, A).
+    `settings`: of the space.
+    """
+
+    outcomes: Ints
+    probabilities: Array
+    tries: Ints
+    settings: dict[str, Any]
+
+    def save(self, path: Path) -> None:
+        """Write it as .npz."""
+        np.savez_compressed(
+            path, outcomes=self.outcomes, probabilities=self.probabilities, tries=self.tries, settings=json.dumps(self.settings)
+        )
+
+
+def load_truth(path: Path, space: Space) -> Truth:
+    """Read what `Truth.save` wrote; raises InvalidValue if it is of another space."""
+    with np.load(path) as file:
+        truth = Truth(file["outcomes"], file["probabilities"], file["tries"], json.loads(str(file["settings"])))
+    if truth.settings["digest"] != space.settings["digest"]:
+        raise InvalidValue(f"{path} is about another space, {truth.settings}: measure the truth of this one, {space.settings}.")
+    return truth
+
+
+def truth_of(space: Space, seen: Ints) -> Truth:
+    """The frequencies of outcomes in transitions, shape (T, 3): state, action, state reached."""
+    states, actions = space.goals.shape
+    keys, counts = np.unique(np.ravel_multi_index(tuple(seen.T), (states, actions, states)), return_counts=True)
+    pair, reached = np.divmod(keys, states)
+    first = np.searchsorted(pair, pair)  # of the outcomes of the same state-action
+    bin_ = np.arange(len(pair)) - first
+    outcomes = np.zeros((states * actions, max(bin_, default=0) + 1), dtype=np.intp)
+    counted = np.zeros(outcomes.shape)
+    outcomes[pair, bin_], counted[pair, bin_] = reached, counts
+    tries = counted.sum(axis=1, keepdims=True)
+    shape = (states, actions, -1)
+    probabilities = counted / np.maximum(tries, 1.0)
+    return Truth(
+        outcomes.reshape(shape), probabilities.reshape(shape), tries.reshape(states, actions).astype(np.intp), dict(space.settings)
+    )
+
+
+def measure_truth(
+    space: Space, plant_of: Callable[[int], Plant], tries: int, seeds: Iterable[int], most: int, processes: int | None = None
+) -> Truth:
+    """The frequencies in walks that try every action that often, one walk a seed, at the same time.
+
+    Args:
+        space: states and actions.
+        plant_of: a function of a module that makes a plant of a seed.
+        tries: of each action in each walk.
+        seeds: of walks and plants.
+        most: actions of a walk, where some states cannot be reached.
+        processes: None: one a core.
+    """
+    seen = run_batch(partial(walk, space, plant_of, tries, most), seeds, processes)
+    return truth_of(space, np.concatenate(seen))
+
+
+def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, seed: int) -> Ints:
+    """The transitions of a walk until it has tried every action that often, shape (T, 3): state, action, state reached."""
+    plant, rng = plant_of(seed), np.random.default_rng(seed)
+    model, values = TransitionModel(space), np.zeros(len(space))
+    state = begin_nearby(space, plant, seed)
+    lacking = np.where(space.goals == NO_ACTION, 0.0, 1.0)
+    seen: list[tuple[int, int, int]] = []
+    while lacking.any() and len(seen) < most:
+        if rng.random() < ANYWHERE:
+            action = int(rng.integers(len(space.actions(state))))
+        else:
+            values, found = value_iteration(model.debiased(), lacking, DISCOUNT, TOLERANCE, values)
+            action = choose(found[state], rng)
+        outcome = plant.act(space.part, space.target(space.goal(state, action)))
+        reached = space.state_of(outcome.q[space.columns])
+        model.observe(state, action, reached)
+        lacking[state, action] = max(0.0, 1.0 - model.tries[state, action] / tries)
+        seen.append((state, action, reached))
+        state = reached
+    return np.array(seen, dtype=np.intp).reshape(-1, 3)
+
+
+def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
+    """The sum of |p - q| over the outcomes of each state-action, 0 to 2, shape (S, A); NaN where the truth is not known.
+
+    Bins of the two may differ in order and number, and several may be of one state.
+    """
+    states, actions = truth.outcomes.shape[:2]
+    pair = np.arange(states * actions)[:, None]
+    keys, signed = [], []
+    for model, sign in ((beliefs, 1.0), (truth, -1.0)):
+        probabilities = model.probabilities.reshape(states * actions, -1)
+        keys.append((pair * states + model.outcomes.reshape(probabilities.shape))[probabilities > 0.0])
+        signed.append(sign * probabilities[probabilities > 0.0])
+    found, index = np.unique(np.concatenate(keys), return_inverse=True)
+    difference = np.abs(np.bincount(index, weights=np.concatenate(signed)))
+    error = np.bincount(found // states, weights=difference, minlength=states * actions).reshape(states, actions)
+    return np.where(truth.probabilities.any(axis=-1), error, np.nan)
+
+
+def most_likely(truth: OutcomeModel) -> Array:
+    """The probability of each action's most likely outcome, shape (S, A); NaN where the truth is not known."""
+    highest: Array = truth.probabilities.max(axis=-1)
+    return np.where(highest > 0.0, highest, np.nan)
+
+
+def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, float]:
+    """Mean L1 over all state-actions, and over the stochastic ones: those whose most likely outcome has less than .9 (NaN: none)."""
+    error = l1(beliefs, truth)
+    stochastic = most_likely(truth) < CERTAIN
+    return float(np.nanmean(error)), float(error[stochastic].mean()) if stochastic.any() else float("nan")
+
+
+def sampling_error(truth: Truth) -> Array:
+    """The expected L1 distance between these frequencies and the distribution they were drawn from, shape (S, A); NaN untried.
+
+    The sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)): no smaller error of a
+    model can be measured.
+    """
+    p = truth.probabilities
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error: Array = np.sqrt(2.0 * p * (1.0 - p) / (np.pi * truth.tries[..., None])).sum(axis=-1)
+    return error

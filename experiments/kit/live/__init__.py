@@ -1,0 +1,1 @@
+"""Shared by experiments that run the live system."""

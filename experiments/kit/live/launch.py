@@ -1,0 +1,184 @@
+"""Launches a live system of real processes, with or without a performer, and exchanges files with it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from mobee.errors import MobeeError
+
+_STARTS, _ENDS = 120.0, 30.0  # s
+_LOOK = 0.5  # s between two calls of who watches
+TABLE = Path(__file__).with_name("table.xml")  # a world: the iCub's table with nothing on it
+
+
+class LaunchFailed(MobeeError):
+    """A system that did not come to its end; the message is its last word."""
+
+
+def summary_of(
+    scenario: str,
+    settings: Sequence[str] = (),
+    *,
+    duration: float | None = None,
+    ticks: int | None = None,
+    environment: Mapping[str, str] | None = None,
+    runs: Path | None = None,
+    watch: Callable[[int], None] = lambda pid: None,
+) -> dict[str, Any]:
+    """Launch a scenario without monitor, wait for its end, and return its summary.  Raises LaunchFailed.
+
+    It ends after `duration` seconds, or in lockstep after so many `ticks`.  `runs`: where its folder stays; None: nowhere.
+    `watch` is called with the launcher's process id twice a second.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
+        argv += ["--runs", str(runs or scratch)]
+        argv += [] if duration is None else ["--duration", str(duration)]
+        argv += [] if ticks is None else ["--ticks", str(ticks)]
+        for setting in settings:
+            argv += ["--set", setting]
+        # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
+        process = subprocess.Popen(
+            argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0, env={**os.environ, **(environment or {})}
+        )
+        try:
+            said, news = _watched(process, watch, math.inf if ticks else _STARTS + _ENDS + (duration or 0.0))
+        except subprocess.TimeoutExpired:
+            raise LaunchFailed(f"{scenario}: no end in sight") from None
+        finally:
+            stop(process)
+    if process.returncode != 0:
+        raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(news.strip().splitlines() or ['it said nothing'])[-1]}")
+    return dict(json.loads(said))
+
+
+def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], seconds: float) -> tuple[str, str]:
+    """What it said on both streams until its end; raises TimeoutExpired."""
+    late = time.monotonic() + seconds
+    while True:
+        try:
+            said, news = process.communicate(timeout=_LOOK)
+        except subprocess.TimeoutExpired:
+            if time.monotonic() > late:
+                raise
+            watch(process.pid)
+        else:
+            return said, news
+
+
+def stop(process: subprocess.Popen[Any]) -> int:
+    """End a system that leads a group of its own, in order if it can; returns its exit code."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.communicate(timeout=_ENDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    return int(process.returncode)
+
+
+def free_endpoint() -> str:
+    """An address on which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+T = TypeVar("T", bound=Struct)
+JOB, DONE = "job.json", "done.jsonl"
+
+
+def write_job(folder: Path, job: Struct) -> None:
+    """Into a folder that it makes; what a launch that was broken off has left there goes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / DONE).unlink(missing_ok=True)
+    (folder / JOB).write_bytes(msgspec.json.encode(job))
+
+
+def read_job(folder: Path, kind: type[T]) -> T:
+    """What `write_job` wrote."""
+    return msgspec.json.decode((folder / JOB).read_bytes(), type=kind)
+
+
+def append_done(folder: Path, record: Struct) -> None:
+    """It is in the file when this returns."""
+    with (folder / DONE).open("ab") as file:
+        file.write(msgspec.json.encode(record) + b"\n")
+
+
+def read_done(folder: Path, kind: type[T]) -> list[T]:
+    """All of a launch; none if there is no file."""
+    path = folder / DONE
+    return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()] if path.exists() else []
+
+
+PATIENCE = 60.0  # s for a tick of lockstep: the performer plans in one
+
+_SCENARIO = """# Written by an experiment.
+title = "{title}"
+
+[shared]
+robot = "icub"
+gains = "default"
+seed = {seed}
+{mode}
+
+[services.robot_sim]
+world = "{simulated}"
+rate = {rate:g}
+record = "{folder}"
+
+[services.model]
+world = "{world}"
+
+[services.controller]
+speed_scale = {speed:g}
+
+[services.performer]
+module = "experiments.kit.live.performer"
+perform = "{perform}"
+run_dir = "{folder}"
+"""
+
+
+def launch(
+    folder: Path,
+    perform: str,
+    *,
+    title: str,
+    world: str,
+    seed: int,
+    rate: float,
+    speed: float,
+    seconds: float,
+    lockstep: bool = True,
+    simulated: str = "",
+) -> dict[str, Any]:
+    """Launch the system with a performer; its recording is left in the folder, and its summary returned.
+
+    `perform`: the performer's function, see `Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time,
+    after which the system ends; `simulated`: the simulator's world where it is not the model's.  Raises LaunchFailed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
+    scenario = folder / "scenario.toml"
+    values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
+    values |= {"rate": rate, "speed": speed, "perform": perform}
+    scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
+    limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
+    return summary_of(str(scenario), runs=folder / "launch", **limit)

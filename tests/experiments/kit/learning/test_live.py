@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.kit.cells import Cell, write_cell
+from experiments.kit.learning import live as live_learning
+from experiments.kit.learning.live import RATE, ROBOTS, TASKS, agents, learn_live, offline_plant
+from experiments.kit.learning.outcome_distance import compared
+from experiments.kit.live.launch import LaunchFailed
+from mobee.store import STORE, Transition, TransitionStore
+from services.launcher.scenario import read_scenario
+
+
+def made(folder, part, count, end=1):
+    with TransitionStore(folder / STORE, part) as store:
+        for n in range(len(store.load()) + 1, count + 1):
+            store.append(Transition(n, 0, 0, end, 0.0, True, 4.0, (0.0,)))
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_launcher_takes_the_scenario_and_its_agents_are_those_of_the_offline_plant(tmp_path, monkeypatch, task, robot):
+    started = []
+
+    def launched(path, ticks, runs):
+        started.append((read_scenario(path), ticks))
+        for part in TASKS[task].parts:
+            made(tmp_path, part, 30)
+        return {}
+
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live(task, robot, 3, 30, tmp_path, lambda number: None)
+    ((scenario, ticks),) = started
+    configs = {part.who: part.config for part in scenario.parts}
+    assert scenario.is_locked and ticks > 30 * 4 * RATE
+    assert configs["robot_sim"].backend == robot and configs["robot_sim"].rate == RATE
+    assert configs["robot_sim"].motors == ("published" if robot == "pybullet" else "identified")
+    offline = agents(TASKS[task], offline_plant(TASKS[task], 3), 3)
+    assert [f"agent_{agent.part}" for agent in offline] == [who for who in configs if who.startswith("agent_")]
+    for agent in offline:
+        config = configs[f"agent_{agent.part}"]
+        assert (config.joints, config.neighbours, config.seed) == (agent.space.joints, agent.space.neighbours, agent.seed)
+        assert (config.explorer, config.discount, config.initial, config.transitions) == ("curious", 0.9, "50-50", 30)
+
+
+def test_it_goes_on_with_another_seed_until_all_parts_have_enough(tmp_path, monkeypatch):
+    seeds, told = [], []
+
+    def launched(path, ticks, runs):
+        scenario = read_scenario(path)
+        seeds.append(next(part.config.seed for part in scenario.parts if part.who == "robot_sim"))
+        made(tmp_path, "left_arm", 10 * len(seeds))
+        made(tmp_path, "right_arm", 10 * len(seeds) - 3)
+        return {}
+
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live("arms", "kinematic", 0, 25, tmp_path, told.append)
+    assert told == [0, 7, 17] and len(set(seeds)) == 3
+
+
+def test_a_system_that_makes_nothing_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr(live_learning, "summary_of", lambda path, ticks, runs: {})
+    with pytest.raises(LaunchFailed, match="no transition"):
+        learn_live("arms", "pybullet", 0, 25, tmp_path, lambda number: None)
+
+
+def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_others(tmp_path):
+    for seed in range(3):
+        rows = np.array([(0, 0, 1)] * 4 + [(1, 0, seed)] * 4)
+        write_cell(
+            tmp_path, Cell(f"arms-s{seed}", seed, {"task": "arms", "transitions": 8}), {"seen_left_arm": rows, "seen_right_arm": rows}, 1.0
+        )
+    (tmp_path / "arms" / "pybullet").mkdir(parents=True)
+    for part in TASKS["arms"].parts:
+        made(tmp_path / "arms" / "pybullet", part, 9, end=2)
+    found = compared(tmp_path, "arms", 4)
+    assert [one.variation for one in found.offline] == [0.5, 0.5, 0.5]
+    assert (found.live["pybullet"].variation, found.live["pybullet"].agree, found.live["pybullet"].compared) == (1.0, 0.0, 2)
+    assert found.counts["pybullet"]["left_arm"].sum() == 8  # as many as the offline seeds made
+
+
+def test_a_part_that_has_enough_goes_on_with_the_others_so_that_none_waits_for_it(tmp_path, monkeypatch):
+    left = []
+
+    def launched(path, ticks, runs):
+        goals = {part.who.removeprefix("agent_"): part.config.transitions for part in read_scenario(path).parts if "agent_" in part.who}
+        left.append(goals)
+        for part, goal in goals.items():
+            made(tmp_path, part, goal - (4 if part == "right_arm" and len(left) == 1 else 0))
+        return {}
+
+    monkeypatch.setattr(live_learning, "summary_of", launched)
+    learn_live("arms", "kinematic", 0, 25, tmp_path, lambda number: None)
+    assert left == [{"left_arm": 25, "right_arm": 25}, {"left_arm": 29, "right_arm": 25}]

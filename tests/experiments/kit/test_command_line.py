@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from experiments.kit.command_line import positive_number, positive_whole, whole_from_two
+
+
+def test_numbers_are_read() -> None:
+    assert (positive_whole("7"), whole_from_two("2"), positive_number("2.5e-1")) == (7, 2, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("read", "text"),
+    [(positive_whole, "0"), (positive_whole, "-1"), (positive_whole, "1.5"), (positive_whole, "²"), (whole_from_two, "1")]
+    + [(positive_number, text) for text in ("0", "-2", "nan", "inf", "few")],
+)
+def test_what_is_none_is_refused(read, text) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match=f"'{text}'"):
+        read(text)
