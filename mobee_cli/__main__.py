@@ -74,14 +74,19 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: {message}; `{self.prog} --help` tells more\n")
 
 
+def parser_of(verb: str) -> argparse.ArgumentParser:
+    """The parser of a verb's options; imports the verb's module."""
+    parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
+    importlib.import_module(f"mobee_cli.{verb}").add_arguments(parser)
+    return parser
+
+
 def _run(verb: str, arguments: list[str]) -> int:
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     try:
-        module = importlib.import_module(f"mobee_cli.{verb}")
-        parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
-        module.add_arguments(parser)
-        return int(module.run(parser.parse_args(arguments)))
+        parser = parser_of(verb)
+        return int(importlib.import_module(f"mobee_cli.{verb}").run(parser.parse_args(arguments)))
     except UserError as error:
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return error.code

@@ -1,0 +1,42 @@
+"""Settings of Sphinx for the documentation's site; docs/site/build.py prepares the pages and calls Sphinx."""
+
+from __future__ import annotations
+
+import re
+from importlib import metadata
+from typing import Any
+
+project = "MoBeE"
+author = "The MoBeE developers"
+copyright = author  # noqa: A001  (the name that Sphinx asks for)
+release = version = metadata.version("mobee")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "docs/index"
+html_theme = "furo"
+html_title = "MoBeE"
+html_copy_source = False
+html_show_sourcelink = False
+
+myst_heading_anchors = 6  # a link to page.md#heading is checked, by the rule with which GitHub names headings
+
+autodoc_member_order = "bysource"
+autodoc_type_aliases = {name: name for name in ("Array", "Ints", "Bools")}
+autodoc_default_options = {"members": True, "show-inheritance": True}
+napoleon_numpy_docstring = False
+suppress_warnings = ["ref.python"]  # annotations hold short names, such as Pose, which the library and the bus both have
+
+
+def _as_restructured_text(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Make of a docstring's Markdown, `code` and plain text, what reStructuredText shows in the same way."""
+    del app, what, name, thing, options
+    for at, line in enumerate(lines):
+        pieces = re.split(r"(`+[^`]+`+)", line)
+        pieces[::2] = [re.sub(r"([*|])|_(?=\W|$)", lambda found: "\\" + found[0], piece) for piece in pieces[::2]]
+        pieces[1::2] = [f"``{piece.strip('`')}``" for piece in pieces[1::2]]
+        lines[at] = "".join(pieces)
+
+
+def setup(app: Any) -> None:
+    """Tell Sphinx about the conversion of docstrings; it comes before that of napoleon."""
+    app.connect("autodoc-process-docstring", _as_restructured_text, priority=100)
