@@ -1,4 +1,4 @@
-"""The action of one part: owner, target, state."""
+"""The action of one part: owner, target, status."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mobee.control import Settle, SettleTest
 
 @dataclass
 class Owner:
-    """One process, as long as its token lives."""
+    """The process that owns a part's goal, as long as its liveliness token exists."""
 
     who: str
     instance: str
@@ -20,7 +20,7 @@ class Owner:
 
 
 class Action:
-    """Goal ownership and action state of a part; times in s of the bus clock, ticks in k."""
+    """Goal ownership and action status of a part; times in s of the bus clock, ticks in k."""
 
     def __init__(self, settle: Settle) -> None:
         self._settle = settle
@@ -33,42 +33,42 @@ class Action:
     def start(self, action_id: str, k: int, t: float) -> None:
         """A goal was set at tick k."""
         self.id, self.start_k = action_id, k
-        self.go_on(k, t)
+        self.settle_again(k, t)
 
-    def go_on(self, k: int, t: float) -> None:
-        """The same action has to settle once more, from tick k on."""
+    def settle_again(self, k: int, t: float) -> None:
+        """The same action continues at tick k, and ends when the part has settled once more."""
         self._test = SettleTest(self._settle, t)
-        self._become("moving", k)
+        self._set_status("moving", k)
 
-    def look(self, k: int, t: float, speeds: Array, accelerations: Array, is_under_way: Callable[[], bool] = lambda: False) -> None:
-        """See whether the motion has died down; `is_under_way`: whether an action that has settled is not over all the same."""
+    def update(self, k: int, t: float, speeds: Array, accelerations: Array, continues: Callable[[], bool] = lambda: False) -> None:
+        """Test whether the motion has settled; an action whose motion has settled is still "moving" while `continues` is true."""
         if self._test is not None and self.status == "moving":
             verdict = self._test.look(t, speeds, accelerations)
-            self._become("moving" if verdict == "settled" and is_under_way() else verdict, k)
+            self._set_status("moving" if verdict == "settled" and continues() else verdict, k)
 
     def hold(self, k: int) -> None:
-        """The part is not under control: whatever was going on ended without an outcome."""
+        """The part is not under control: its action has ended without an outcome."""
         self._test = None
-        self._become("held", k)
+        self._set_status("held", k)
 
     def resume(self, k: int) -> None:
-        """Under control again, at rest, with nothing to do."""
+        """Under control again, at rest, without an action."""
         self.id = ""
-        self._become("idle", k)
+        self._set_status("idle", k)
 
-    def drop(self, k: int) -> None:
-        """The owner is gone: its action ends, the part stays."""
+    def lose_owner(self, k: int) -> None:
+        """The owner is gone: its action ends."""
         self.owner, self._test = None, None
         if self.status != "held":
             self.resume(k)
 
-    def _become(self, status: MotionStatus, k: int) -> None:
+    def _set_status(self, status: MotionStatus, k: int) -> None:
         if status != self.status:
             self.status, self.since_k = status, k
 
 
 def busy_owners(actions: Iterable[Action]) -> list[str]:
-    """Services with nothing to decide: every part that they own is moving."""
+    """Services with nothing to decide, because every part that they own is moving."""
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:

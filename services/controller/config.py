@@ -9,7 +9,7 @@ from msgspec import Meta
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
-from services.controller.terms import load_terms
+from services.controller.forces import load_terms
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Takes and arms the drives of all parts, and again after each hold."""
+"""Takes and arms the drives of all parts at robot_sim, and again after each hold."""
 
 from __future__ import annotations
 
@@ -12,65 +12,70 @@ from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
-RETRY = 0.2  # s between attempts to arm a part
-SHOWS = 0.1  # s after which the state of a part must show that it was armed
+RETRY_PERIOD = 0.2  # s between attempts to arm a part
+CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was armed
 
 
 class Drives:
-    """The drive epoch of each part, and whether robot_sim obeys it.
+    """The drive epoch of each part, and whether robot_sim follows this controller's commands.
 
-    Never waits for an answer: while one part is armed the others need their commands.  In lockstep its times are those of the bus.
+    No method waits for an answer: while one part is being armed, the others need their commands.  Times are of the monotonic clock, in
+    lockstep of the bus clock.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         self._service, self._patience = service, service.patience
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         self._next_try = dict.fromkeys(robot.parts, 0.0)
-        self._shows_by = dict.fromkeys(robot.parts, 0.0)
-        self._stopped = False  # an emergency stop outlives a robot_sim that dies under it
-        self._asking: dict[str, object] = {}  # part -> mark of the attempt under way
-        self.answered: Callable[[], None] = lambda: None  # an attempt is over
+        self._confirm_by = dict.fromkeys(robot.parts, 0.0)
+        self._stopped = False  # an emergency stop outlives a robot_sim that dies
+        self._attempts: dict[str, object] = {}  # part -> identity of the attempt in progress
+        self._on_attempt_end: list[Callable[[], None]] = []
+
+    def on_attempt_end(self, handler: Callable[[], None]) -> None:
+        """Call the handler when an attempt to arm a part has succeeded or failed."""
+        self._on_attempt_end.append(handler)
 
     @property
-    def asking(self) -> bool:
-        """Whether an attempt to arm a part is under way."""
-        return bool(self._asking)
+    def is_arming(self) -> bool:
+        """Whether an attempt to arm a part is in progress."""
+        return bool(self._attempts)
 
     def _now(self) -> float:
         return self._service.bus.t * 1e-9 if self._service.locked else time.monotonic()
 
-    def armed(self, part: str, state: PartStatus) -> bool:
-        """Whether the part does what this controller commands, as of its newest state; or will have, if it was armed just now."""
+    def is_armed(self, part: str, state: PartStatus) -> bool:
+        """Whether the part follows this controller's commands, by its newest state, or because it was armed just now."""
         if self.epochs[part] == 0:
             return False
         if state.epoch == self.epochs[part] and state.gate == "armed":
-            self._shows_by[part] = 0.0
+            self._confirm_by[part] = 0.0
             return True
-        return self._now() < self._shows_by[part]
+        return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """A new run of robot_sim: all epochs are void, and answers still to come are too."""
+        """A new run of robot_sim: all epochs, and answers that are still to come, are void."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
-        self._asking.clear()
+        self._attempts.clear()
 
     def note_stop(self, message: EStop) -> None:
-        """An emergency stop, or its reset: between them nothing is armed."""
+        """Note an emergency stop or its reset; between them nothing is armed."""
         self._stopped = message.set
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Whether a part in that state may be taken and armed."""
+        """Whether a part in this state may be taken and armed."""
         return not self._stopped and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:
-        """Begin to take and arm a part that is idle or in hold; `armed` says when it is done."""
+        """Begin to take and arm a part that is idle or in hold; `is_armed` tells when it has succeeded."""
         now = self._now()
-        if not self.can_arm(state) or now < self._next_try[part] or part in self._asking:
+        if not self.can_arm(state) or now < self._next_try[part] or part in self._attempts:
             return
-        if not self._service.locked or self._service.bus.k > 0:  # tick 0 is repeated until all are there, and its time stands still
-            self._next_try[part] = now + RETRY
+        if not self._service.locked or self._service.bus.k > 0:  # in tick 0, which is repeated, time stands still
+            self._next_try[part] = now + RETRY_PERIOD
         self.epochs[part] = 0
-        attempt = self._asking[part] = object()
+        attempt = self._attempts[part] = object()
         self._service.ask(
             keys.drive(part, "take"),
             Taken,
@@ -81,7 +86,7 @@ class Drives:
         )
 
     def _taken(self, part: str, attempt: object, answer: Taken | CallFailed) -> None:
-        if self._asking.get(part) is not attempt:
+        if self._attempts.get(part) is not attempt:
             return
         if isinstance(answer, CallFailed):
             self._failed(part, str(answer))
@@ -97,18 +102,22 @@ class Drives:
         )
 
     def _driven(self, part: str, attempt: object, epoch: int, answer: Driven | CallFailed) -> None:
-        if self._asking.get(part) is not attempt:
+        if self._attempts.get(part) is not attempt:
             return
         if isinstance(answer, CallFailed) or answer.gate != "armed":
             self._failed(part, str(answer) if isinstance(answer, CallFailed) else f"gate {answer.gate}")
             return
-        del self._asking[part]
+        del self._attempts[part]
         self.epochs[part] = epoch
-        self._shows_by[part] = self._now() + SHOWS
+        self._confirm_by[part] = self._now() + CONFIRM_TIME
         self._service.bus.event("info", "armed", f"{part} is under control, epoch {epoch}")
-        self.answered()
+        self._end_attempt()
 
     def _failed(self, part: str, why: str) -> None:
-        del self._asking[part]
+        del self._attempts[part]
         self._service.log.info("%s cannot be armed yet: %s", part, why)
-        self.answered()
+        self._end_attempt()
+
+    def _end_attempt(self) -> None:
+        for handler in self._on_attempt_end:
+            handler()

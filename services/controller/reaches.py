@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from bus_schema.messages import Reach as ReachMessage
 from bus_schema.messages import ReachPhase, Targets, Tick
 from bus_schema.rpc import ReachFor
-from mobee import Controller
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.model.hands import MAX_HANDS
@@ -18,49 +17,50 @@ from mobee.reach import ReachTarget
 from mobee.robot.robot import Robot
 from services.common.bus import Bus
 from services.controller.action import Action
+from services.controller.law import RobotLaw
 
-NEWS = 0.01  # s of real time: so often a reach under way is told of in free mode, where messages may be lost
-REST = 10  # times that, when it is over
+PUBLISH_PERIOD = 0.01  # s of real time between two messages of a reach in free mode, where messages may be lost
+ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 
 
 @dataclass
 class Reach:
-    """The last reach of a part; q (n,) rad and what follows are of the force's end, tick `end_k`."""
+    """The last reach of a part.  From `q` on the fields are of the tick `end_k`, in which the force ended."""
 
     action_id: str
     marker: str
     object: str
     target: ReachTarget
     stay: bool
-    q: Array
-    position: Array  # (3,) m
+    q: Array  # (n,) rad, measured
+    position: Array  # (3,) m, of the marker
     end_k: int
     phase: ReachPhase = "reaching"
     settled: bool = False
     touched: tuple[str, ...] = ()
 
 
-class ReachesUnderWay:
+class Reaches:
     """Begins, follows and ends the reaches of all parts."""
 
-    def __init__(self, bus: Bus, robot: Robot, law: Controller, actions: Mapping[str, Action], measured: Callable[[], Array]) -> None:
-        """`measured`: q (n,) rad at the newest tick."""
-        self._bus, self._robot, self._law, self._actions, self._measured = bus, robot, law, actions, measured
+    def __init__(self, bus: Bus, robot: Robot, law: RobotLaw, actions: Mapping[str, Action]) -> None:
+        self._bus, self._robot, self._law, self._actions = bus, robot, law, actions
         self._last: dict[str, Reach] = {}
         self._streams = {part: bus.publisher(ReachMessage, part) for part in robot.parts}
 
     def begin(self, part: str, asked: ReachFor) -> None:
-        """Force the part from now on.  Raises InvalidValue, UnknownName for what cannot be reached for."""
+        """Draw the part's marker to its target from now on; raises InvalidValue or UnknownName if it cannot reach for that."""
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
         if len(others) >= MAX_HANDS:
             raise InvalidValue(f"{' and '.join(sorted(others))} are reaching: at most {MAX_HANDS} markers may reach at once")
-        self._law.reach_toward(part, asked.marker, target)
-        self._last[part] = Reach(asked.action_id, asked.marker, asked.object, target, asked.stay, *self._here(asked.marker), self._bus.k)
-        self._tell(part)
+        self._law.reach(part, asked.marker, target)
+        position = self._law.marker_position(asked.marker)
+        self._last[part] = Reach(asked.action_id, asked.marker, asked.object, target, asked.stay, self._law.q, position, self._bus.k)
+        self._publish(part)
 
-    def aim(self, targets: Targets) -> None:
-        """The model has seen where the targets are; one that it knows no more, or where none can be, is where it was."""
+    def follow_targets(self, targets: Targets) -> None:
+        """Take the targets' new positions; a target that has none, or an invalid one, stays where it was."""
         for part, reach in self._last.items():
             position = targets.positions.get(reach.object)
             if reach.phase == "reaching" and position is not None and position != reach.target.position.tolist():
@@ -69,10 +69,10 @@ class ReachesUnderWay:
                 except InvalidValue as error:
                     self._bus.reject("value", f"{reach.object} at tick {targets.re_k}: {error}")
                     continue
-                self._law.reach_toward(part, reach.marker, reach.target)
+                self._law.reach(part, reach.marker, reach.target)
 
-    def look(self, part: str, tick: Tick, touched: list[str]) -> None:
-        """Let go of a part whose action has come to its end: it is drawn back, and has to settle once more, unless it is to stay."""
+    def update(self, part: str, tick: Tick) -> None:
+        """When the part has settled or timed out, end the force; the part is drawn back and must settle again, unless it is to stay."""
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):
             return
@@ -80,39 +80,36 @@ class ReachesUnderWay:
             reach.phase = "over"
         else:
             self._law.end_reach(part)
-            reach.q, reach.position = self._here(reach.marker)
-            reach.end_k = tick.k
-            reach.settled, reach.touched, reach.phase = action.status == "settled", tuple(touched), "over" if reach.stay else "returning"
+            self._measure(reach, tick.k)
+            reach.settled, reach.touched = action.status == "settled", tuple(self._law.forces.touched(part))
+            reach.phase = "over" if reach.stay else "returning"
             if reach.stay:
                 self._law.set_attractor(part, reach.q[self._robot.part(part).slice])
             else:
-                action.go_on(tick.k, tick.t * 1e-9)
-        self._tell(part)
+                action.settle_again(tick.k, tick.t * 1e-9)
+        self._publish(part)
 
-    def drop(self, part: str) -> None:
+    def interrupt(self, part: str) -> None:
         """End the part's reach, if there is one, without an outcome."""
         reach = self._last.get(part)
         if reach is not None and reach.phase in ("reaching", "returning"):
             self._law.end_reach(part)
             reach.phase = "interrupted"
-            self._tell(part)
+            self._publish(part)
 
-    def tell(self, tick: Tick) -> None:
-        """Free mode: tell of all reaches again now and then."""
-        period = max(1, round(1e9 * NEWS * tick.rate / tick.dt))
+    def publish_regularly(self, tick: Tick) -> None:
+        """Free mode: publish all reaches again from time to time."""
+        period = max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt))
         for part, reach in self._last.items():
-            if tick.k % (period if reach.phase in ("reaching", "returning") else REST * period) == 0:
+            if tick.k % (period if reach.phase in ("reaching", "returning") else ENDED_PERIODS * period) == 0:
                 if reach.phase == "reaching":
-                    reach.q, reach.position = self._here(reach.marker)
-                    reach.end_k = tick.k
-                self._tell(part)
+                    self._measure(reach, tick.k)
+                self._publish(part)
 
-    def _here(self, marker: str) -> tuple[Array, Array]:
-        """The encoders (n,) rad, and where a marker is by them, (3,) m."""
-        q = self._measured()
-        return q, self._law.model.evaluate(q).position(marker)
+    def _measure(self, reach: Reach, k: int) -> None:
+        reach.q, reach.position, reach.end_k = self._law.q, self._law.marker_position(reach.marker), k
 
-    def _tell(self, part: str) -> None:
+    def _publish(self, part: str) -> None:
         reach = self._last[part]
         self._streams[part].put(
             action_id=reach.action_id,

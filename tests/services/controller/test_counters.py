@@ -2,16 +2,16 @@ from __future__ import annotations
 
 import pytest
 
-from services.controller import commanding as counters
-from services.controller.commanding import Counters
+from services.controller import publish
+from services.controller.publish import Counters
 
 
 def test_the_first_step_has_no_period_and_the_others_are_compared_with_what_was_due(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter((5.0, 5.012, 5.02))
-    monkeypatch.setattr(counters.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(publish.time, "monotonic", lambda: next(clock))
     counted = Counters()
-    counted.watch_period(0.01)
+    counted.note_step(0.01)
     assert counted.numbers()["jitter_ms_p99"] == -1.0
-    counted.watch_period(0.01)
-    counted.watch_period(0.01)
+    counted.note_step(0.01)
+    counted.note_step(0.01)
     assert counted.numbers()["jitter_ms_p50"] == pytest.approx(2.0)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from mobee import Controller, Gains, Model
-from services.controller.warm import warm
+from services.controller.law import warm_up
 from tests.services.controller.stage import ROBOT
 
 
 @pytest.mark.parametrize("gains", ["default", "published_2014"])
 def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
     warmed, new = (Controller(Model(ROBOT), Gains.named(gains), "velocity") for _ in range(2))
-    warm(warmed, ROBOT)
+    warm_up(warmed, ROBOT)
     q = ROBOT.home + 0.01
     for _ in range(3):
         assert np.array_equal(warmed.step(q, 0.01).velocity, new.step(q, 0.01).velocity)
@@ -24,4 +24,4 @@ def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
 
 def test_what_the_gains_never_move_keeps_no_controller_from_starting() -> None:
     gains = replace(Gains.default(), weights=(("l_*", 0.0), ("r_*", 0.0)))
-    warm(Controller(Model(ROBOT), gains, "velocity"), ROBOT)
+    warm_up(Controller(Model(ROBOT), gains, "velocity"), ROBOT)

@@ -1,0 +1,112 @@
+"""Forces that the law receives: those of the model, checked, and user-defined terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bus_schema.messages import ContactItem
+from bus_schema.messages import Forces as ForcesMessage
+from mobee.arrays import Array
+from mobee.control import Forces
+from mobee.control.checked import LARGEST_FORCE
+from mobee.control.forces import told_terms
+from mobee.control.terms import Term, valid_terms
+from mobee.learning.named import imported
+from mobee.model.contact import KINDS, ContactTable
+from mobee.model.hands import Hands
+from mobee.model.pose import Pose
+from mobee.model.snapshot import Snapshot
+from mobee.robot.robot import Robot
+
+MAX_TICKS = 3  # age of forces beyond which the robot holds, and ticks that the law catches up at most
+MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under control
+
+
+class ModelForces:
+    """The newest forces of the model, as they were published and as vectors."""
+
+    def __init__(self, robot: Robot, needs_contacts: bool) -> None:
+        """`needs_contacts`: messages without contacts are refused, because the terms of the law may depend on them."""
+        self._robot, self._needs_contacts = robot, needs_contacts
+        self.message: ForcesMessage | None = None
+        self.vectors: Forces  # each term (n,) rad/s^2, of `message`
+
+    def take(self, message: ForcesMessage) -> str:
+        """Replace the forces; returns why they were refused instead, or an empty text."""
+        why = self._refusal(message)
+        if not why:
+            self.message, self.vectors = message, Forces(**{name: np.array(row) for name, row in message.terms.items()})
+        return why
+
+    def forget(self) -> None:
+        """Drop the forces: a new run, or the model is gone."""
+        self.message = None
+
+    def answer(self, k: int) -> bool:
+        """Whether they are of tick k or later."""
+        return self.message is not None and self.message.re_k >= k
+
+    def are_fresh(self, k: int) -> bool:
+        """Whether they are of a tick near k, and computed from recent states of all parts; a contact concerns several parts."""
+        if self.message is None:
+            return False
+        ages = (self.message.part_age.get(part, MAX_STATE_AGE + 1) for part in self._robot.parts)
+        return abs(k - self.message.re_k) <= MAX_TICKS and all(age <= MAX_STATE_AGE for age in ages)
+
+    def touched(self, part: str) -> list[str]:
+        """World objects in contact with a part."""
+        return self.message.touched.get(part, []) if self.message is not None else []
+
+    @property
+    def contacts(self) -> Sequence[ContactItem]:
+        """All contacts, if the model publishes them."""
+        return self.message.contacts or () if self.message is not None else ()
+
+    def _refusal(self, message: ForcesMessage) -> str:
+        terms = message.terms
+        if terms.keys() != set(told_terms()):
+            return f"the terms are {', '.join(terms) or 'none'}; this law has {', '.join(told_terms())}"
+        largest = LARGEST_FORCE / len(terms)
+        if any(max(row, default=0.0) > largest or min(row, default=0.0) < -largest for row in terms.values()):
+            return f"a force is larger than {largest:.3g} rad/s^2, the largest that the law accepts"
+        if self._needs_contacts and message.contacts is None:
+            return "contacts are missing, on which terms of this controller may depend: set shared.terms, so that the model publishes them"
+        return _unknown_link(message.contacts or (), len(self._robot.links))
+
+
+def _unknown_link(contacts: Iterable[ContactItem], links: int) -> str:
+    largest = max((max(contact.first_link, contact.second_link) for contact in contacts), default=-1)
+    return f"a contact has link {largest}, the robot has {links} links" if largest >= links else ""
+
+
+def load_terms(names: Sequence[str]) -> tuple[Term, ...]:
+    """Import terms given as `module:name`; a function becomes a term with its own name.  Raises InvalidValue."""
+    return valid_terms([_term(name) for name in names])
+
+
+def _term(path: str) -> Term:
+    found = imported("term", path)
+    return found if isinstance(found, Term) else Term(path.partition(":")[2], found)
+
+
+class PublishedContacts:
+    """The contacts that the model published, in the form that a pose uses instead of its own (`Pose.feel`)."""
+
+    def __init__(self, pose: Pose, contacts: Sequence[ContactItem]) -> None:
+        self._pose, self._contacts = pose, contacts
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
+        """The contact table, and the sum of J^T (depth * normal) over the contacts of fields, (1, n)."""
+        felt, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
+        for at, contact in enumerate(self._contacts):
+            numbers.append((0, KINDS.index(contact.kind), 2 * at, 2 * at + 1, contact.first_link, contact.second_link))
+            reals.append([contact.depth, *contact.normal, *contact.point])
+            if contact.kind == "field":
+                push, point = contact.depth * np.array(contact.normal), np.array(contact.point)
+                for link, sign in ((contact.first_link, 1.0), (contact.second_link, -1.0)):
+                    if link >= 0:
+                        felt[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
+        names = tuple(name for contact in self._contacts for name in (contact.first, contact.second))
+        return ContactTable(names, (), (np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7))), felt

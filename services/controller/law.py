@@ -1,0 +1,204 @@
+"""The control law of the whole robot as the controller runs it: the one owner of the law's state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus_schema import VERSION, decode, encode, encoding_of
+from bus_schema.messages import Forces as ForcesMessage
+from bus_schema.messages import Tick
+from bus_schema.rpc import ReachFor
+from mobee import Controller, Gains, Model
+from mobee.arrays import Array
+from mobee.control import Command, Forces
+from mobee.control.forces import needs_contacts
+from mobee.errors import InvalidValue
+from mobee.model.contact import links_moved
+from mobee.reach import ReachTarget
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Robot
+from services.common.bus import Bus
+from services.common.exit_codes import BAD_INPUT
+from services.controller.config import Config
+from services.controller.forces import ModelForces, PublishedContacts, load_terms
+
+WARM_UP_TICK = 0.01  # s
+
+
+class RobotLaw:
+    """Holds the law's state and all its inputs: measured positions, forces of model and clients, attractors, reaches.
+
+    The other objects of the controller change the law by these methods only.
+    """
+
+    def __init__(self, bus: Bus, config: Config, robot: Robot) -> None:
+        """At rest at home; every code path of a reach has run once, so that the first real one is not late."""
+        self._bus, self._config, self._robot = bus, config, robot
+        model = Model(robot)  # without a world: contacts come from the model service
+        gains = Gains.named(config.gains)
+        self._law = Controller(model, gains, config.modality, speed_scale=config.speed_scale, terms=load_terms(config.terms))
+        self._needs_contacts = bool(self._law.terms) or needs_contacts()
+        self.forces = ModelForces(robot, self._needs_contacts)
+        self.max_dt = self._law.max_dt  # s, longest tick for which the gains are stable
+        self.q: Array = robot.home  # (n,) rad, measured at the newest tick
+        self._where = {name: part.slice for name, part in robot.parts.items()}
+        self._units = fine_units(robot)
+        self._client_forces = np.zeros(len(robot.motors))
+        self._pushes: dict[str, dict[str, Array]] = {}  # part -> marker -> (3,)
+        self._own_terms = bus.publisher(ForcesMessage, "controller", "LATEST")
+        self._last_k = -1  # last tick of this run in which the law was used
+        self._last_tick: Tick | None = None  # that of the last step, while the step can be repeated
+        warm_up(self._law, robot)
+        self._state_before = self._law.state.copy()  # before the last step
+
+    # Ticks
+
+    def reset(self) -> None:
+        """A new run: at rest at home, without forces of the model."""
+        self.forces.forget()
+        self._last_k, self._last_tick = -1, None
+        self._law.reset(self._robot.home)
+
+    def measure(self, q: Array) -> None:
+        """A tick begins, in which the motors are at q (n,) rad."""
+        self.q, self._last_tick = q, None
+
+    def count_ticks(self, k: int) -> int:
+        """Ticks since the last call in this run, at least 1."""
+        ticks = max(k - self._last_k, 1) if self._last_k >= 0 else 1
+        self._last_k = k
+        return ticks
+
+    def step(self, tick: Tick, ticks: int) -> Array:
+        """Advance the law over `ticks` ticks; returns the reference (n,) in the unit of the modality."""
+        for _ in range(ticks):
+            self._state_before = self._law.state.copy()
+            command = self._step(tick)
+        self._last_tick = tick
+        return self._reference(command)
+
+    def repeat_step(self) -> Array | None:
+        """Compute the last step again, with what clients have asked for since; None if it cannot be repeated."""
+        if self._last_tick is None:
+            return None
+        self._law.state[:] = self._state_before
+        return self._reference(self._step(self._last_tick))
+
+    def _step(self, tick: Tick) -> Command:
+        """One step under the forces of the model; user-defined terms are evaluated at its contacts."""
+        dt, forces = tick.dt / 1e9, self.forces.vectors
+        if not self._needs_contacts:
+            return self._law.step(self.q, dt, forces)
+        pose = self._law.model.evaluate(self.q)
+        pose.feel(PublishedContacts(pose, self.forces.contacts))
+        try:
+            command = self._law.step(self.q, dt, forces, pose)
+        except InvalidValue as error:  # a restart would fail at the same term
+            self._bus.event("error", "term", str(error))
+            raise SystemExit(BAD_INPUT) from None
+        if self._own_terms.heard:
+            own = {name: row.tolist() for name, row in self._law.last_forces.items() if name not in forces}
+            self._own_terms.put(re_k=tick.k, terms=own, part_age={}, touched={})
+        return command
+
+    def _reference(self, command: Command) -> Array:
+        reference: Array = getattr(command, self._config.modality)
+        return reference
+
+    # One part
+
+    def rest(self, part: str) -> None:
+        """Not under control: at rest where the part was measured."""
+        self._law.rest(part, self.q[self._where[part]])
+
+    def brake(self, part: str) -> None:
+        """Nobody owns the part any more: it brakes and stays, or goes to the posture that its settings give."""
+        if self._last_k >= 0:
+            self._law.hold(part, self.q[self._where[part]])
+            self._last_tick = None
+            self.seek_posture(part)
+
+    def seek_posture(self, part: str) -> None:
+        """Set the attractor of a part without owner to the posture in the settings, if there is one."""
+        if part in self._config.posture:
+            self._law.set_attractor(part, np.array(self._config.posture[part]))
+
+    def set_attractor(self, part: str, target: Array) -> None:
+        """Draw the part to `target` (n_part,) rad."""
+        self._law.set_attractor(part, target)
+
+    def motion(self, part: str) -> tuple[Array, Array, Array]:
+        """Velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
+        where = self._where[part]
+        return self._law.velocity[where], self._law.acceleration[where], self._law.attractor[where]
+
+    def settle_speeds(self, part: str) -> tuple[Array, Array]:
+        """Velocity and acceleration of the part's motors, each in the motor's fine unit, for the test of settling."""
+        where = self._where[part]
+        return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
+
+    # Reaches and forces of clients
+
+    def reach(self, part: str, marker: str, target: ReachTarget) -> None:
+        """Draw a marker to a target by forces on the part; raises InvalidValue or UnknownName if it cannot reach."""
+        self._law.reach_toward(part, marker, target)
+
+    def end_reach(self, part: str) -> None:
+        """End the force of the part's reach."""
+        self._law.end_reach(part)
+
+    def is_approaching(self, part: str) -> bool:
+        """Whether the marker of the part's reach still comes nearer to its target."""
+        return self._law.still_nears(part)
+
+    def marker_position(self, marker: str) -> Array:
+        """Where the marker is at the measured positions, (3,) m."""
+        return self._law.model.evaluate(self.q).position(marker)
+
+    def set_client_force(self, part: str, force: Array) -> None:
+        """A client's joint-space force on a part, (n_part,) rad/s^2 (thesis eq. 5.9)."""
+        self._client_forces[self._where[part]] = force
+        self._apply_client_forces()
+
+    def set_push(self, part: str, marker: str, push: Array) -> None:
+        """A client's force at a marker of a part, (3,) m/s^2 (thesis eq. 5.10); several clients may push at one marker."""
+        self._pushes.setdefault(part, {})[marker] = push
+        self._apply_client_forces()
+
+    def clear_client_forces(self, part: str) -> None:
+        """End the forces of the part's client, but not its reach; those on other parts continue."""
+        self._client_forces[self._where[part]] = 0.0
+        self._pushes.pop(part, None)
+        self._apply_client_forces()
+
+    def _apply_client_forces(self) -> None:
+        self._law.clear()
+        self._law.force(self._client_forces)
+        at_marker: dict[str, Array] = {}
+        for pushes in self._pushes.values():
+            for marker, push in pushes.items():
+                at_marker[marker] = at_marker.get(marker, 0.0) + push
+        for marker, push in at_marker.items():
+            self._law.push(marker, push)
+
+
+def warm_up(law: Controller, robot: Robot) -> None:
+    """Begin, step and end a reach of each part with each marker, and decode a request; afterwards the law is at rest at home."""
+    asked = ReachFor(
+        v=VERSION, id="0", who="warm", epoch=0, action_id="0", marker="none", object="none", position=[0.0] * 3, radius=1.0, aim="centre"
+    )
+    decode(ReachFor, encode(asked), encoding_of(ReachFor))
+    nothing = np.zeros(len(robot.motors))
+    moved = links_moved(robot)
+    here = law.model.evaluate(robot.home)
+    for part in robot.parts:
+        for name, marker in robot.markers.items():
+            if marker.link in moved[part]:
+                try:
+                    law.reach_toward(part, name, ReachTarget(here.position(name)))
+                except InvalidValue:  # only motors of weight 0 move it: a request for such a reach is refused
+                    continue
+                law.step(robot.home, min(WARM_UP_TICK, 0.5 * law.max_dt), Forces(**dict.fromkeys(law.force_names, nothing)))
+                law.still_nears(part)
+                law.end_reach(part)
+    law.reset(robot.home)

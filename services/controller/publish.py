@@ -1,0 +1,145 @@
+"""Publishes the commands and motions of all parts, and in lockstep the answer to each tick; counts ticks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from bus_schema.messages import Answer, Commands, Motion, Order, Tick
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from services.common.bus import Bus
+from services.common.lockstep import Participant
+from services.common.rate import Percentiles
+from services.common.service import Service
+from services.controller.action import Action, Owner, busy_owners
+from services.controller.drives import Drives
+from services.controller.law import RobotLaw
+
+LOCKSTEP_PUBLISH_PERIOD = 50  # ticks between two motions of a part that is moving or has no owner, in lockstep
+PUBLISH_PERIOD = 0.01  # s of real time between two motions of a part in free mode; a change is published at once
+
+
+class Counters:
+    """Counts of one measurement."""
+
+    def __init__(self) -> None:
+        self.ticks = self.late_forces = self.held_ticks = self.long_gaps = 0
+        self._stepped_at = 0.0  # s, monotonic clock
+        self._jitter = Percentiles()  # ms, of the time between two steps
+
+    def note_step(self, period: float) -> None:
+        """Once a step: how far its time after the last one is from `period` [s]."""
+        before, self._stepped_at = self._stepped_at, time.monotonic()
+        if before > 0.0:
+            self._jitter.add(abs(self._stepped_at - before - period) * 1e3)
+
+    def numbers(self) -> Mapping[str, float]:
+        """For `stat`."""
+        return {
+            "ticks": self.ticks,
+            "late_forces": self.late_forces,
+            "held_ticks": self.held_ticks,
+            "long_gaps": self.long_gaps,
+            "jitter_ms_p50": self._jitter.at(50),
+            "jitter_ms_p99": self._jitter.at(99),
+        }
+
+
+class MotionPublisher:
+    """The motion streams of all parts."""
+
+    def __init__(self, bus: Bus, robot: Robot, law: RobotLaw, actions: Mapping[str, Action]) -> None:
+        self._law, self._actions = law, actions
+        self._where = {name: part.slice for name, part in robot.parts.items()}
+        self._streams = {part: bus.publisher(Motion, part) for part in robot.parts}
+        self._published: dict[str, tuple[str, Owner | None]] = {}  # action and owner in each part's last message
+
+    def publish(self, tick: Tick) -> None:
+        """Publish the state of every action, except where it is redundant."""
+        for part, action in self._actions.items():
+            if self._is_redundant(part, tick):
+                continue
+            velocity, acceleration, attractor = self._law.motion(part)
+            self._streams[part].put(
+                k=tick.k,
+                t=tick.t,
+                action_id=action.id,
+                epoch=action.owner.epoch if action.owner is not None else 0,
+                status=action.status,
+                since_k=action.since_k,
+                start_k=action.start_k,
+                q=self._law.q[self._where[part]].tolist(),
+                dq=velocity.tolist(),
+                ddq=acceleration.tolist(),
+                goal=attractor.tolist(),
+                touched=self._law.forces.touched(part),
+            )
+
+    def _is_redundant(self, part: str, tick: Tick) -> bool:
+        """Whether action, owner and status are as in the last message, and no regular message is due."""
+        action, k = self._actions[part], tick.k
+        known, self._published[part] = self._published.get(part), (action.id, action.owner)
+        if known != self._published[part] or action.since_k >= k:
+            return False
+        if tick.mode == "lock":
+            return (action.status == "moving" or action.owner is None) and k % LOCKSTEP_PUBLISH_PERIOD > 0
+        return k % max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt)) > 0
+
+
+class CommandPublisher:
+    """One message per tick to all parts that follow this controller's commands."""
+
+    def __init__(self, service: Service, ttl: int, law: RobotLaw, actions: Mapping[str, Action], drives: Drives) -> None:
+        self._service, self._ttl, self._law, self._actions, self._drives = service, ttl, law, actions, drives
+        self._commands = service.bus.publisher(Commands)
+        self._participant = Participant(service)
+        self._sent: tuple[int, dict[str, Order]] | None = None  # tick and orders of the last message
+        self._to_answer: tuple[int, Answer] | None = None  # lockstep: a tick that is not answered yet, and its answer
+        drives.on_attempt_end(self._answer)
+
+    def begin_tick(self) -> None:
+        """A new tick, or a new run: nothing of the one before is sent any more."""
+        self._sent = self._to_answer = None
+
+    def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
+        """Publish tick k's orders, if there are any; reference (n,) in the unit of the modality."""
+        self._sent = k, orders
+        if orders:
+            self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._ttl, answer=answer)
+
+    def send_again(self, part: str) -> None:
+        """Free mode: let a request for a part take effect before the next tick, by computing and publishing the last step again."""
+        if self._service.locked or self._sent is None or part not in self._sent[1]:
+            return
+        reference = self._law.repeat_step()
+        if reference is not None:
+            self.send(*self._sent, reference)
+
+    def send_and_answer(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
+        """Lockstep: publish, and answer the tick in the same message unless a part is being armed; tick 0 when all parts are ready."""
+        if tick.k == 0 and not (fresh and self._is_ready(tick)):
+            return
+        forces = self._law.forces.message
+        including = [forces.src] if forces is not None and forces.re_k == tick.k else []
+        answer = Answer(fresh, busy_owners(self._actions.values()), including)
+        self._to_answer = tick.k, answer
+        if tick.k == 0 or not orders or self._drives.is_arming:
+            self.send(tick.k, orders, reference)
+            self._answer()
+            return
+        self._participant.inject_test_delay()
+        self.send(tick.k, orders, reference, answer)
+        self._to_answer = None
+
+    def _is_ready(self, tick: Tick) -> bool:
+        """Tick 0: whether every part that can be armed is armed, and the commands have a subscriber."""
+        ready = (self._drives.is_armed(part, state) or not self._drives.can_arm(state) for part, state in tick.parts.items())
+        return all(ready) and self._commands.heard
+
+    def _answer(self) -> None:
+        """Answer the tick, once no part is being armed."""
+        if self._to_answer is not None and not self._drives.is_arming:
+            (k, answer), self._to_answer = self._to_answer, None
+            busy = busy_owners(self._actions.values())
+            self._participant.done(k, ok=answer.ok, busy=busy, including=answer.including)
