@@ -1,4 +1,4 @@
-"""Queries of the published arm among balls, how far its planners' beliefs are off, and rivals sent to the goals of the queries."""
+"""Queries of the published arm among balls, the wrong models of its planners, and the execution of the queries."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from mobee.errors import InvalidValue
 
 BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
 BALLS, RADIUS = 4, 0.03  # m
-SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad by which a ball and a joint differ from what is believed
-MOST_TRIES = 20_000  # of motions among which the queries are found
-LIMIT = 120.0  # s of plant time, for a query
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed position of a ball and of a joint angle
+MAX_MOTIONS = 20_000  # among which the queries are found
+LIMIT = 120.0  # s of plant time per query
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The true world, the errors of what is believed, and Q queries, each from rest at `starts` to the cell of a lattice state."""
+    """The true world, the errors of the planners' model, and Q queries, each from rest at `starts` to the cell of a lattice state."""
 
     balls: Array  # (B, 3) m
-    shifts: Array  # (B, 3) m, believed minus true places
+    shifts: Array  # (B, 3) m, believed minus true positions
     turns: Array  # (4,) rad, believed minus true joint angles
     starts: Array  # (Q, 4) rad
     goals: Ints  # (Q,)
-    is_hard: NDArray[np.bool_]  # (Q,): going straight there failed when it was tried
+    is_hard: NDArray[np.bool_]  # (Q,): the straight motion failed when it was tried
 
 
 def space() -> Lattice:
-    """The published lattice of rank 3 with 16 neighbours."""
+    """Return the published lattice of rank 3 with 16 neighbours."""
     return arm_space(RANK3, ARM_NEIGHBOURS)
 
 
 def world_of(balls: Array) -> World:
-    """Balls at these places (B, 3) m."""
+    """Return a world with balls at these positions (B, 3) m."""
     world = World()
     for number, position in enumerate(balls):
         world.add(f"ball {number}", sphere(RADIUS), position=position)
@@ -48,14 +48,14 @@ def world_of(balls: Array) -> World:
 
 
 def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
-    """The true robot among the true balls, at rest at `start` (4,) rad."""
+    """Return the true robot among the true balls, at rest at `start` (4,) rad."""
     plant = arm_plant(seed, world=world_of(scene.balls))
     place(plant, whole(start[None])[0])
     return plant
 
 
 def make_scene(seed: int, queries: int) -> Scene:
-    """Balls in the workspace, and queries of which half, or as many as are found, are not reached by going straight."""
+    """Draw balls in the workspace, and queries; in half of them, or as many as are found, a straight motion does not reach the goal."""
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)
     shifts = rng.normal(size=balls.shape)
@@ -65,7 +65,7 @@ def make_scene(seed: int, queries: int) -> Scene:
 
 
 def _balls(rng: np.random.Generator) -> Array:
-    """Places of the palm in random poses between the lattice's outer samples, that touch nothing of the robot at home."""
+    """Return positions of the palm in random poses between the lattice's outer samples, where a ball does not touch the robot at home."""
     low, high = robot().limits[columns()].T
     alone = Model(robot())
     found: list[Array] = []
@@ -78,14 +78,14 @@ def _balls(rng: np.random.Generator) -> Array:
 
 
 def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> tuple[Array, Ints, NDArray[np.bool_]]:
-    """Move straight from sample to sample; a motion that was tried becomes a query, if its goal was ever reached."""
+    """Move straight from sample to sample; choose queries among these motions, whose goals were reached at least once."""
     lattice = space()
     plant = arm_plant(seed, world=world_of(balls))
     free = [s for s in range(len(lattice)) if not len(plant.model.evaluate(whole(lattice.samples[s])).table)]
     tried: list[tuple[Array, int, bool]] = []
     reached: set[int] = set()
     here = plant.measure(PART)[:JOINTS]
-    while len(tried) < MOST_TRIES:
+    while len(tried) < MAX_MOTIONS:
         goal = int(rng.choice(free))
         end = plant.act(PART, lattice.target(goal)).q[:JOINTS]
         succeeded = lattice.state_of(end) == goal
@@ -100,7 +100,7 @@ def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> t
                 break
     if not hard or not easy:
         raise InvalidValue(
-            f"scene {seed}: going straight reached {len(easy)} of {len(tried)} goals; leave this seed out, there is no choice."
+            f"scene {seed}: straight motions reached {len(easy)} of {len(tried)} goals; queries of both kinds are needed: use another seed."
         )
     half = count // 2
     chosen = [*_some(rng, hard, count - half), *_some(rng, easy, half)]
@@ -114,10 +114,10 @@ def _some(rng: np.random.Generator, queries: list[tuple[Array, int, bool]], coun
 
 
 def believed(scene: Scene, kind: str) -> Belief:
-    """A belief about a scene, of one of the BELIEFS: "true", or with hidden parts.
+    """Return a planner's model of a scene, one of the BELIEFS.
 
-    Hidden are with "no cables" (the rows of the shoulder's cables), "miscalibrated" (balls 1 cm and joints 3
-    degrees off), "both", "gross" (both, three times as much off).
+    "true": without errors; "no cables": without the constraints of the shoulder's cables; "miscalibrated": balls wrong by 1 cm and joints
+    by 3 degrees; "both": both errors; "gross": both, with three times the miscalibration.
     """
     times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
     clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
@@ -129,21 +129,21 @@ class Answers:
     """The results of Q queries."""
 
     success: NDArray[np.bool_]  # (Q,)
-    seconds: Array  # (Q,) of plant time, LIMIT where there was no success
+    seconds: Array  # (Q,) plant time, LIMIT for queries that failed
     actions: Ints  # (Q,)
     repairs: Ints  # (Q,)
 
 
 def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
-    """Send the rival to every goal, in order; the same noise for all rivals."""
+    """Send a rival to every goal, in order; the noise is the same for all rivals."""
     lattice = space()
     rows = []
     for number, goal in enumerate(scene.goals):
         plant = plant_of(scene, 1000 * seed + number, scene.starts[number])
-        begun, before, actions = plant.time, rival.repairs, 0
+        first_time, repairs, actions = plant.time, rival.repairs, 0
         rival.begin(int(goal))
         here = plant.measure(PART)[:JOINTS]
-        while lattice.state_of(here) != goal and plant.time - begun < LIMIT:
+        while lattice.state_of(here) != goal and plant.time - first_time < LIMIT:
             aim = rival.aim(here)
             if aim is None:
                 break
@@ -152,8 +152,8 @@ def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
             end = plant.act(PART, target).q[:JOINTS]
             rival.observe(here, end)
             here, actions = end, actions + 1
-        success, seconds = lattice.state_of(here) == goal, plant.time - begun
+        success, seconds = lattice.state_of(here) == goal, plant.time - first_time
         success = success and seconds <= LIMIT
-        rows.append((success, seconds if success else LIMIT, actions, rival.repairs - before))
+        rows.append((success, seconds if success else LIMIT, actions, rival.repairs - repairs))
     success, seconds, actions, repairs = zip(*rows, strict=True)
     return Answers(np.array(success), np.array(seconds), np.array(actions), np.array(repairs))

@@ -1,4 +1,4 @@
-"""An arm and its workspace, with the errors and the ball that are hidden from planners, or from all (`reach-under-model-error`)."""
+"""An arm and its workspace, with calibration errors and a ball that the planners' model, or every model, does not contain."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 
 WRONG = ("nothing", "planners", "everyone")
-"""Whose knowledge is wrong: nobody's; the planners' alone; also MoBeE's, which sees the same wrong encoders and targets."""
-SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad by which targets and joints differ from what is believed
-UNSEEN = "unseen"
+"""Whose model is wrong: nobody's; the planners' alone; also MoBeE's, which has the same wrong encoders and target positions."""
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed target positions and joint angles
+UNSEEN = "unseen"  # name of the hidden ball
 RADIUS = 0.05  # m, of the hidden ball
-AWAY = 0.12  # m, from its middle to that of any of the thesis' targets
-LEAST, MOST = 0.08, 0.3  # share of the straight paths between two states that it blocks
-DRAWS = 400
+TARGET_CLEARANCE = 0.12  # m, least distance of the ball's centre from the centre of any target of the thesis
+MIN_BLOCKED, MAX_BLOCKED = 0.08, 0.3  # share of the straight paths between two states that the ball blocks
+DRAWS = 400  # positions of the ball that are tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Targets where they are seen, the place of the ball (3,) m, and by how much joints and targets are off: (4,) rad, (3,) m."""
+    """Targets as MoBeE sees them, the ball's position (3,) m, and the errors of joints `turns` (4,) rad and targets `shift` (3,) m."""
 
     targets: list[ReachTarget]
     ball: Array
@@ -38,27 +38,27 @@ class Scene:
     wrong: str
 
     def plant(self, seed: int, ball: bool = True) -> JudgedPlant:
-        """The true arm, with or without the ball."""
+        """Return the true arm, with or without the ball."""
         turns = np.zeros(len(body().motors))
         turns[[body().motor_index(name) for name in RIGHT]] = self.turns
         errors = Errors(turns, self.shift) if self.wrong == "everyone" else None
         return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
 
     def belief(self) -> PeerBelief:
-        """The belief of its planners."""
+        """Return the planners' model of the arm and the workspace."""
         if self.wrong == "nothing":
             return arm_belief(_world(self.ball))
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
 
     def seen(self, target: ReachTarget) -> ReachTarget:
-        """A target where its planners believe it to be."""
+        """Return a target at the position that the planners believe."""
         return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
 
 
 def make_scene(seed: int, wrong: str) -> Scene:
-    """A ball that blocks many motions, and errors of the sizes above; they are the same for every `wrong`.
+    """Draw a ball that blocks motions, and errors of the sizes above; they are the same for every `wrong`.
 
-    Targets of `touchable_targets` that cannot be touched beside the ball are left out.
+    Targets of `touchable_targets` that cannot be touched because of the ball are left out.
     """
     return replace(_drawn(seed), wrong=wrong)
 
@@ -80,7 +80,7 @@ def _world(ball: Array) -> World:
 
 
 def _ball(rng: np.random.Generator, targets: Array) -> Array:
-    """A place of the palm, away from the targets and from the robot at home, at which a ball blocks some motions."""
+    """Return a position of the palm, away from the targets and from the robot at home, at which a ball blocks some motions."""
     low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
     pairs = list(permutations(range(len(space())), 2))
     chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
@@ -90,13 +90,13 @@ def _ball(rng: np.random.Generator, targets: Array) -> Array:
     for _ in range(DRAWS):
         q = rng.uniform(low, high)
         place = alone.model.evaluate(alone.whole(q)).position(alone.marker)
-        if np.linalg.norm(targets - place, axis=1).min() < AWAY:
+        if np.linalg.norm(targets - place, axis=1).min() < TARGET_CLEARANCE:
             continue
         belief = arm_belief(_world(place))
         if len(belief.model.evaluate(body().home).table):
             continue
         blocked = 1.0 - belief.sound(paths).reshape(len(chosen), -1).all(axis=1).mean()
-        if LEAST <= blocked - before <= MOST:
+        if MIN_BLOCKED <= blocked - before <= MAX_BLOCKED:
             found: Array = place
             return found
-    raise InvalidValue(f"no place for the ball in {DRAWS} draws: leave this seed out.")
+    raise InvalidValue(f"no position for the ball was found in {DRAWS} draws: use another seed.")

@@ -1,14 +1,15 @@
-"""A roadmap planner and the learned MDP planner on the same noisy robot, which neither of them knows whole.
+"""Compare roadmap planners (PRM) with the learned MDP planner on the same noisy robot, of which the roadmaps have a wrong model.
 
 Claim: "a plan first, act later approach, such as PRM planning, will never work well on robots such as the iCub", and the roadmap's
-"simple graph is insufficient", an MDP is needed.  Source: paper 2.3, 3.1 (the comparison it says the experiment offers); thesis 4.2.
+"simple graph is insufficient"; an MDP is needed.  Source: paper 2.3, 3.1 (which announce this comparison); thesis 4.2.
 Published: no numbers.  Run time: four minutes on 2 cores.
 
-The left arm of the published robot among four balls; 60 queries from rest to a cell of the rank 3 lattice, half of them not reached by
-going straight, at most 120 s each.  The roadmaps' belief about the robot lacks the shoulder's cables, or has the balls 1 cm and
-the joints 3 degrees off, or both; the MDP has no such belief and learns by curiosity before the queries, or from the queries alone.
-A roadmap falls short if, where going straight fails, it succeeds in less than 95 % and less often than the MDP.  The seeds draw balls,
-noise and queries; the lattice's graph is the same for all.
+The left arm of the published robot among four balls; 60 queries from rest to a cell of the rank 3 lattice, at most 120 s each.  Half of the
+queries are hard: a straight motion does not reach the goal.  The roadmaps' model of the robot lacks the shoulder's cables ("no cables"), or
+its balls are wrong by 1 cm and its joints by 3 degrees ("miscalibrated"), or both; "gross" has three times these errors.  The MDP has no
+such model: it learns by curiosity before the queries, or from the queries alone.  A roadmap is planned once, or repaired after a failed
+motion for the present query ("repairs") or for all later queries too ("remembers").  A roadmap does not work well if it succeeds in less
+than 95 % of the hard queries and less often than the MDP.  The seeds draw balls, noise and queries; all runs share the lattice's graph.
 """
 
 from __future__ import annotations
@@ -36,13 +37,23 @@ from mobee.roadmap.ompl import require_ompl
 
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
-WELL = 0.95  # success, also where going straight fails, of what "works well"
-BLOCK = 20  # queries, of which one point of a curve is the mean
-NUMBERS = ("success", "hard", "seconds", "actions", "repairs")
+WELL = 0.95  # success in hard queries from which a planner "works well"
+BLOCK = 20  # queries whose mean is one point of a curve
+NUMBERS = {
+    "success": "success",
+    "hard": "success in hard queries",
+    "seconds": "robot time per query [s]",
+    "actions": "actions per query",
+    "repairs": "repairs per query",
+}
 
-FAILS = Claim("paper 3.1", "a plan first, act later approach, such as a PRM, does not work well: plans fail at run time", "no number")
+FAILS = Claim(
+    "paper 3.1", "planning first and acting later, as with a PRM, does not work well: plans of a wrong model fail at run time", "no number"
+)
 INSUFFICIENT = Claim(
-    "paper 2.3", "the PRM's simple graph is insufficient: with part of the truth hidden, a learned MDP is needed", "no number"
+    "paper 2.3",
+    "the PRM's simple graph is insufficient, even if it is repaired: where the model is wrong, a learned MDP is needed",
+    "no number",
 )
 CLAIMS = (FAILS, INSUFFICIENT)
 
@@ -58,11 +69,11 @@ COLORS = {
     "MDP, 4000 learned": "darkgreen",
     "straight": "black",
 }
-SHOWN = "both"  # the belief of the curves
+SHOWN = "both"  # the roadmaps' model in the curves
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Going straight, the MDP after so many transitions, the roadmaps under each belief."""
+    """Return straight motions, the MDP after different numbers of transitions, and the roadmaps under each belief."""
     shared = {"queries": 20 if arguments.quick else QUERIES}
     learned = [Condition(f"mdp-{n}", {**shared, "learned": n}, 1.0 + n / 1000) for n in LEARNED]
     roadmaps = [Condition(f"roadmaps-{belief.replace(' ', '-')}", {**shared, "belief": belief}, 8.0) for belief in BELIEFS]
@@ -70,19 +81,19 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Send the rivals of a condition to all goals; arrays by "rival|measure"."""
+    """Send the rivals of a condition to all goals; returns arrays by "rival|measure"."""
     scene, lattice = make_scene(seed, settings["queries"]), space()
     values: dict[str, Any] = {"hard": scene.is_hard}
-    for name, rival, price in _rivals(settings, seed, scene, lattice):
+    for name, rival, cost in _rivals(settings, seed, scene, lattice):
         got = answer(scene, rival, seed)
         for measure in ("success", "seconds", "actions", "repairs"):
             values[f"{name}|{measure}"] = np.asarray(getattr(got, measure))
-        values[f"{name}|price"] = np.array(price)
+        values[f"{name}|cost"] = np.array(cost)
     return values
 
 
 def _rivals(settings: dict[str, Any], seed: int, scene: Scene, lattice: Lattice) -> Iterator[tuple[str, Rival, float]]:
-    """Each with its name and its price: hours of plant time, or thousands of poses checked, before the first query."""
+    """Yield rivals with their names and costs before the first query: hours of plant time, or thousands of poses checked."""
     if "learned" in settings:
         plant = arm_plant(seed + 500, world=world_of(scene.balls))
         agent = CuriousAgent(lattice, plant, seed=seed)
@@ -112,7 +123,7 @@ class Number:
 
     @classmethod
     def of(cls, values: Array) -> Number:
-        """Of one value a seed, (n,)."""
+        """Summarise one value per seed, (n,)."""
         return cls(interquartile_mean(values), *interval(values))
 
     def __str__(self) -> str:
@@ -122,21 +133,21 @@ class Number:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """A rival under a belief ("" for those that believe nothing)."""
+    """A rival under a belief ("" for rivals without a model)."""
 
     rival: str
     belief: str
     success: Number
     hard: Number
-    """Success where going straight fails."""
+    """Success in hard queries."""
     seconds: Number
-    """Of plant time a query, the limit where there was no success."""
+    """Plant time per query; the limit for queries that failed."""
     actions: Number
     repairs: Number
-    price: float
+    cost: float
     """Hours of plant time, or thousands of poses checked, before the first query."""
     curve: Array
-    """(blocks, 3): seconds a query over blocks of queries, mean, low, high."""
+    """(blocks, 3): mean, low and high of the plant time per query, over blocks of queries."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,22 +157,27 @@ class Summary:
     rows: tuple[Row, ...]
 
     def row(self, rival: str, belief: str) -> Row:
-        """The row of a rival; raises InvalidValue if it has not run."""
+        """Return the row of a rival; raises InvalidValue if it has not run."""
         for row in self.rows:
             if (row.rival, row.belief) == (rival, belief):
                 return row
-        raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: go on with --resume.")
+        raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: continue the run with --resume.")
 
     def table(self) -> list[dict[str, Any]]:
-        """For the results, as text."""
+        """Return the rows with texts, for the results."""
         return [
-            {"rival": row.rival, "belief": row.belief, **{name: str(getattr(row, name)) for name in NUMBERS}, "price": round(row.price, 2)}
+            {
+                "planner": row.rival,
+                "its model": row.belief or "none",
+                **{label: str(getattr(row, name)) for name, label in NUMBERS.items()},
+                "before the first query": f"{row.cost:.2f} {'thousand poses checked' if row.belief else 'h of robot time'}",
+            }
             for row in self.rows
         ]
 
 
 def summary_of(found: Cells) -> Summary:
-    """The seeds of each rival and belief put together."""
+    """Summarise the seeds of each rival and belief."""
     values: dict[tuple[str, str], dict[str, list[Array]]] = defaultdict(lambda: defaultdict(list))
     for result in found.values():
         belief = str(result.cell.settings.get("belief", ""))
@@ -177,52 +193,52 @@ def summary_of(found: Cells) -> Summary:
 
 def _row(rival: str, belief: str, measures: dict[str, list[Array]]) -> Row:
     numbers = {name: Number.of(np.array([values.mean() for values in measures[name]])) for name in NUMBERS}
-    seconds = measures["seconds"]  # of each seed; a scene may have fewer queries than were asked for
+    seconds = measures["seconds"]  # of each seed; a scene may have fewer queries than the settings ask for
     firsts = range(0, max(map(len, seconds)), BLOCK)
     blocks = [Number.of(np.array([one[first : first + BLOCK].mean() for one in seconds if len(one) > first])) for first in firsts]
     curve = np.array([(b.mean, b.low, b.high) for b in blocks])
-    return Row(rival, belief, **numbers, price=float(np.mean(measures["price"])), curve=curve)
+    return Row(rival, belief, **numbers, cost=float(np.mean(measures["cost"])), curve=curve)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The claims, and a row a rival and belief."""
+    """Return the claims, and a row per rival and belief."""
     summary = summary_of(found)
     return {"claims": [claim.record() for claim in measured(summary)], "rivals": summary.table()}
 
 
 def measured(summary: Summary) -> list[Claim]:
-    """The claims with our numbers."""
+    """Return the claims with our numbers."""
     once, learned = summary.row("OMPL, planned once", "both"), summary.row("MDP, 4000 learned", "")
     remembers = summary.row("OMPL, remembers", "both")
-    a_query = 3600.0 * learned.price / QUERIES
+    learning = 3600.0 * learned.cost / QUERIES
     first = FAILS.measured(
-        f"with cables, 1 cm and 3 degrees hidden, success {once.success}, {once.hard} where going straight fails;"
-        f" the MDP after 4000 transitions {learned.success}, {learned.hard}",
+        f"success of a PRM without cables, 1 cm and 3 degrees wrong: {once.success}, in hard queries {once.hard};"
+        f" of the MDP after 4000 transitions: {learned.success}, in hard queries {learned.hard}",
         _falls_short(once, learned),
     )
     second = INSUFFICIENT.measured(
-        f"a PRM that takes out what fails, and remembers it, succeeds in {remembers.success}, {remembers.hard} where going straight fails,"
-        f" and takes {remembers.seconds} s a query; the MDP {learned.success}, {learned.hard} and {learned.seconds} s, after"
-        f" {learned.price:.1f} h of learning, {a_query:.0f} s for each of {QUERIES} queries",
+        f"success of a PRM that removes failed edges, and remembers them: {remembers.success}, in hard queries {remembers.hard},"
+        f" {remembers.seconds} s per query; of the MDP: {learned.success}, in hard queries {learned.hard}, {learned.seconds} s per query,"
+        f" after {learned.cost:.1f} h of learning, which is {learning:.0f} s for each of {QUERIES} queries",
         _falls_short(remembers, learned),
     )
     return [first, second]
 
 
 def _falls_short(roadmap: Row, learned: Row) -> bool | None:
-    """Whether the roadmap does not work well where going straight fails, and the MDP does better; False where it works well."""
+    """Return whether the roadmap does not work well in hard queries, and the MDP does better; False where the roadmap works well."""
     if roadmap.hard.high < min(WELL, learned.hard.low):
         return True
     return False if roadmap.hard.low >= WELL else None
 
 
 def plot(found: Cells) -> Any:
-    """Success and time of all rivals under each belief, and how time falls with the number of queries."""
+    """Draw success and time of all rivals under each belief, and the time per query over the number of queries."""
     summary = summary_of(found)
     drawing = new_figure(15.0, 5.0)
     success, seconds, curves = drawing.subplots(1, 3)
-    _points(success, summary, "hard", "success where going straight fails")
-    _points(seconds, summary, "seconds", "plant time a query [s]")
+    _points(success, summary, "hard", "success in hard queries")
+    _points(seconds, summary, "seconds", "robot time per query [s]")
     _curves(curves, summary)
     handles, labels = success.get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8)
@@ -237,12 +253,12 @@ def _points(axes: Any, summary: Summary, name: str, label: str) -> None:
             shift = 0.11 * (roadmaps.index(rival) - (len(roadmaps) - 1) / 2)
             at = np.array([BELIEFS.index(row.belief) for row in rows]) + shift
             _bars(axes, at, rows, name, color, rival)
-        elif rows:  # it believes nothing: the same everywhere
+        elif rows:  # without a model: the same under all beliefs
             number = getattr(rows[0], name)
-            axes.axhline(number.mean, color=color, linewidth=1.0, label=f"{rival} ({rows[0].price:.1f} h)" if "MDP" in rival else rival)
+            axes.axhline(number.mean, color=color, linewidth=1.0, label=f"{rival} ({rows[0].cost:.1f} h)" if "MDP" in rival else rival)
             axes.axhspan(number.low, number.high, color=color, alpha=0.12, linewidth=0.0)
     axes.set_xticks(range(len(BELIEFS)), BELIEFS, fontsize=8)
-    axes.set(xlabel="what the roadmaps believe", ylabel=label, ylim=(0.0, None))
+    axes.set(xlabel="the roadmaps' model of the robot", ylabel=label, ylim=(0.0, None))
     axes.grid(alpha=0.2, axis="y")
 
 
@@ -260,13 +276,13 @@ def _curves(axes: Any, summary: Summary) -> None:
                 at = BLOCK * (np.arange(len(row.curve)) + 0.5)
                 axes.plot(at, row.curve[:, 0], ".-", color=color, linewidth=1.2)
                 axes.fill_between(at, row.curve[:, 1], row.curve[:, 2], color=color, alpha=0.1, linewidth=0.0)
-    axes.set(xlabel="queries so far", ylabel=f"plant time a query [s], roadmaps believe “{SHOWN}”", ylim=(0.0, None))
+    axes.set(xlabel="queries so far", ylabel=f"robot time per query [s], roadmaps' model “{SHOWN}”", ylim=(0.0, None))
     axes.grid(alpha=0.2)
 
 
 EXPERIMENT = Experiment(
     name="prm-vs-mdp",
-    claim="a roadmap that is planned first and followed later does not work on a noisy robot, and a learned MDP is needed",
+    claim="planning first in a roadmap and acting later does not work well on a noisy robot; a learned MDP is needed",
     source="paper 2.3, 3.1; thesis 4.2",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=require_ompl),

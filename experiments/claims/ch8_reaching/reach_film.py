@@ -1,10 +1,10 @@
-"""Selected reaches as a filmstrip (thesis figs. A.1-A.3).
+"""Draw selected reaches as filmstrips (thesis figs. A.1-A.3).
 
     python -m experiments.claims.ch8_reaching.reach_film [RUN.sqlite] [--out reach_film.png]
 
-The iCub at its table under the default law, its right arm offline.  RUN: the file of a run that learned to reach, as of a `ReachStore`;
-one that is not there is made, by 3000 curious transitions and 800 problem-tries on the 27 targets of the thesis.  Of 60 reaches for
-targets drawn at random, each from a random state, the clearest examples are drawn: from above, far, around the target.
+The robot is the iCub at its table under the default law, simulated offline; its right arm reaches.  RUN is the file that a `ReachStore` of
+a learner wrote; if it does not exist, a new learner makes 3000 curious transitions and 800 problem-tries on the 27 targets of the thesis.
+Then it reaches 60 times for random targets from random states; the clearest examples are drawn: from above, far, around the target.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from mobee.rendering.sheet import Strip, filmstrip
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60
-REACHED = 0.02  # m from the target's surface
-NEAR = 0.002  # m: the hand has arrived
+REACHED = 0.02  # m from the target's surface, within which a reach succeeds
+ARRIVED = 0.002  # m beyond its least distance, within which the hand has arrived
 VIEWS = ("oblique", "left")
-LAST = 0.10  # m: the least distance that a detour is divided by
-LEAST = 0.15  # m: the shortest path that is shown, and the last piece of a path, which may be from above
+LAST_PIECE = 0.10  # m, of a path, whose slope says whether it comes from above; also the least distance that a detour is divided by
+MIN_LENGTH = 0.15  # m, of a path that is shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,14 +52,14 @@ class Episode:
 
 
 def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
-    """Joints of the right arm at the table, the ball taken off it; the others are rigid."""
+    """Return a plant in which these joints of the right arm move, at the table without the ball."""
     world = mobee.load_world("table")
     world.remove("ball")
     return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
 
 
 def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = LEARNED) -> None:
-    """Learn transitions and then reaches at the table, on record in a file."""
+    """Learn transitions and then reaches at the table, recorded in a file."""
     plant = table_plant(seed)
     space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)
     with TransitionStore(file, PART) as store:
@@ -81,7 +81,7 @@ def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = LEAR
 
 
 def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> list[Episode]:
-    """Reach that often for targets that the agent knows, drawn at random, each time from a random state; those that succeeded."""
+    """Reach `count` times for random targets of the agent, each time from a random state; returns the reaches that succeeded."""
     rng, found = np.random.default_rng([seed, 8]), []
     for _ in range(count):
         agent.evaluate([], 1)  # puts the robot in a random state
@@ -92,13 +92,13 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
         if done.reach_state is not None and done.missing <= REACHED:
             motion = recording.motion()
             away = np.linalg.norm(motion.path(agent.marker) - target.position, axis=1)
-            found.append(Episode(target, done, motion.part(0, int(np.argmax(away <= away.min() + NEAR)))))
+            found.append(Episode(target, done, motion.part(0, int(np.argmax(away <= away.min() + ARRIVED)))))
     return found
 
 
 def selected(paths: Sequence[Array]) -> dict[str, int]:
-    """The number of the clearest example of each kind among paths (T, 3) m, none of them for two kinds."""
-    left = [number for number, path in enumerate(paths) if _length(path) >= LEAST]
+    """Return the index of the clearest example of each kind among paths (T, 3) m; no path is chosen for two kinds."""
+    left = [number for number, path in enumerate(paths) if _length(path) >= MIN_LENGTH]
     chosen: dict[str, int] = {}
     for name, measure in KINDS.items():
         if left:
@@ -111,8 +111,8 @@ def _length(path: Array) -> float:
 
 
 def _descent(path: Array) -> float:
-    """The slope of the last piece of a path: 1 vertically down, 0 level."""
-    before = path[np.linalg.norm(path - path[-1], axis=1) >= LAST]
+    """Return the slope of the last piece of a path: 1 vertically down, 0 level."""
+    before = path[np.linalg.norm(path - path[-1], axis=1) >= LAST_PIECE]
     if not len(before):
         return -np.inf
     return float((before[-1] - path[-1])[2] / np.linalg.norm(before[-1] - path[-1]))
@@ -123,15 +123,15 @@ def _distance(path: Array) -> float:
 
 
 def _detour(path: Array) -> float:
-    """The length over the straight distance."""
-    return _length(path) / max(float(np.linalg.norm(path[-1] - path[0])), LAST)
+    """Return the length over the straight distance."""
+    return _length(path) / max(float(np.linalg.norm(path[-1] - path[0])), LAST_PIECE)
 
 
 KINDS = {"From above": _descent, "Far": _distance, "Around the target": _detour}
 
 
 def _strip(name: str, one: Episode, marker: str, poses: int) -> Strip:
-    """From the view in which the target hides least of the hand that is at it."""
+    """Return the filmstrip of a reach, from the view in which the target hides least of the hand."""
     behind = one.motion.poses[-1].position(marker) - one.target.position
     view = min(VIEWS, key=lambda view: float(camera_axes(view)[2] @ behind))
     return Strip(one.motion, marker, (view,), poses, _title(name, one), partial(_caption, marker))
@@ -149,7 +149,7 @@ def _caption(marker: str, motion: Motion, moment: int) -> str:
 
 
 def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]:
-    """Draw the selected reaches of what is on record in a file; returns their titles."""
+    """Draw selected reaches of the learner that is recorded in a file; returns their titles."""
     with ReachStore(file, PART, read_only=True) as store:
         joints = store.settings()["space"]["joints"]
     plant = table_plant(seed + 1, joints)
@@ -157,22 +157,26 @@ def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]
     found = episodes(agent, plant, EPISODES, seed)
     chosen = [(name, found[number]) for name, number in selected([one.motion.path(agent.marker) for one in found]).items()]
     if not chosen:
-        raise MobeeError(f"{file}: none of {EPISODES} reaches ended within {REACHED} m of its target; let it learn more.")
+        raise MobeeError(f"{file}: none of {EPISODES} reaches ended within {REACHED} m of its target; let the agent learn more.")
     strips = [_strip(name, one, agent.marker, poses) for name, one in chosen]
     filmstrip(strips, out, height)
     return [strip.title for strip in strips]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Learn if need be, and draw."""
-    parser = argparse.ArgumentParser(description="Draw selected reaches of what was learned.")
+    """Learn unless the file of a learner exists, and draw."""
+    parser = argparse.ArgumentParser(description="Draw selected reaches of a learner.")
     parser.add_argument(
-        "run", nargs="?", type=Path, metavar="RUN.sqlite", help="the record of a learner; made if not there (default: made, not kept)"
+        "run",
+        nargs="?",
+        type=Path,
+        metavar="RUN.sqlite",
+        help="file of a learner; written if it does not exist (default: a temporary file)",
     )
     parser.add_argument("--out", type=Path, default=Path("reach_film.png"), metavar="PNG", help="default: %(default)s")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the states and targets (default: %(default)s)")
-    parser.add_argument("--poses", type=int, default=6, metavar="N", help="pictures of each reach (default: %(default)s)")
-    parser.add_argument("--height", type=int, default=260, metavar="PIXELS", help="of each picture (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random states and targets (default: %(default)s)")
+    parser.add_argument("--poses", type=int, default=6, metavar="N", help="pictures per reach (default: %(default)s)")
+    parser.add_argument("--height", type=int, default=260, metavar="PIXELS", help="height of each picture (default: %(default)s)")
     options = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         file = options.run or Path(folder) / "run.sqlite"

@@ -1,15 +1,15 @@
-"""Predictors of reach rewards: how near do they come to an oracle, and after how many problem-tries?
+"""Compare predictors of the reward of a reach with an oracle, by the score of the agents that use them.
 
-Claim: a predictor that shares what it learns over poses and targets brings at least .80 of an oracle's score after 200 problem-tries, .90
-after 400 and .97 after 1600, and .80 on targets never tried after 800; the published one brings much less.
+Claim: a predictor that generalises over poses and targets reaches at least .80 of an oracle's score after 200 problem-tries, .90 after
+400 and .97 after 1600, and .80 after 800 on targets that were never tried; the published predictor reaches much less.
 Source: aims of this reproduction, to thesis 8.5 and 9.4.4 ("a more powerful function approximator").  Published: no numbers.
 Run time: 20 minutes on 2 cores.
 
-The arm, its targets and its evaluations are those of `reach-exploration`; all learners have the same seeds, problems and
-transition models.  The oracle plans as they do, but knows the mean reward of every reach and which transitions a target blocks,
-both measured by 5 tries of each on the plant (truth.npz in the run's folder).  Fractions are of the oracle's mean score over all
-seeds, so that they can exceed 1 by chance. Targets never tried: the middles of the grid's eight cells.  "spread", "local",
-"alike": how failed transitions are remembered.
+Arm, targets and evaluations are those of the experiment reach-exploration; learners have the same seeds, problems and transition models.
+The oracle plans as the learners do, but knows the mean reward of every reach and which transitions a target blocks; both are measured by
+5 tries of each on the plant (truth.npz in the run's folder).  Scores are divided by the oracle's mean score over all seeds, so that a
+fraction can exceed 1 by chance.  The targets that are never tried lie in the middle of the grid's eight cells.  "spread", "local" and
+"alike" in a learner's name say how it remembers failed transitions (mobee/learning/reaching/failures.py).
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 ORACLE, TRUTH = "oracle", "truth"
 RECOMMENDED = "gp-ucb-alike"  # by docs/reaching.md
 PUBLISHED = "published"
-CHECKPOINTS = (100, 200, 400, 800, 1600)  # problem-tries after which everybody is evaluated
-REPETITIONS = 5
+CHECKPOINTS = (100, 200, 400, 800, 1600)  # problem-tries after which the learners are evaluated
+REPETITIONS = 5  # evaluations at each checkpoint
 
 GRID, BETWEEN = "grid", "between"
 AIMS = {(GRID, 200): 0.80, (GRID, 400): 0.90, (GRID, 1600): 0.97, (BETWEEN, 800): 0.80}  # set and problem-tries -> fraction of the oracle
-TIMES = 2.0  # the published predictor's score
+MIN_RATIO = 2.0  # of the recommended predictor's score to the published one's
 _SETS = {GRID: "on the 27 targets", BETWEEN: "on 8 targets never tried"}
 AIMED = {
     (name, checkpoint): Claim(
         "aim of this reproduction",
-        f"the recommended predictor reaches at least {least:.2f} of the oracle's score after {checkpoint} problem-tries {_SETS[name]}",
+        f"after {checkpoint} problem-tries the recommended predictor reaches at least {least:.2f} of the oracle's score {_SETS[name]}",
         f"at least {least:.2f}",
     )
     for (name, checkpoint), least in AIMS.items()
 }
 ABOVE = Claim(
     "thesis 8.5",
-    "a more powerful function approximator benefits the system greatly: at least twice the published one's score after 400 tries",
+    "a more powerful function approximator improves the system greatly: at least twice the published predictor's score after 400 tries",
     "no numbers",
 )
 CLAIMS = (*AIMED.values(), ABOVE)
@@ -69,9 +69,9 @@ Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, checkpoin
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options of a sweep, --law, --scale and --only."""
     sweep_arguments(parser)
-    parser.add_argument("--law", choices=list(laws()), default="published", help="the law that the arm moves by (default: published)")
+    parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
         "--scale", type=positive_number, default=SCALE, metavar="M", help=f"the unit of distances in the equations (default: {SCALE} m)"
     )
@@ -79,12 +79,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def places(quick: bool) -> dict[str, Array]:
-    """The targets that are learned and those that are not, by name; --quick: nine and one."""
+    """Return the positions of the targets that are tried and of those that never are, by name; --quick: nine and one."""
     return {GRID: grid()[::3] if quick else grid(), BETWEEN: between()[:1] if quick else between()}
 
 
 def truths(arguments: argparse.Namespace) -> list[Cell]:
-    """The cells that measure the truth, one a target."""
+    """Return the cells that measure the truth, one per target."""
     settings: dict[str, Any] = {"what": TRUTH, "law": arguments.law, "tries": 1 if arguments.quick else TRIES}
     named = {name: found.tolist() for name, found in places(arguments.quick).items()}
     return [
@@ -95,33 +95,33 @@ def truths(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """The oracle and every learner with every seed; --quick: 200 problem-tries."""
+    """Return the cells of the oracle and of every learner with every seed; --quick: 200 problem-tries."""
     settings: dict[str, Any] = {"law": arguments.law, "scale": arguments.scale, "quick": arguments.quick}
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
     checkpoints = [100, 200] if arguments.quick else list(CHECKPOINTS)
     learners = [
-        Cell(f"{name}-s{seed}", seed, settings | {"what": name, "looks": checkpoints}, LEARNERS[name].cost)
+        Cell(f"{name}-s{seed}", seed, settings | {"what": name, "checkpoints": checkpoints}, LEARNERS[name].cost)
         for name in arguments.only or LEARNERS
         for seed in seeds
     ]
     return learners + [Cell(f"oracle-s{seed}", seed, settings | {"what": ORACLE}, 0.2) for seed in seeds]
 
 
-def find_truth(cell: Cell) -> dict[str, Any]:
+def measure_truth(cell: Cell) -> dict[str, Any]:
     """Measure the rewards of all reaches for a target, and which transitions it blocks."""
     settings = cell.settings
     return measure(np.array(settings["place"]), settings["law"], settings["tries"]).values()
 
 
 def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
-    """Learn, or plan with the truth, with evaluations on the targets tried and on those never tried."""
+    """Learn, or plan with the truth, with evaluations on the targets that are tried and on those that never are."""
     settings, space = cell.settings, reach_space()
     plant, aim = reach_plant(cell.seed, settings["law"]), laws()[settings["law"]].aim
     beliefs = learned_beliefs(plant, cell.seed)
     sets = {name: targets_at(found, aim) for name, found in places(settings["quick"]).items()}
     if settings["what"] == ORACLE:
-        knowing = oracle(truth, space, plant, beliefs, MARKER, settings["scale"], cell.seed)
-        each = (of_evaluations(name, [knowing.evaluate(found, 2 * REPETITIONS)]) for name, found in sets.items())
+        best = oracle(truth, space, plant, beliefs, MARKER, settings["scale"], cell.seed)
+        each = (of_evaluations(name, [best.evaluate(found, 2 * REPETITIONS)]) for name, found in sets.items())
         return {key: value for one in each for key, value in one.items()}
     learner = LEARNERS[settings["what"]]
     agent = ReachAgent(
@@ -135,13 +135,13 @@ def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
         scale=settings["scale"],
         seed=cell.seed,
     )
-    return learn(agent, sets[GRID], settings["looks"], REPETITIONS, sets)
+    return learn(agent, sets[GRID], settings["checkpoints"], REPETITIONS, sets)
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the remaining cells: the truth first, then what is compared with it."""
+    """Run the remaining cells: first those that measure the truth, then the oracle and the learners."""
     wanted = truths(arguments)
-    run_cells(find_truth, wanted, folder, arguments)
+    run_cells(measure_truth, wanted, folder, arguments)
     found = load_cells(folder)
     truth = truth_of({tuple(cell.settings["place"]): found[cell.name].values for cell in wanted})
     truth.save(folder / "truth.npz")
@@ -150,13 +150,13 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def oracle_scores(found: Found, name: str) -> Array:
-    """The oracle's cumulative rewards on a set of targets, mean of a seed's evaluations, (seeds,)."""
+    """Return the oracle's score on a set of targets, mean of a seed's evaluations, (seeds,)."""
     runs = grouped(found, "what", [ORACLE]).get(ORACLE, [])
     return np.array([one[f"rewards_{name}"].sum(axis=-1).mean() for one in runs])
 
 
 def fractions(found: Found) -> Fractions:
-    """The scores of the learners, in the order of the seeds, over the oracle's mean."""
+    """Return the scores of the learners, in the order of the seeds, divided by the oracle's mean score."""
     curves: Fractions = {}
     for name in (GRID, BETWEEN):
         best = oracle_scores(found, name)
@@ -167,13 +167,13 @@ def fractions(found: Found) -> Fractions:
 
 
 def evaluated_after(found: Found) -> list[int]:
-    """The problem-tries after which the learners were evaluated."""
-    given = [one.cell.settings["looks"] for one in found.values() if "looks" in one.cell.settings]
+    """Return the problem-tries after which the learners were evaluated."""
+    given = [one.cell.settings["checkpoints"] for one in found.values() if "checkpoints" in one.cell.settings]
     return list(given[0]) if given else []
 
 
 def findings(found: Found) -> dict[str, Any]:
-    """A row a learner and set, and the claims."""
+    """Return a row per learner and set of targets, and the claims."""
     curves, at = fractions(found), evaluated_after(found)
     rows = {
         f"{learner}, {_SETS[name]}": {str(checkpoint): estimate(column) for checkpoint, column in zip(at, curve.T, strict=True)}
@@ -185,15 +185,15 @@ def findings(found: Found) -> dict[str, Any]:
         for learner in {one.cell.settings["what"] for one in found.values()}
     }
     return {
-        "oracle": best,
-        "fractions": rows,
-        "seconds": dict(sorted(seconds.items())),
+        "oracle's score": best,
+        "fraction of the oracle's score after so many tries": rows,
+        "computing seconds": dict(sorted(seconds.items())),
         "claims": [claim.record() for claim in measured(curves, at)],
     }
 
 
 def measured(curves: Fractions, at: list[int]) -> list[Claim]:
-    """The claims with our numbers; open where the learner or the evaluation is missing."""
+    """Return the claims with our numbers; open where the learner or the evaluation was not run."""
     claims = []
     for (name, checkpoint), claim in AIMED.items():
         ours, published = (_column(curves, at, learner, name, checkpoint) for learner in (RECOMMENDED, PUBLISHED))
@@ -207,7 +207,7 @@ def measured(curves: Fractions, at: list[int]) -> list[Claim]:
         return [*claims, ABOVE]
     low, high = ratio_interval(ours, published)
     text = f"{ratio(ours, published):.2f} x [{low:.2f}, {high:.2f}] ({RECOMMENDED} {estimate(ours)}, published {estimate(published)})"
-    return [*claims, ABOVE.measured(text, decides((low, high), least=TIMES))]
+    return [*claims, ABOVE.measured(text, decides((low, high), least=MIN_RATIO))]
 
 
 def _column(curves: Fractions, at: list[int], learner: str, name: str, checkpoint: int) -> Array | None:
@@ -215,17 +215,17 @@ def _column(curves: Fractions, at: list[int], learner: str, name: str, checkpoin
 
 
 def plot(found: Found) -> Any:
-    """Fractions of the oracle's score against problem-tries: targets tried, targets never tried; the aims as crosses."""
+    """Draw fractions of the oracle's score over problem-tries, for targets tried and targets never tried; crosses mark our aims."""
     curves, at = fractions(found), evaluated_after(found)
     if not curves:
-        raise InvalidValue("there is no finished learner beside the oracle: the run was stopped before.")
+        raise InvalidValue("no learner has finished, or the oracle has not: continue the run with --resume.")
     drawing = new_figure(14.0, 5.5)
     for axes, (name, title) in zip(drawing.subplots(1, 2, sharey=True), TITLES.items(), strict=True):
         for number, learner in enumerate(LEARNERS):
             if (learner, name) in curves:
                 _curve(axes, at, curves[learner, name], learner, f"C{number % 10}", "--" if number >= 10 else "-")
         wanted = [(checkpoint, least) for (other, checkpoint), least in AIMS.items() if other == name]
-        axes.plot(*zip(*wanted, strict=True), "kx", markersize=9.0, label="aims")
+        axes.plot(*zip(*wanted, strict=True), "kx", markersize=9.0, label="aims of this reproduction")
         axes.axhline(1.0, color="k", linestyle=":", linewidth=0.8)
         axes.set(xscale="log", xlabel="problem-tries", title=title, ylim=(0.0, None))
         axes.set_xticks(at, at)
@@ -237,7 +237,7 @@ def plot(found: Found) -> Any:
 
 
 def _curve(axes: Any, at: list[int], curve: Array, learner: str, color: str, style: str) -> None:
-    """Interquartile means; the intervals of the recommended and of the published one."""
+    """Draw interquartile means, and the intervals of the recommended and the published predictor."""
     middle = [interquartile_mean(column) for column in curve.T]
     axes.plot(at, middle, style, color=color, label=learner, linewidth=2.2 if learner in (RECOMMENDED, PUBLISHED) else 1.0)
     if learner in (RECOMMENDED, PUBLISHED):
@@ -253,7 +253,7 @@ def figure(folder: Path) -> Path:
 
 EXPERIMENT = Experiment(
     name="reach-predictors",
-    claim="predictors that share over poses and targets reach nearly as well as one who knows the truth, after a few hundred tries",
+    claim="after a few hundred tries, predictors that generalise over poses and targets score nearly as high as an oracle",
     source="aims of this reproduction, to thesis 8.5 and 9.4.4",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

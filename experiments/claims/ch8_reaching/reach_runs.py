@@ -1,4 +1,4 @@
-"""The numbers of the runs of one exploration strategy: scores, choices of states, agreement, coverage and costs."""
+"""Measures of the runs of one exploration strategy: scores, choices of states, agreement, coverage and costs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from mobee.learning.reaching.evaluation import NOWHERE
 from mobee.learning.reaching.where import hands_of
 
 STRATEGIES = ("intrinsic", "greedy", "random")
-CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which everybody is evaluated
+CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which the agents are evaluated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The runs of one strategy, by seed: values of their cells, and the seconds that each took."""
+    """The N runs of one strategy, by seed: values of their cells, and the computing time of each, s."""
 
     values: tuple[Mapping[str, Any], ...]
     seconds: tuple[float, ...]
@@ -31,75 +31,75 @@ class Runs:
         return len(self.values)
 
     def scores(self, checkpoint: int) -> Array:
-        """The cumulative reward over the targets, mean of the evaluations, (N,): what figure 8.2 stacks."""
+        """Return the sum of the rewards of all targets, mean of the evaluations, (N,), as in figure 8.2."""
         at = self.checkpoints.index(checkpoint)
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
     def chosen(self, checkpoint: int) -> Array:
-        """The share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
+        """Return the share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
         at = self.checkpoints.index(checkpoint)
         return np.array([_shares(one["states_grid"][at]) for one in self.values])
 
     def agreement(self, checkpoint: int) -> Array:
-        """The mean overlap of each run's choices with those of another run, (N,), 0 to 1."""
+        """Return the mean overlap of each run's choices with those of the other runs, (N,), 0 to 1."""
         chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
         others = max(len(self) - 1, 1)
         shared: Array = (overlaps.sum(axis=1) - overlaps.diagonal()) / others
         return shared
 
-    def favourites(self, checkpoint: int) -> Array:
-        """The least number of states that make half of a run's reaches, (N,)."""
+    def states_of_half(self, checkpoint: int) -> Array:
+        """Return the smallest number of states from which half of a run's reaches started, (N,)."""
         ordered = -np.sort(-self.chosen(checkpoint), axis=1)
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, checkpoint: int) -> Array:
-        """The mean height of the palm in the chosen states above that in all states, (N,) m."""
+        """Return the mean height of the palm in the chosen states minus that in all states, (N,) m."""
         heights = palms()[:, 2]
         above: Array = self.chosen(checkpoint) @ heights - heights.mean()
         return above
 
     def tried(self, tries: int) -> Array:
-        """The share of all pairs of a state and a target that were tried in the first so many problem-tries, (N,)."""
+        """Return the share of all pairs of a state and a target that were tried in the first `tries` problem-tries, (N,)."""
         return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
 
     def exploration(self, tries: int) -> Array:
-        """The mean number of reaches by target and state in the first so many problem-tries, (27, S): fig. 8.7."""
+        """Return the mean number of reaches by target and state in the first `tries` problem-tries, (27, S): fig. 8.7."""
         mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
         return mean
 
     def concentration(self, first: int, last: int) -> Array:
-        """The share of the two most frequent states among the reaches of problem-tries `first` to `last`, (N,)."""
+        """Return the share of the two most frequent states among the reaches of problem-tries `first` to `last`, (N,)."""
         sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
         return np.array([one[:2].sum() / one.sum() for one in sums])
 
     def failures(self) -> Array:
-        """The number of negative rewards of each run while it explored, (N,)."""
+        """Return the number of negative rewards of each run during exploration, (N,)."""
         return np.array([float(one["failures"].sum()) for one in self.values])
 
     def hours(self) -> Array:
-        """The robot's time of exploration, (N,) h."""
+        """Return the robot time of exploration, (N,) h."""
         return np.array([float(one["duration"].sum()) / 3600.0 for one in self.values])
 
     def actions(self) -> Array:
-        """Actions a problem-try, (N,)."""
+        """Return the mean number of actions per problem-try, (N,)."""
         return np.array([float(one["actions"].mean()) for one in self.values])
 
 
 def palms() -> Array:
-    """The position of the palm in each state, (S, 3) m."""
+    """Return the position of the palm in each state, (S, 3) m."""
     return hands_of(reach_space(), MARKER)
 
 
 def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
-    """The runs by strategy, in the order of the seeds."""
+    """Return the runs by strategy, in the order of the seeds."""
     ordered = sorted(found.values(), key=lambda result: result.cell.seed)
     runs = {}
     for strategy in STRATEGIES:
-        mine = [result for result in ordered if result.cell.settings["strategy"] == strategy]
-        if mine:
-            checkpoints = tuple(mine[0].cell.settings["looks"])
-            runs[strategy] = Runs(tuple(one.values for one in mine), tuple(one.seconds for one in mine), checkpoints)
+        results = [result for result in ordered if result.cell.settings["strategy"] == strategy]
+        if results:
+            checkpoints = tuple(results[0].cell.settings["checkpoints"])
+            runs[strategy] = Runs(tuple(one.values for one in results), tuple(one.seconds for one in results), checkpoints)
     return runs
 
 

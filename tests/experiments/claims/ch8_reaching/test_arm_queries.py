@@ -14,30 +14,30 @@ def scene():
     return make_scene(3, 6)
 
 
-def test_a_scene_follows_from_its_seed(scene):
+def test_a_seed_gives_the_same_scene_again(scene):
     again = make_scene(3, 6)
     for name in ("balls", "shifts", "turns", "starts", "goals", "is_hard"):
         assert np.array_equal(getattr(scene, name), getattr(again, name))
     assert not np.array_equal(make_scene(4, 2).balls, scene.balls)
 
 
-def test_half_the_queries_are_hard_and_none_is_there_already(scene):
+def test_half_of_the_queries_are_hard_and_none_begins_in_its_goal(scene):
     assert scene.is_hard.sum() == 3
     assert all(space().state_of(q) != goal for q, goal in zip(scene.starts, scene.goals, strict=True))
 
 
-def test_the_planners_are_as_mistaken_as_they_should_be(scene):
+def test_balls_and_joints_have_errors_of_the_stated_size(scene):
     assert np.linalg.norm(scene.shifts, axis=1) == pytest.approx(np.full(4, SHIFT))
     assert np.abs(scene.turns) == pytest.approx(np.full(4, TURN))
 
 
-def test_going_straight_reaches_the_easy_goals_and_takes_its_time_for_the_hard_ones(scene):
+def test_straight_motions_reach_the_easy_goals_and_failed_queries_last_as_long_as_the_limit(scene):
     got = answer(scene, Straight(space()), 3)
     assert got.success[~scene.is_hard].all() and (got.seconds[got.success] < LIMIT).all()
     assert (got.seconds[~got.success] == LIMIT).all() and got.actions.min() >= 1
 
 
-def test_hidden_cables_make_poses_sound_that_are_not():
+def test_without_cables_the_hard_states_are_believed_to_be_sound():
     far = Scene(np.full((1, 3), 5.0), np.zeros((1, 3)), np.zeros(4), np.zeros((0, 4)), np.zeros(0, dtype=int), np.zeros(0, dtype=bool))
     samples = space().samples
     hard = [24, 51, 78]
@@ -45,7 +45,7 @@ def test_hidden_cables_make_poses_sound_that_are_not():
     assert believed(far, "no cables").sound(samples).all()
 
 
-def test_a_ball_is_believed_where_calibration_puts_it():
+def test_a_miscalibrated_belief_has_the_ball_elsewhere():
     sample = space().samples[40]
     robot = load_robot("icub_2014")
     palm = Model(robot).evaluate(whole(sample)).position("left_palm")
@@ -56,7 +56,7 @@ def test_a_ball_is_believed_where_calibration_puts_it():
     assert len(Model(robot, world_of(palm[None])).evaluate(whole(sample)).table)
 
 
-def test_a_motion_is_sound_only_if_all_of_it_is():
+def test_a_motion_past_a_ball_is_not_sound_though_its_ends_are():
     lattice = space()
     nowhere = np.zeros((0, 4)), np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
     start, end = lattice.samples[36], lattice.samples[44]

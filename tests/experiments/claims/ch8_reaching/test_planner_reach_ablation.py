@@ -22,18 +22,18 @@ def sweep(**shares):
 
 
 @pytest.mark.parametrize(("planner", "reach", "expected"), [(0.2, 0.6, True), (0.2, 0.8, None), (0.9, 0.1, False)])
-def test_both_must_have_more_success_than_each_alone(planner, reach, expected):
+def test_both_together_must_succeed_more_often_than_each_alone(planner, reach, expected):
     both = np.full(6, 0.8)
     assert does_more(both, {"planner": np.full(6, planner), "reach": np.full(6, reach)}) is expected
 
 
-def test_each_scene_is_a_claim_of_its_own_by_what_decides_under_the_law():
+def test_each_scene_has_a_claim_about_the_measure_of_its_law():
     found = findings(sweep(planner=0.3, reach=0.5, both=0.9))["claims"]
     assert len(found) == len(LAWS) * len(SCENES) and {claim["verdict"] for claim in found} == {"confirmed"}
     assert "reward planner alone 0.03" in found[0]["ours"] and "success planner alone 0.30" in found[-1]["ours"]
 
 
-def test_the_table_has_success_and_the_remaining_distance():
+def test_the_rows_have_success_and_the_distance_that_is_left():
     rows = findings(sweep(planner=0.3, reach=0.5, both=0.9))["cases"]
     assert len(rows) == len(LAWS) * len(SCENES) * len(METHODS)
-    assert rows[0]["success"].startswith("0.30") and rows[0]["median missing [cm]"].startswith("10.0")
+    assert rows[0]["success"].startswith("0.30") and rows[0]["median distance left [cm]"].startswith("10.0")

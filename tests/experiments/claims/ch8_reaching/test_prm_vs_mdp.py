@@ -13,7 +13,7 @@ HARD = np.tile([True, False], BLOCK)
 def rival(name, share, seconds):
     success = np.arange(2 * BLOCK) < share * 2 * BLOCK
     numbers = {"success": success, "seconds": np.full(2 * BLOCK, seconds), "actions": np.full(2 * BLOCK, 3), "repairs": np.zeros(2 * BLOCK)}
-    return {f"{name}|{measure}": values for measure, values in numbers.items()} | {f"{name}|price": np.array(7.0)}
+    return {f"{name}|{measure}": values for measure, values in numbers.items()} | {f"{name}|cost": np.array(7.0)}
 
 
 @pytest.fixture
@@ -28,24 +28,24 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_row_is_a_rival_under_a_belief_with_all_its_seeds(folder):
+def test_a_row_summarises_all_seeds_of_a_rival_under_a_belief(folder):
     summary = summary_of(load_cells(folder))
     once = summary.row("OMPL, planned once", "both")
-    assert (once.success.mean, once.hard.mean, once.seconds.mean, once.price) == (0.5, 0.5, 60.0, 7.0)
+    assert (once.success.mean, once.hard.mean, once.seconds.mean, once.cost) == (0.5, 0.5, 60.0, 7.0)
     learned = summary.row("MDP, 4000 learned", "")
     assert learned.seconds.low == 18.0 and learned.seconds.high == 20.0 and learned.curve.shape == (2, 3)
     with pytest.raises(InvalidValue, match="resume"):
         summary.row("straight", "")
 
 
-def test_planning_once_fails_and_a_graph_that_is_repaired_does_not(folder):
+def test_a_rival_that_fails_confirms_and_one_that_works_refutes(folder):
     first, second = measured(summary_of(load_cells(folder)))
     assert (first.verdict, second.verdict) == ("confirmed", "refuted")
     assert "0.50" in first.ours and "7.0 h" in second.ours
 
 
 @pytest.mark.parametrize(("once", "mdp", "verdict"), [(0.9, 1.0, "confirmed"), (0.96, 1.0, "refuted"), (0.9, 0.8, "open")])
-def test_a_roadmap_falls_short_where_it_neither_works_well_nor_as_well_as_the_mdp(tmp_path, once, mdp, verdict):
+def test_a_roadmap_must_be_below_95_percent_and_below_the_mdp(tmp_path, once, mdp, verdict):
     for seed in range(2):
         all_hard = np.ones(2 * BLOCK, dtype=bool)
         both = rival("OMPL, planned once", once, 60.0) | rival("OMPL, remembers", once, 20.0)
@@ -56,13 +56,13 @@ def test_a_roadmap_falls_short_where_it_neither_works_well_nor_as_well_as_the_md
     assert [claim.verdict for claim in claims] == [verdict, verdict]
 
 
-def test_a_scene_with_fewer_queries_counts_as_far_as_it_goes(folder):
+def test_a_scene_with_fewer_queries_counts_in_the_blocks_it_has(folder):
     few = {key: values[:BLOCK] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
     write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK], **few}, 1.0)
     curve = summary_of(load_cells(folder)).row("MDP, 4000 learned", "").curve
     assert curve[:, 0].tolist() == [19.5, 19.0]
 
 
-def test_the_figure_is_drawn_from_what_is_there(folder):
+def test_the_figure_of_an_unfinished_run_is_drawn(folder):
     pytest.importorskip("matplotlib")
     assert EXPERIMENT.method.figure(folder).stat().st_size > 10_000

@@ -4,7 +4,23 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching import reach_exploration
-from experiments.claims.ch8_reaching.reach_exploration import THOSE, _choices, measured, plot, trial
+from experiments.claims.ch8_reaching.reach_exploration import (
+    AGREE,
+    BETTER,
+    DECREASES,
+    FALLS,
+    FEW,
+    NEGATIVE,
+    SAME_STATES,
+    SPEED,
+    STEADY,
+    TIME,
+    TIME_GREEDY,
+    WEAK_EARLY,
+    measured,
+    plot,
+    trial,
+)
 from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, Runs
 from experiments.kit.reaching import arm
 from tests.experiments.finished_cells import Cell, finished
@@ -45,79 +61,51 @@ def verdicts(found) -> dict[str, str]:
     return {claim.text: claim.verdict for claim in measured(found)}
 
 
-def verdict_of_favourites(found) -> str:
-    (verdict,) = [claim.verdict for claim in _choices(found) if claim.text == THOSE.text]
-    return verdict
-
-
-def of(found: dict[str, str], words: str) -> str:
-    (verdict,) = [verdict for text, verdict in found.items() if words in text]
-    return verdict
+BETTER_LATE = (BETTER[800], BETTER[1600], BETTER[6400])
 
 
 def test_the_published_findings_confirm_the_claims():
     found = verdicts(runs())
-    for words in (
-        "after 800 problem",
-        "after 1600 problem",
-        "after 6400 problem",
-        "less competent",
-        "steadily",
-        "falls back",
-        "decreases",
-        "come to agree",
-        "few fav",
-    ):
-        assert of(found, words) == "confirmed", words
-    for words in ("many more negative", "about twice", "about as long", "less than 10 minutes"):
-        assert of(found, words) == "confirmed", words
+    for claim in (*BETTER_LATE, WEAK_EARLY, STEADY, FALLS, DECREASES, AGREE, FEW, NEGATIVE, TIME, TIME_GREEDY, SPEED):
+        assert found[claim.text] == "confirmed", claim.text
 
 
 def test_a_better_greedy_agent_refutes_them():
     broad = ((4.8, 5.0, 5.2, 6.4, 7.9, 7.9, 7.0), 20, 100, 22.6)
     found = verdicts(runs(intrinsic=broad, greedy=((6.0, 6.5, 7.0, 8.0, 9.0, 9.0, 9.5), 1, 900, 60.0)))
-    for words in (
-        "after 800 problem",
-        "after 1600 problem",
-        "after 6400 problem",
-        "come to agree",
-        "few fav",
-        "many more negative",
-        "about as long",
-    ):
-        assert of(found, words) == "refuted", words
+    for claim in (*BETTER_LATE, AGREE, FEW, NEGATIVE, TIME_GREEDY):
+        assert found[claim.text] == "refuted", claim.text
 
 
 def test_equal_agents_refute_that_one_is_better_and_leave_changes_open():
     same = ((5.0,) * 7, 3, 100, 20.0)
     found = verdicts(runs(intrinsic=same, greedy=same, random=same))
-    assert of(found, "after 1600 problem") == "refuted" and of(found, "falls back") == "open"
-    assert of(found, "about twice") == "refuted"
+    assert [found[claim.text] for claim in (BETTER[1600], FALLS, TIME)] == ["refuted", "open", "refuted"]
 
 
 @pytest.mark.parametrize(
     ("first", "second", "verdict"), [(57, 77, "confirmed"), (76, 56, "confirmed"), (57, 76, "refuted"), (0, 1, "refuted")]
 )
-def test_the_favourites_are_those_of_the_thesis_or_not(first, second, verdict):
+def test_the_two_states_must_be_those_of_the_thesis(first, second, verdict):
     made = runs()
     for one in made["intrinsic"].values:
         one["states_grid"][-1] = np.where(one["states_grid"][-1] == 0, first, second)
-    assert verdict_of_favourites(made) == verdict
+    assert verdicts(made)[SAME_STATES.text] == verdict
 
 
 def test_the_agreement_of_runs_is_the_overlap_of_their_choices():
     pair = [dict(values(0, (1.0,) * 7, 2, 0, 1.0)) for _ in range(2)]
     for one, states in zip(pair, ([0, 0, 1, 1], [0, 2, 2, 2]), strict=True):
         one["states_grid"] = np.tile(states, (7, 1))
-    mine = Runs(tuple(pair), (1.0, 1.0), CHECKPOINTS)
-    assert mine.agreement(100) == pytest.approx([0.25, 0.25])
-    assert mine.favourites(100).tolist() == [1.0, 1.0]
+    group = Runs(tuple(pair), (1.0, 1.0), CHECKPOINTS)
+    assert group.agreement(100) == pytest.approx([0.25, 0.25])
+    assert group.states_of_half(100).tolist() == [1.0, 1.0]
 
 
 def test_the_settings_alone_decide_a_trial(monkeypatch):
     monkeypatch.setattr(reach_exploration, "learned_beliefs", lambda plant, seed: arm.learned_beliefs(plant, seed, 40))
     monkeypatch.setattr(reach_exploration, "REPETITIONS", 1)
-    settings = {"strategy": "intrinsic", "law": "published", "scale": 0.01, "looks": [4]}
+    settings = {"strategy": "intrinsic", "law": "published", "scale": 0.01, "checkpoints": [4]}
     first, second = trial(settings, 5), trial(settings, 5)
     assert all(np.array_equal(first[name], second[name]) for name in first)
     assert first["rewards_grid"].shape == (1, 1, 27) and 0.0 < first["rewards_grid"].sum() < 27.0
@@ -128,6 +116,6 @@ def test_a_run_is_drawn(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(reach_exploration, "HEIGHT", 40)  # small pictures take no time
     made = runs()
-    cells = [Cell(f"{name}-s{seed}", seed, {"strategy": name, "looks": list(CHECKPOINTS)}) for name in made for seed in range(2)]
+    cells = [Cell(f"{name}-s{seed}", seed, {"strategy": name, "checkpoints": list(CHECKPOINTS)}) for name in made for seed in range(2)]
     plot(finished(lambda cell: made[cell.settings["strategy"]].values[cell.seed], cells)).savefig(tmp_path / "reach.png")
     assert (tmp_path / "reach.png").stat().st_size > 50_000

@@ -17,7 +17,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_episodes_show_the_target_all_the_time_end_with_the_hand_at_it_and_leave_no_trace(run: Path) -> None:
+def test_episodes_show_the_target_and_end_with_the_hand_at_it_and_do_not_change_the_file(run: Path) -> None:
     before, plant = run.read_bytes(), table_plant(1)
     agent = load_reaches(run, plant)
     found = episodes(agent, plant, 4, 0)
@@ -25,7 +25,7 @@ def test_episodes_show_the_target_all_the_time_end_with_the_hand_at_it_and_leave
     for one in found:
         for objects in one.motion.objects:
             np.testing.assert_array_equal(objects[TARGET].position, one.target.position)
-        away = np.linalg.norm(one.motion.way(agent.marker) - one.target.position, axis=1)
+        away = np.linalg.norm(one.motion.path(agent.marker) - one.target.position, axis=1)
         assert away[-1] <= one.target.radius + 0.025 and (away[:-1] > away[-1]).all()
     assert run.read_bytes() == before
 
@@ -53,11 +53,11 @@ TURNING = np.concatenate([STRAIGHT, STRAIGHT[::-1] + [0.0, 0.0, 0.05]])
 SHORT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], 20)
 
 
-def test_each_kind_of_way_is_selected_once() -> None:
+def test_one_path_of_each_kind_is_selected() -> None:
     found = selected([STRAIGHT, SHORT, ABOVE, TURNING, FAR])
     assert found == {"From above": 2, "Far": 4, "Around the target": 3}
 
 
-def test_of_fewer_ways_than_kinds_each_is_selected_once_and_short_ones_never() -> None:
+def test_no_path_is_selected_twice_and_short_paths_never() -> None:
     assert selected([SHORT]) == {}
     assert selected([SHORT, FAR]) == {"From above": 1}

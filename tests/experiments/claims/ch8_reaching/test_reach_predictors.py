@@ -20,7 +20,7 @@ SEEDS, TARGETS = 6, {GRID: 27, BETWEEN: 8}
 def result(what: str, seed: int, level: float):
     checkpoints = 1 if what == ORACLE else len(CHECKPOINTS)
     values = {f"rewards_{name}": np.full((checkpoints, 5, count), level) for name, count in TARGETS.items()}
-    settings = {"what": what} | ({} if what == ORACLE else {"looks": list(CHECKPOINTS)})
+    settings = {"what": what} | ({} if what == ORACLE else {"checkpoints": list(CHECKPOINTS)})
     return SimpleNamespace(cell=Cell(f"{what}-s{seed}", seed, settings), seconds=1.0, values=values)
 
 
@@ -39,13 +39,13 @@ def test_scores_are_divided_by_the_oracles():
     assert curves[PUBLISHED, BETWEEN] == pytest.approx(np.full((SEEDS, len(CHECKPOINTS)), 0.4))
 
 
-def test_the_aims_decide():
+def test_the_aims_decide_the_claims():
     assert verdicts(found(0.98, 0.4)) == ["confirmed"] * 5
     assert verdicts(found(0.92, 0.5)) == ["confirmed", "confirmed", "refuted", "confirmed", "refuted"]
     assert verdicts(found(0.5, 0.6)) == ["refuted"] * 5
 
 
-def test_what_was_not_run_stays_open():
+def test_claims_about_a_learner_that_was_not_run_stay_open():
     cells = {name: one for name, one in found(0.98, 0.5).items() if one.cell.settings["what"] != RECOMMENDED}
     assert verdicts(cells) == ["open"] * 5
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.reach_under_model_error import ABOVE, CLAIMS, EVEN, crossover, findings, measured, verdict
+from experiments.claims.ch8_reaching.reach_under_model_error import ABOVE, CLAIMS, EVEN, LABELS, crossover, findings, measured, verdict
 from tests.experiments.finished_cells import Cell, finished
 
 TRIES = [100, 200, 800]
@@ -15,16 +15,17 @@ def sweep(learner, peers):
     given = {"learner": learner, **peers}
 
     def work(cell):
-        rows = [{"fates": [s, 1.0 - s, 0.0, 0.0], "seconds": 10.0, "actions": 3.0, "hours": 1.0} for s in given[cell.settings["who"]]]
+        shares = given[cell.settings["contestant"]]
+        rows = [{"fates": [s, 1.0 - s, 0.0, 0.0], "seconds": 10.0, "actions": 3.0, "hours": 1.0} for s in shares]
         return {"rows": rows, "planning": [0.1, 0.2]}
 
     return finished(
         work,
         [
-            Cell(f"{who}-{wrong}-{seed}", seed, {"who": who, "wrong": wrong, "tries": TRIES})
+            Cell(f"{contestant}-{wrong}-{seed}", seed, {"contestant": contestant, "wrong": wrong, "tries": TRIES})
             for seed in range(SEEDS)
             for wrong in ("nothing", "planners", "everyone")
-            for who in given
+            for contestant in given
         ],
     )
 
@@ -42,17 +43,17 @@ def peers(none=0.5, blocked=0.5, missed=0.9):
         (-0.1, 0.3, -EVEN, False),
     ],
 )
-def test_a_lead_counts_over_the_better_of_the_peers(none, blocked, least, expected):
+def test_the_learner_must_lead_both_peers(none, blocked, least, expected):
     leads = {"none": np.full(SEEDS, none), "blocked": np.full(SEEDS, blocked)}
     assert verdict(leads, least) is expected
 
 
-def test_a_lead_that_its_interval_leaves_open_is_open():
+def test_a_lead_whose_interval_contains_the_bound_is_open():
     spread = np.array([0.0, 0.4, 0.1, 0.3, 0.05, 0.35])
     assert verdict({"none": spread, "blocked": np.full(SEEDS, 0.5)}, ABOVE) is None
 
 
-def test_claims_look_at_their_own_number_of_tries():
+def test_each_claim_is_about_its_own_number_of_tries():
     found = measured(sweep([0.2, 0.5, 0.8], peers()))
     assert [claim.verdict for claim in found] == ["confirmed"] * 4 + ["refuted"]
     found = measured(sweep([0.9, 0.3, 0.6], peers()))
@@ -60,19 +61,19 @@ def test_claims_look_at_their_own_number_of_tries():
     assert "0.60" in found[1].ours and "lead 0.10" in found[1].ours
 
 
-def test_what_is_not_measured_is_open():
+def test_claims_without_cells_are_open():
     found = measured({})
     assert [claim.verdict for claim in found] == ["open"] * len(CLAIMS)
 
 
-def test_the_learner_has_crossed_over_where_it_is_not_below_the_peer_for_good():
+def test_the_crossover_is_the_number_of_tries_from_which_the_learner_stays_no_lower():
     learner = np.array([[0.6, 0.4, 0.7], [0.5, 0.5, 0.5], [0.1, 0.2, 0.3]])
     peer = np.full((3, 3), 0.5)
     assert crossover(TRIES, learner, peer).tolist() == [800.0, 100.0, np.inf]
 
 
-def test_the_table_has_a_row_of_everyone_and_says_where_nobody_crossed_over():
+def test_there_is_a_row_for_each_contestant_and_a_crossover_for_each_planner():
     table = findings(sweep([0.2, 0.4, 0.8], peers()))
-    assert len(table["success"]) == 12 and table["success"][0]["success at 800"].startswith("0.80")
-    texts = {row["peer remembers"]: row["learner no lower after [tries]"] for row in table["crossover"]}
-    assert set(texts["missed"].split(", ")) == {"never"} and set(texts["none"].split(", ")) == {"800"}
+    assert len(table["success"]) == 12 and table["success"][0]["success after 800 tries"].startswith("0.80")
+    texts = {row["planner"]: row["learner no worse after so many tries, by seed"] for row in table["crossover"]}
+    assert set(texts[LABELS["missed"]].split(", ")) == {"never"} and set(texts[LABELS["none"]].split(", ")) == {"800"}

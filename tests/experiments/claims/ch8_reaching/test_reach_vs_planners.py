@@ -29,7 +29,7 @@ def verdicts(**given):
 
 
 @pytest.mark.parametrize(("learner", "expected"), [(0.9, "confirmed"), (1.0, "confirmed"), (0.8, "refuted")])
-def test_the_learner_may_not_fall_behind_the_peer(learner, expected):
+def test_the_learner_may_be_at_most_5_points_below_the_planner(learner, expected):
     assert verdicts(learner=learner)[:3] == [expected] * 3
 
 
@@ -40,5 +40,5 @@ def test_a_planner_is_slow_if_it_takes_a_tenth_of_the_published_time(seconds, sm
 
 def test_the_table_has_planning_in_milliseconds():
     table = sweep()
-    assert len(table["cases"]) == len(SCENES) * len(CONTESTANTS) and table["cases"][0]["planning [ms]"].startswith("1.0")
+    assert len(table["cases"]) == len(SCENES) * len(CONTESTANTS) and table["cases"][0]["planning per try [ms]"].startswith("1.0")
     assert table["both arms"]["seconds"].startswith("0.010")

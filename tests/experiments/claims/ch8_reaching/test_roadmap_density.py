@@ -6,7 +6,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.roadmap_density import APART, CLAIMS, MODES, SPACINGS, Query, built, draw_query, findings, plot, walked
+from experiments.claims.ch8_reaching.roadmap_density import (
+    CLAIMS,
+    MIN_DISTANCE,
+    MODES,
+    SPACINGS,
+    Query,
+    built,
+    draw_query,
+    findings,
+    plot,
+    walked,
+)
 from experiments.kit.roadmap_task import RIGHT
 from mobee import Model, Roadmap, World, load_robot
 from mobee.roadmap.edges import check_edges
@@ -18,18 +29,18 @@ def query() -> Query:
     return draw_query(np.random.default_rng(0), built(SPACINGS[0]))
 
 
-def test_a_query_is_blocked_on_the_optimistic_way_and_has_another(query: Query) -> None:
+def test_the_shortest_path_of_a_query_is_blocked_and_another_path_remains(query: Query) -> None:
     roadmap = built(SPACINGS[0])
     palms = roadmap.model.evaluate(roadmap.q[[query.start, query.goal]]).position(RIGHT)
-    assert np.linalg.norm(palms[0] - palms[1]) >= APART
-    way = roadmap.graph.shortest(query.start, query.goal)
-    pairs = np.sort(np.stack([way[:-1], way[1:]], axis=1), axis=1)
+    assert np.linalg.norm(palms[0] - palms[1]) >= MIN_DISTANCE
+    path = roadmap.graph.shortest(query.start, query.goal)
+    pairs = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
     assert not check_edges(query.model, roadmap.q, pairs).all()
     assert roadmap.graph.shortest(query.start, query.goal, query.blocked) is not None
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_walk_arrives_over_free_edges_alone_and_bumps_once_an_edge(query: Query, mode: str) -> None:
+def test_a_walk_passes_only_free_edges_and_bumps_at_most_once_per_edge(query: Query, mode: str) -> None:
     roadmap = built(SPACINGS[0])
     walk = walked(roadmap, query, mode)
     assert walk.arrived and walk.path[0] == query.start and walk.path[-1] == query.goal
@@ -38,7 +49,7 @@ def test_a_walk_arrives_over_free_edges_alone_and_bumps_once_an_edge(query: Quer
     assert 1 <= walk.bumps <= len(query.blocked) and walk.edges == walk.bumps + len(pairs)
 
 
-def test_nothing_is_found_where_no_way_is_left() -> None:
+def test_a_walk_ends_where_no_path_remains() -> None:
     icub = load_robot("icub")
     model = Model(icub, World())
     line = np.repeat(icub.home[None], 3, axis=0)
@@ -70,8 +81,8 @@ def results(few: int, many: int, around: int, arrived: bool = True) -> dict[str,
         (results(9, 90, 99, arrived=False), ["refuted", "confirmed", "refuted"]),
     ],
 )
-def test_bumps_and_queries_that_fail_decide(found: dict[str, Any], verdicts: list[str], tmp_path: Path) -> None:
-    told = findings(found)
-    assert [claim["verdict"] for claim in told["claims"]] == verdicts and len(verdicts) == len(CLAIMS)
-    assert told["played"]["without a solid contact"] == told["played"]["ways"] == 6
+def test_bumps_and_failed_queries_decide_the_claims(found: dict[str, Any], verdicts: list[str], tmp_path: Path) -> None:
+    results = findings(found)
+    assert [claim["verdict"] for claim in results["claims"]] == verdicts and len(verdicts) == len(CLAIMS)
+    assert results["executed"]["paths without a solid contact"] == results["executed"]["paths"] == 6
     plot(found).savefig(tmp_path / "pregrasp.png")
