@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.experiment import LEAST_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.experiment import MIN_SEEDS, Claim, open_with_few_seeds
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue
@@ -37,7 +37,7 @@ kill. `--engine ray` (`pip install '.[cluster]'`) works on the Ray cluster that 
 this machine alone if there is none; MoBeE must be installed on each of them in the same version. `--quick` shows whether it works.
 
 **confirmed**: our number is what was published. **refuted**: it is not. **open**: it was not measured, does not decide, or rests on
-fewer than {LEAST_SEEDS} seeds.
+fewer than {MIN_SEEDS} seeds.
 
 Where states have 16 neighbours, many samples are equally far, and which become neighbours is drawn. In exploration-coverage and
 neighbour-count each seed draws its own graph. Everywhere else all seeds share one (tie seed 0): there the intervals cover noise,

@@ -18,8 +18,8 @@ from experiments.kit.run_folder import (
     discard_unused,
     experiment_of,
     given_run,
-    held,
     keep_options,
+    locked,
     new_run,
     newest_run,
     options_of,
@@ -127,7 +127,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     try:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
         folder = options.resume or new_run(options.runs, experiment.name, own)
-        with held(folder):
+        with locked(folder):
             if options.resume:
                 keep_options(folder, experiment.name, own)
             results = _results(experiment, options, folder)

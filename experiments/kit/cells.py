@@ -1,4 +1,4 @@
-"""Cells: the independent runs of a sweep, and their results on disk, one .npz file each, which is whole or not there."""
+"""Cells: the independent runs of a sweep, and their results on disk, one .npz file each, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _SAFE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,119}")
 
 @dataclass(frozen=True)
 class Cell:
-    """What decides a run: the same cell gives the same values on any machine.
+    """The settings and the seed of one run: the same cell gives the same values on any machine.
 
     `name`: unique in its sweep and safe as a file's name, as "lattice-g0.9-50-50-s3".  `settings`: JSON values.
-    `cost`: how long it takes beside the others, in any unit; it orders the sweep and tells the time left.
+    `cost`: expected duration relative to the other cells, in any unit; orders the sweep and predicts the remaining time.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Cell:
     def __post_init__(self) -> None:
         if not _SAFE.fullmatch(self.name):
             raise InvalidValue(
-                f"cell {self.name!r}: a name has up to 120 letters, digits and any of . _ + = -, and begins with one of the first."
+                f"cell {self.name!r}: a name has up to 120 letters, digits and any of . _ + = -, and begins with a letter or a digit."
             )
         if not self.cost > 0.0:
             raise InvalidValue(f"cell {self.name!r} costs {self.cost!r}: must be above 0")
@@ -47,25 +47,28 @@ Work = Callable[[Cell], dict[str, Any]]
 
 @dataclass(frozen=True)
 class CellResult:
-    """A finished cell on disk; its values are read when they are first asked for."""
+    """A finished cell on disk; its values are read at first access."""
 
     cell: Cell
     seconds: float
-    """How long the work took."""
+    """Duration of the run."""
     path: Path
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """What the work returned: JSON values and arrays."""
+        """The values that the run returned: JSON values and arrays."""
         return read_values(self.path)
 
 
 FOLDER = "cells"
-_RECORD, _ARRAY = "record", "array."  # names in the archive: the JSON text, and what comes before the names of the arrays
+_RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, and the prefix of the arrays
 
 
 def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
-    """Put a cell's values into `folder`/cells/<name>.npz at once; raises InvalidValue for what is no JSON and no array, and OSError."""
+    """Write a cell's values to `folder`/cells/<name>.npz, whole or not at all.
+
+    Raises InvalidValue for a value that is neither JSON nor an array, and OSError.
+    """
     arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
     record = {"cell": asdict(cell), "seconds": seconds, "values": {key: value for key, value in values.items() if key not in arrays}}
     for key, array in arrays.items():
@@ -82,23 +85,23 @@ def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float)
 
 
 def cell_path(folder: Path, name: str) -> Path:
-    """Where a finished cell lies."""
+    """Return the file of a finished cell."""
     return folder / FOLDER / f"{name}.npz"
 
 
 def load_cells(folder: Path) -> dict[str, CellResult]:
-    """The finished cells of a run by name, sorted; raises InvalidValue for a file that is none."""
+    """Return the finished cells of a run by name, sorted; raises InvalidValue for a damaged file."""
     return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
 
 
 def read_cell(path: Path) -> CellResult:
-    """One finished cell, its arrays left on disk."""
+    """Read one finished cell without its arrays."""
     record = _read(path, arrays=False)[0]
     return CellResult(Cell(**record["cell"]), record["seconds"], path)
 
 
 def read_values(path: Path) -> dict[str, Any]:
-    """The values of one finished cell."""
+    """Read the values of one finished cell."""
     record, arrays = _read(path, arrays=True)
     return {**record["values"], **arrays}
 
@@ -110,7 +113,7 @@ def _read(path: Path, arrays: bool) -> tuple[dict[str, Any], dict[str, Array]]:
             names = [name for name in archive.files if arrays and name.startswith(_ARRAY)]
             return record, {name.removeprefix(_ARRAY): archive[name] for name in names}
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise InvalidValue(f"{path} is not a finished cell ({error}): delete it, and the run will do it again.") from None
+        raise InvalidValue(f"{path} is not a finished cell ({error}): delete it, and the run will repeat the cell.") from None
 
 
 def _bytes(cell: Cell, record: dict[str, Any]) -> Array:
@@ -122,7 +125,7 @@ def _bytes(cell: Cell, record: dict[str, Any]) -> Array:
 
 
 def _plain(value: object) -> Any:
-    """NumPy's scalars are JSON values too."""
+    """Convert NumPy scalars to JSON values."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{value!r} of type {type(value).__name__} is no JSON value")

@@ -10,14 +10,14 @@ from types import TracebackType
 
 
 def positive_whole(text: str) -> int:
-    """A whole number of 1 or more."""
+    """Parse a whole number of 1 or more."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number")
     return int(text)
 
 
 def whole_from_two(text: str) -> int:
-    """A whole number of 2 or more."""
+    """Parse a whole number of 2 or more."""
     number = positive_whole(text)
     if number < 2:
         raise argparse.ArgumentTypeError(f"{text!r} is less than 2")
@@ -25,7 +25,7 @@ def whole_from_two(text: str) -> int:
 
 
 def positive_number(text: str) -> float:
-    """A finite number above 0."""
+    """Parse a finite number above 0."""
     try:
         number = float(text)
     except ValueError:
@@ -40,14 +40,14 @@ PERIOD = 0.1  # s between two drawings
 
 
 class Progress:
-    """A bar on standard error, if that is a terminal."""
+    """A progress bar on standard error, if that is a terminal; otherwise nothing is printed."""
 
     def __init__(self) -> None:
         self._is_shown = sys.stderr.isatty()
         self._next = 0.0
 
     def show(self, fraction: float, text: str) -> None:
-        """Say that this fraction 0..1 is done; cheap, most calls draw nothing."""
+        """Show a fraction 0..1 and a text; at most one drawing each PERIOD, so it can be called often."""
         now = time.monotonic()
         if not self._is_shown or now < self._next:
             return

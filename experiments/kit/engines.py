@@ -15,22 +15,22 @@ from dataclasses import dataclass
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import Any, cast
 
 from experiments.kit.cells import Cell, Work
 from mobee.errors import MobeeError
 
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # for who is not started by mobee_cli, which sets them too
-_PATIENCE = 2.0  # s, for a process to end
+_THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # set here too: not every caller comes from mobee_cli
+_END_TIMEOUT = 2.0  # s, for a process to end
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Yield the cells as they are finished, in any order; one job works in this process."""
+    """Run the cells in processes of this machine and yield them as they finish, in any order; a single job runs in this process."""
     count = min(jobs or cores(), len(cells))
     if count == 1:
         yield from (do(work, cell) for cell in cells)
@@ -55,13 +55,13 @@ def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterato
 
 
 class _Worker:
-    """A process that works off one cell after another."""
+    """A process that runs one cell after another."""
 
     def __init__(self, work: Work) -> None:
         context = get_context("spawn")
         self.answers, theirs = context.Pipe()
         self.process: SpawnProcess = context.Process(target=_serve, args=(work, theirs), daemon=True)
-        with _undisturbed():
+        with _worker_environment():
             self.process.start()
         theirs.close()
         self.cell: Cell | None = None
@@ -72,11 +72,11 @@ class _Worker:
         self.cell = cell
         try:
             self.answers.send(cell)
-        except OSError:  # it has died; `take` says how
+        except OSError:  # the process has died; `take` reports how
             self.is_whole = False
 
     def take(self) -> Done:
-        """The cell that has ended."""
+        """Return the cell that has ended; if the process died, with the reason."""
         cell, self.cell = self.cell, None
         if cell is None:
             raise RuntimeError("no cell is under way in this process")
@@ -85,8 +85,8 @@ class _Worker:
             return done
         except (EOFError, OSError):
             self.is_whole = False
-            self.process.join(_PATIENCE)
-            return Done(cell, 0.0, None, f"its process died: {_how(self.process.exitcode)}")
+            self.process.join(_END_TIMEOUT)
+            return Done(cell, 0.0, None, f"its process died: {_exit_reason(self.process.exitcode)}")
 
 
 def _serve(work: Work, cells: Connection) -> None:
@@ -110,9 +110,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _how(code: int | None) -> str:
+def _exit_reason(code: int | None) -> str:
     if code is not None and code < 0:
-        return f"killed by signal {-code} ({signal.Signals(-code).name}); short of memory? Then use fewer --jobs"
+        return f"killed by signal {-code} ({signal.Signals(-code).name}); if memory is short, use fewer --jobs"
     return f"exit code {code}"
 
 
@@ -120,7 +120,7 @@ def _end(workers: Sequence[_Worker]) -> None:
     for worker in workers:
         worker.process.terminate()
     for worker in workers:
-        worker.process.join(_PATIENCE)
+        worker.process.join(_END_TIMEOUT)
         if worker.process.is_alive():
             worker.process.kill()
             worker.process.join()
@@ -128,11 +128,11 @@ def _end(workers: Sequence[_Worker]) -> None:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Processes started meanwhile leave Ctrl-C to this one, and use one thread each for linear algebra."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+def _worker_environment() -> Iterator[None]:
+    """While entered, started processes ignore Ctrl-C (this one handles it) and use one thread each for linear algebra."""
+    before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
     try:
         yield
     finally:
@@ -147,7 +147,7 @@ def _undisturbed() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Done:
-    """A cell that was worked off: its values, or what went wrong."""
+    """A cell that was run: its values, or its error."""
 
     cell: Cell
     seconds: float
@@ -161,11 +161,11 @@ class Done:
 
 
 def do(work: Work, cell: Cell) -> Done:
-    """Work a cell off, whatever happens."""
+    """Run a cell; an exception is caught and returned in the result."""
     start = time.monotonic()
     try:
         values = work(cell)
-    except Exception:  # of the experiment's own code: it is reported with the cell's name, and the others go on
+    except Exception:  # of the experiment's own code: it is reported with the cell's name, and the other cells continue
         return Done(cell, time.monotonic() - start, None, traceback.format_exc())
     return Done(cell, time.monotonic() - start, values)
 
@@ -175,9 +175,12 @@ class RayMissing(MobeeError):
 
 
 def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Yield the cells as they are finished, in any order; MoBeE must be installed on all machines of the cluster."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is reported to anybody
-    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # what Ray will do by itself one day; silences its warning
+    """Run the cells on the Ray cluster of this machine, or on its own cores, and yield them as they finish, in any order.
+
+    MoBeE must be installed on all machines of the cluster.  Raises RayMissing.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends no usage statistics
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # Ray's future default; silences its warning
     try:
         import ray
     except ImportError:
@@ -190,9 +193,9 @@ def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done
         remote = ray.remote(max_retries=0)(do)
         waiting = deque(cells)
         running: dict[Any, Cell] = {}
-        room = jobs or max(1, int(ray.cluster_resources().get("CPU", 1)))
+        capacity = jobs or max(1, int(cast(Any, ray).cluster_resources().get("CPU", 1)))
         while waiting or running:
-            while waiting and len(running) < room:
+            while waiting and len(running) < capacity:
                 cell = waiting.popleft()
                 running[remote.remote(work, cell)] = cell
             (ready, *_), _ = ray.wait(list(running))

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, get_args
 from mobee.errors import UnknownName
 
 Verdict = Literal["confirmed", "refuted", "open"]
-LEAST_SEEDS = 5  # for a verdict: a bootstrap of fewer values is too narrow, of one it has no width
+MIN_SEEDS = 5  # for a verdict: a bootstrap interval of fewer values is too narrow
 
 
 @dataclass(frozen=True)
@@ -33,18 +33,18 @@ class Claim:
             raise UnknownName("verdict", self.verdict, get_args(Verdict))
 
     def measured(self, ours: str, holds: bool | None) -> Claim:
-        """With our number; it holds, does not, or that is open (None)."""
+        """Return the claim with the measured number `ours`; `holds` is None where the measurement does not decide it."""
         return replace(self, ours=ours, verdict="open" if holds is None else "confirmed" if holds else "refuted")
 
     def record(self) -> dict[str, str]:
-        """As a dict for JSON."""
+        """Return the claim as a dict for JSON."""
         return asdict(self)
 
 
 def open_with_few_seeds(results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Results of an experiment with its claims open, where its runs have too few `seeds` for a verdict; the numbers stay."""
+    """Return results in which all claims are open if the run had fewer than MIN_SEEDS `seeds`; the numbers are kept."""
     seeds = options.get("seeds")
-    if seeds is None or seeds >= LEAST_SEEDS or "claims" not in results:
+    if seeds is None or seeds >= MIN_SEEDS or "claims" not in results:
         return dict(results)
     return {**results, "claims": [_undecided(Claim(**claim), seeds).record() for claim in results["claims"]]}
 
@@ -56,25 +56,25 @@ def _undecided(claim: Claim, seeds: int) -> Claim:
 
 
 class Method(Protocol):
-    """How an experiment is done.
+    """How an experiment is run and drawn.
 
-    `run` works in the folder of a run and may be interrupted at any time: what is finished is on disk there, and it goes on
-    behind that when it is called again.  A result `passed` of False fails the command.
+    `run` writes into the folder of a run and may be interrupted at any time: finished parts are on disk, and the next call
+    continues after them.  If its result `passed` is False, the command fails.
     """
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Options of the experiment; `--seed`, `--runs`, `--resume` and `--json` are there already."""
+        """Add the options of the experiment; `--seed`, `--runs`, `--resume` and `--json` exist already."""
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-        """Do it; returns the results, of the types that JSON has."""
+        """Run the experiment; returns its results as JSON values."""
 
     def figure(self, folder: Path) -> Path:
-        """Draw what a run left in its folder; returns the picture's path."""
+        """Draw the results in the folder of a run; returns the path of the picture."""
 
 
 @dataclass(frozen=True)
 class Steps:
-    """A method of three functions, for what is not a sweep; see `Method`."""
+    """A method made of three functions, for an experiment that is not a sweep; see `Method`."""
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Path], dict[str, Any]]
@@ -83,10 +83,10 @@ class Steps:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What `mobee experiment` lists and runs; a module of a claim holds one as EXPERIMENT.
+    """An experiment as `mobee experiment` lists and runs it; the module of a claim holds one as EXPERIMENT.
 
     `claim`: one line.  `notes`: the module's docstring, which states claim, source, published numbers and run time.
-    `claims`: the rows of the table of claims that it answers; their numbers are then in the results under "claims".
+    `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Matplotlib, if it is there: experiments run without it, only their figures need it."""
+"""Plots with Matplotlib, which is optional: experiments run without it, only their figures need it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class MatplotlibMissing(MobeeError):
 
 
 def new_figure(width: float, height: float) -> Any:
-    """An empty matplotlib.figure.Figure, inches; raises MatplotlibMissing, and InvalidValue for one without rows or columns."""
+    """Return an empty matplotlib Figure of a size in inches; raises MatplotlibMissing, and InvalidValue for a size of 0."""
     if not (width > 0.0 and height > 0.0):
         raise InvalidValue("none of the runs that the figure shows is finished: go on with --resume.")
     try:
@@ -29,28 +29,28 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
-    """A line through the means of the runs (N, L) at L places, in a band."""
+    """Draw the means of the runs (N, L) at L places as a line, and their intervals as a band."""
     means, low, high = _of(list(runs.T))
     axes.plot(at, means, "o-", color=color, label=label, markersize=4)
     axes.fill_between(at, low, high, color=color, alpha=0.15, linewidth=0.0)
 
 
 def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:
-    """A bar with a whisker for each group of runs."""
+    """Draw the mean of each group of runs as a bar, and its interval as a whisker."""
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
     axes.bar(at, means, width, yerr=spread, color=color, label=label, capsize=3)
 
 
 def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[ArrayLike], **style: Any) -> None:
-    """The mean and the interval of each group of runs; `style`: of Matplotlib's errorbar."""
+    """Draw the mean and the interval of each group of runs; `style`: passed to Matplotlib's errorbar."""
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
     axes.errorbar(at, means, spread, **style)
 
 
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
-    """A bar for each number of the runs, which all have as many; each run adds a piece in its colour.  Returns the bars' heights."""
+    """Draw runs of equally many numbers as stacked bars, a colour for each run; returns the heights of the bars."""
     heights = np.zeros(len(runs[0]))
     for run in runs:
         axes.bar(np.arange(len(run)), run, bottom=heights, width=1.0)

@@ -1,4 +1,4 @@
-"""Records of a run, appended one by one, so that nothing finished is lost."""
+"""Records of a run in a CSV file, appended one by one, so that an interruption loses no finished record."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Self, TextIO
 
 
 class Records:
-    """A CSV file with a head line; each record is in it when `append` returns.  What a kill has cut is taken off."""
+    """A CSV file with a header; each record is on disk when `append` returns.  An incomplete last line is removed on opening."""
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path, self.columns = path, columns
@@ -20,7 +20,7 @@ class Records:
         self._writer = csv.DictWriter(self._file, columns)
 
     def append(self, record: Mapping[str, object]) -> None:
-        """Write one record, with all columns; the first brings the head line."""
+        """Write one record with all columns, and the header before the first."""
         if self._file.tell() == 0:
             self._writer.writeheader()
         self._writer.writerow(record)
@@ -34,7 +34,7 @@ class Records:
 
 
 def read_records(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
-    """All whole records; [] if there is no file.  A last line that a kill has cut is dropped."""
+    """Return all complete records; [] if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="") as file:
@@ -45,7 +45,7 @@ def read_records(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
 
 
 def _whole(file: TextIO) -> int:
-    """Length of the whole lines of an ASCII file, which is left at their end."""
+    """Return the length of the complete lines of an ASCII file, and position the file there."""
     file.seek(0)
     length = file.read().rfind("\n") + 1
     file.seek(length)
@@ -54,20 +54,20 @@ def _whole(file: TextIO) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A record as a dataclass, to be derived from: its fields are texts, floats and booleans."""
+    """Base class of records that are dataclasses with fields of type str, float and bool."""
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
-        """Of the file."""
+        """Return the column names of the file."""
         return tuple(field.name for field in fields(cls))
 
     def record(self) -> dict[str, object]:
-        """For the file, or as the values of a cell; numbers to six places."""
+        """Return the record for the file or as the values of a cell; numbers are rounded to six places."""
         values = {name: getattr(self, name) for name in self.columns()}
         return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Self:
-        """From the file."""
+        """Return the record read from a row of the file."""
         read: dict[str, Any] = {"float": float, "bool": "True".__eq__, "str": str}
         return cls(**{field.name: read[str(field.type)](row[field.name]) for field in fields(cls)})

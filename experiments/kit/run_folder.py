@@ -1,4 +1,4 @@
-"""The folder of an experiment's run: what was asked for, with what, and what came of it."""
+"""The folder of an experiment's run: its options, the versions of the software, and its results."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
 
 
 def discard_unused(folder: Path) -> None:
-    """Remove the folder of a run that was refused before it had anything to keep; otherwise it stays."""
+    """Remove the folder of a run that was refused before it wrote any result."""
     if all(path.name in (CONFIG, VERSIONS) or (path.is_file() and path.stat().st_size == 0) for path in folder.iterdir()):
         shutil.rmtree(folder)
 
 
 def experiment_of(folder: Path) -> str:
-    """Of which experiment a run is; raises InvalidValue if it is no run."""
+    """Return the name of a run's experiment; raises InvalidValue if the folder is not that of a run."""
     return _begun(folder)[0]
 
 
 def _begun(folder: Path) -> tuple[str, dict[str, Any]]:
-    """Name and options."""
+    """Return the experiment's name and the options of a run."""
     try:
         config = json.loads((folder / CONFIG).read_text())
         return str(config["experiment"]), dict(config["options"])
@@ -59,7 +59,7 @@ def _begun(folder: Path) -> tuple[str, dict[str, Any]]:
 
 
 def options_of(folder: Path, name: str) -> dict[str, Any]:
-    """With what options a run was begun; raises InvalidValue if it is no run of that experiment."""
+    """Return the options with which a run was begun; raises InvalidValue if it is a run of another experiment."""
     begun, options = _begun(folder)
     if current_name(begun) != current_name(name):
         raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
@@ -67,32 +67,34 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
-    """Write down with what options a run goes on, where they are not those it was begun with."""
+    """Write the options with which a run continues, if they differ from the recorded ones."""
     if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
         write(folder / CONFIG, {"experiment": name, "options": dict(options)})
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Keep other processes away from a run meanwhile; raises InvalidValue if one is at it, OSError if config.json cannot be opened."""
+def locked(folder: Path) -> Iterator[None]:
+    """Lock a run against other processes; raises InvalidValue if another one holds it, OSError if config.json cannot be opened."""
     with (folder / CONFIG).open("r+") as config:
         _lock(config.fileno(), folder)
-        yield  # let go when the file is closed, at the latest when the process ends
+        yield  # unlocked when the file is closed, at the latest when the process ends
 
 
 def _lock(config: int, folder: Path) -> None:
     try:
         import fcntl
-    except ImportError:  # not on Windows: there, nobody is kept away
+    except ImportError:  # Windows has no fcntl: runs are not locked there
         return
     try:
         fcntl.flock(config, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InvalidValue(f"{folder}: another process is at this run. Wait until it ends, or begin a new run without --resume.") from None
+        raise InvalidValue(
+            f"{folder}: another process works on this run. Wait until it ends, or begin a new run without --resume."
+        ) from None
 
 
 def newest_run(runs: Path, name: str) -> Path:
-    """The folder of the latest run of an experiment; raises InvalidValue if there is none."""
+    """Return the folder of the newest run of an experiment; raises InvalidValue if there is none."""
     runs_of_it = re.compile(rf"(\d{{8}}-\d{{6}})-(?:{'|'.join(map(re.escape, all_names(name)))})(?:-(\d+))?")
     found = {path.parent: match.groups() for path in runs.glob(f"*/{CONFIG}") if (match := runs_of_it.fullmatch(path.parent.name))}
     if not found:
@@ -101,7 +103,7 @@ def newest_run(runs: Path, name: str) -> Path:
 
 
 def given_run(folder: Path, runs: Path, name: str) -> Path:
-    """The folder that was named, if it is one; raises InvalidValue with the newest run."""
+    """Return `folder` if it exists; raises InvalidValue that names the newest run."""
     if folder.is_dir():
         return folder
     try:
@@ -112,12 +114,12 @@ def given_run(folder: Path, runs: Path, name: str) -> Path:
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON for people and programs."""
+    """Write a file of indented JSON."""
     path.write_text(json.dumps(content, indent=2, default=str) + "\n")
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read what `write` wrote; raises InvalidValue."""
+    """Read a file written by `write`; raises InvalidValue if it is missing or damaged."""
     try:
         return dict(json.loads(path.read_text()))
     except (OSError, ValueError, TypeError):
@@ -144,7 +146,7 @@ def _processor() -> str:
 
 
 def _commit() -> str | None:
-    """The commit of the sources, with a + if they were edited since; None outside a git checkout."""
+    """Return the commit of the sources, with a + if they have been edited since; None outside a git checkout."""
     try:
         command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=10.0)

@@ -1,4 +1,8 @@
-"""Summaries of few runs that say how far they can be trusted (Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice")."""
+"""Means of few runs with their uncertainty, and rules that decide a claim by them.
+
+Interquartile means and stratified bootstrap intervals as in Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice".
+A verdict is True, False, or None where the numbers leave the claim open.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +16,19 @@ from experiments.kit.experiment import Claim
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 
-RESAMPLES = 2000
-LEVEL = 0.95
+RESAMPLES = 2000  # bootstrap samples
+LEVEL = 0.95  # of the intervals
 Statistic = Callable[[Array], Array]  # of values along the last axis
 Run = TypeVar("Run")
 
 
 def interquartile_mean(values: ArrayLike) -> float:
-    """The mean of what is left when a quarter of the values, rounded down, is cut off at either end; shape (n,), n at least 1."""
+    """Return the mean of values (n,) without the lowest and the highest quarter, each rounded down; n is at least 1."""
     return float(interquartile_means(_checked(values)))
 
 
 def interquartile_means(values: Array) -> Array:
-    """The same along the last axis of (..., n)."""
+    """Return the interquartile means along the last axis of (..., n)."""
     ordered = np.sort(values, axis=-1)
     cut = values.shape[-1] // 4
     found: Array = ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
@@ -32,7 +36,7 @@ def interquartile_means(values: Array) -> Array:
 
 
 def mean_over(runs: Sequence[Run], number: Callable[[Run], float]) -> float:
-    """The interquartile mean of a number of each run."""
+    """Return the interquartile mean of a number computed for each run."""
     return interquartile_mean([number(run) for run in runs])
 
 
@@ -43,14 +47,14 @@ def interval(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float]:
-    """The 95 % interval of a statistic by the stratified bootstrap (percentiles).
+    """Return the 95 % interval of a statistic by the stratified percentile bootstrap.
 
     Args:
         values: (n,).
-        statistic: of resamples (resamples, n) along the last axis; in each, every value comes from the stratum of its place.
+        statistic: applied to resamples (resamples, n) along the last axis; each value is drawn from the stratum of its place.
         strata: (n,) labels; values are drawn anew within each label.  None: one stratum.
-        seed: of the draws.
-        resamples: how many.
+        seed: of the bootstrap.
+        resamples: number of bootstrap samples.
     """
     given = _checked(values)
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
@@ -62,13 +66,13 @@ def interval(
 
 
 def estimate(values: ArrayLike, digits: int = 2) -> str:
-    """The interquartile mean and its 95 % interval, for people."""
+    """Return the interquartile mean and its 95 % interval as text."""
     low, high = interval(values)
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
 def _drawn(labels: Array, resamples: int, seed: int) -> Ints:
-    """Places of values, drawn within each label, (resamples, n)."""
+    """Draw indices of values within each label, (resamples, n)."""
     _, stratum, sizes = np.unique(labels, return_inverse=True, return_counts=True)
     order = np.argsort(stratum, kind="stable")
     first = (np.cumsum(sizes) - sizes)[stratum[order]]
@@ -78,23 +82,23 @@ def _drawn(labels: Array, resamples: int, seed: int) -> Ints:
 
 
 def ratio(above: ArrayLike, below: ArrayLike) -> float:
-    """The interquartile mean of one group of runs over that of another."""
+    """Return the ratio of the interquartile means of two groups of runs."""
     return interquartile_mean(above) / interquartile_mean(below)
 
 
 def ratio_interval(above: ArrayLike, below: ArrayLike) -> tuple[float, float]:
-    """The 95 % bootstrap interval of `ratio`, both groups drawn anew."""
+    """Return the 95 % bootstrap interval of `ratio`; both groups are resampled."""
     return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second))
 
 
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
-    """`ratio` and its 95 % interval, as `told` has them."""
+    """Return `ratio` and its 95 % interval as text."""
     low, high = ratio_interval(above, below)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
 def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
-    """Whether an interval (low, high) lies within the bounds, or beside them; None where it holds one of them and so does not decide."""
+    """Return True for an interval (low, high) within the bounds, False for one outside, None for one that contains a bound."""
     low, high = span
     if low >= least and high <= most:
         return True
@@ -102,37 +106,37 @@ def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.
 
 
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
-    """How likely a run of the first group is above one of the second, a tie counting half (Mann-Whitney's U / nm)."""
+    """Return the probability that a run of the first group is above one of the second; ties count half (Mann-Whitney U / nm)."""
     return float(_improvements(_checked(first), _checked(second)))
 
 
 def improvement_interval(first: ArrayLike, second: ArrayLike) -> tuple[float, float]:
-    """The 95 % bootstrap interval of `probability_of_improvement`, both groups drawn anew."""
+    """Return the 95 % bootstrap interval of `probability_of_improvement`; both groups are resampled."""
     return _of_both(first, second, _improvements)
 
 
 def _improvements(first: Array, second: Array) -> Array:
-    """Of groups along the last axes."""
+    """Return the probabilities of improvement of groups along the last axes."""
     difference = first[..., :, None] - second[..., None, :]
     found: Array = (difference > 0.0).mean(axis=(-2, -1)) + 0.5 * (difference == 0.0).mean(axis=(-2, -1))
     return found
 
 
 def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Array], Array]) -> tuple[float, float]:
-    """The interval of what compares two groups along the last axes."""
+    """Return the bootstrap interval of a statistic of two groups, which are along the last axes."""
     groups = [_checked(first), _checked(second)]
     sizes = [len(group) for group in groups]
     return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), np.repeat([0, 1], sizes))
 
 
 def relative_spread(counts: ArrayLike) -> float:
-    """Standard deviation over mean; 0 when all are equal."""
+    """Return the standard deviation over the mean; 0 if all numbers are equal."""
     given = np.asarray(counts, dtype=np.float64)
     return float(given.std() / given.mean())
 
 
 def gini(counts: ArrayLike) -> float:
-    """The Gini coefficient of numbers of 0 or more: 0 when all are equal, 1 - 1/n when one has everything."""
+    """Return the Gini coefficient of n numbers >= 0: 0 if all are equal, 1 - 1/n if all but one are 0."""
     ordered = np.sort(np.asarray(counts, dtype=np.float64))
     ranks = np.arange(1, len(ordered) + 1)
     return float(2.0 * (ranks * ordered).sum() / (len(ordered) * ordered.sum()) - (len(ordered) + 1) / len(ordered))
@@ -150,16 +154,16 @@ Verdicts = list[bool | None]
 
 
 def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
-    """Whether all hold; False if one does not, else None if one is open."""
+    """Combine verdicts: False if one is False, else None if one is open, else True."""
     given = list(verdicts)
     return False if False in given else None if None in given else True
 
 
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> tuple[str, Verdicts]:
-    """Whether runs of one group are likelier above (or, `worse`, below) those of each rival than not: the text, and a verdict a rival.
+    """Compare the runs of one group with those of each rival; return a text, and a verdict for each rival.
 
-    It holds where the interval of the probability of improvement is above one half, and does not where it is below, or where the
-    ratio of the two is within a tenth of 1 with its interval: they are about equal.
+    The verdict is True if the group is above the rival (or, with `worse`, below it): the interval of the probability of improvement
+    lies above one half.  It is False if that lies below, or if the interval of the ratio lies within a tenth of 1.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], Verdicts()
     for rival in rivals:
@@ -171,24 +175,24 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
 
 
 def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
-    """Whether the interval of the ratio is within a tenth of 1; where values are not above 0 there is no ratio."""
+    """Return whether the interval of the ratio lies within a tenth of 1; False if a value is not above 0."""
     if min(np.min(first), np.min(second)) <= 0.0:
         return False
     return decides(ratio_interval(first, second), *ABOUT_EQUAL) is True
 
 
 def rises(change: ArrayLike) -> bool | None:
-    """Whether the change of the runs is above 0; False where it is below, None where its interval holds 0."""
+    """Return whether the change of the runs is above 0; None if its interval contains 0."""
     low, high = interval(change)
     return True if low > 0.0 else False if high < 0.0 else None
 
 
 def changes(before: Array, after: Array) -> str:
-    """As text: the means before and after, and the mean change of a run."""
+    """Return the means before and after and the mean change of a run as text."""
     return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"
 
 
 def published_ratio(claim: Claim, above: ArrayLike, below: ArrayLike, bounds: tuple[float, float], note: str = "") -> Claim:
-    """The claim with the measured ratio of two groups of runs, which is to lie within bounds."""
+    """Return the claim with the measured ratio of two groups of runs; it holds if the ratio lies within the bounds."""
     low, high = span = ratio_interval(above, below)
     return claim.measured(f"{ratio(above, below):.2f} [{low:.2f}, {high:.2f}]{note}", decides(span, *bounds))

@@ -21,7 +21,7 @@ from mobee.errors import InvalidValue, MobeeError
 Engine = Callable[[Work, Sequence[Cell], int | None], Iterator[Done]]
 _ENGINES: dict[str, Engine] = {"processes": in_processes, "ray": on_ray}
 
-LISTED = 3  # failed cells that are named; the folder has all
+MAX_LISTED = 3  # failed cells that are named in the message; the folder has all
 
 
 class CellsFailed(MobeeError):
@@ -29,10 +29,10 @@ class CellsFailed(MobeeError):
 
 
 class Condition(NamedTuple):
-    """What the trials with one setting have in common.
+    """One setting of a sweep, under which a trial is run with each seed.
 
-    `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values.  `cost`: how long a trial takes beside the
-    others, in any unit.  `seeds`: its own, if they are not those of the run.
+    `name`: unique in its sweep and safe as a file name.  `settings`: JSON values.  `cost`: expected duration of a trial relative to
+    the others, in any unit.  `seeds`: seeds of this condition, if they are not those of the run.
     """
 
     name: str
@@ -46,16 +46,16 @@ Cells = Mapping[str, CellResult]
 
 
 def grid(**settings: Sequence[Any]) -> list[Condition]:
-    """Every combination of the settings; the last one varies fastest."""
+    """Return a condition for each combination of the settings; the last one varies fastest."""
     return [Condition("-".join(map(str, values)), dict(zip(settings, values, strict=True))) for values in product(*settings.values())]
 
 
 def no_options(parser: argparse.ArgumentParser) -> None:
-    """Add nothing to what all sweeps have."""
+    """Add no options."""
 
 
 def no_requirement() -> None:
-    """Need nothing that may be absent."""
+    """Require no optional package."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,13 @@ class Sweep:
     """A method: one trial under each condition with each seed.
 
     Args:
-        conditions: of the options; `quick` is among them, a bool.
-        trial: of a condition's settings and a seed; returns JSON values and arrays, which these two alone decide.  A function of a
-            module, so that other processes find it.
-        findings: of the finished cells, sorted by name.
-        plot: their figure, a matplotlib Figure; see experiments.kit.plots.
-        seeds: how many there are unless --seeds says otherwise.
-        add_options: adds options of its own.
+        conditions: computes the conditions from the options, among them the bool `quick`.
+        trial: runs one cell, given the settings of its condition and a seed; returns JSON values and arrays, which depend on these
+            two alone.  It must be a function of a module, so that other processes can import it.
+        findings: computes the results from the finished cells, which are sorted by name.
+        plot: draws the finished cells; returns a matplotlib Figure, see experiments.kit.plots.
+        seeds: default of --seeds.
+        add_options: adds the options of the experiment.
         require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
     """
 
@@ -82,19 +82,19 @@ class Sweep:
     require: Callable[[], object] = no_requirement
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Options of the sweep."""
+        """Add the options of all sweeps and those of the experiment."""
         sweep_arguments(parser, self.seeds)
         self.add_options(parser)
 
     def cells(self, arguments: argparse.Namespace) -> list[Cell]:
-        """Every condition with every seed."""
+        """Return the cells: every condition with every seed."""
         seeds = range(arguments.seed, arguments.seed + arguments.seeds)
         return [
             Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in one.seeds or seeds
         ]
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-        """Run the trials that the folder does not hold yet."""
+        """Run the cells that are not in the folder yet; returns the findings."""
         self.require()
         run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
         return self.findings(load_cells(folder))
@@ -103,7 +103,7 @@ class Sweep:
         """Draw the finished cells; raises InvalidValue if there are none."""
         found = load_cells(folder)
         if not found:
-            raise InvalidValue(f"{folder} has no finished cells: it was stopped before the first.")
+            raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
         path = folder / "figure.png"
         self.plot(found).savefig(path, dpi=150)
         return path
@@ -114,14 +114,14 @@ def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
 
 
 def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[dict[str, Any]]]:
-    """The values of the finished cells, by seed, under each value of a setting that has some, in the given order."""
+    """Group the values of the finished cells by a setting, in the given order of its values; each group is sorted by seed."""
     cells = sorted(found.values(), key=lambda result: result.cell.seed)
     groups = {value: [one.values for one in cells if one.cell.settings[setting] == value] for value in order}
     return {value: values for value, values in groups.items() if values}
 
 
 def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[CellResult]]:
-    """The finished cells, by seed, under each combination of values of several settings that has some."""
+    """Group the finished cells by the values of several settings; each group is sorted by seed."""
     groups: dict[tuple[Any, ...], list[CellResult]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(result)
@@ -129,17 +129,17 @@ def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[CellR
 
 
 def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argparse.Namespace) -> None:
-    """Work off the cells that `folder` does not hold yet; each is on disk as soon as it is finished.
+    """Run the cells that are not in `folder` yet; each is written to disk as soon as it is finished.
 
-    `work` is a function of a module, so that other processes find it; it returns a dict of JSON values and arrays, which its cell
-    alone decides.  A kill loses at most the cells under way.
+    `work` must be a function of a module, so that other processes can import it; it returns a dict of JSON values and arrays, which
+    depend on its cell alone.  A kill loses at most the cells that are running.
 
     Raises:
         InvalidValue: two cells have one name, or the folder holds a cell of that name with other settings.
-        CellsFailed: with the names of the first; what went wrong is in `folder`/cells/<name>.failed.txt.
+        CellsFailed: with the names of the first; the errors are in `folder`/cells/<name>.failed.txt.
     """
     _require_distinct(cells)
-    left = _missing(cells, folder)
+    left = _unfinished(cells, folder)
     failed: dict[str, str] = {}
     time_left = TimeLeft([cell.cost for cell in cells], [cell.cost for cell in left], time.monotonic())
     with Progress() as progress:
@@ -151,15 +151,15 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
             time_left.finished(done.cell.cost, time.monotonic())
             progress.show(time_left.fraction, f"{number} of {len(cells)}, {time_left}" + (f", {len(failed)} failed" if failed else ""))
     if failed:
-        listed = "\n".join(f"  {name}: {reason}" for name, reason in list(failed.items())[:LISTED])
-        listed += f"\n  and {len(failed) - LISTED} more" if len(failed) > LISTED else ""
+        listed = "\n".join(f"  {name}: {reason}" for name, reason in list(failed.items())[:MAX_LISTED])
+        listed += f"\n  and {len(failed) - MAX_LISTED} more" if len(failed) > MAX_LISTED else ""
         raise CellsFailed(
             f"{len(failed)} of {len(cells)} cells failed, the others are finished (see {folder}/cells/*.failed.txt):\n{listed}"
         )
 
 
 def _keep(done: Done, folder: Path) -> str:
-    """Write a cell; returns why it failed, "" if it did not."""
+    """Write a cell or its error to disk; returns the reason of its failure, "" if it succeeded."""
     report = cell_path(folder, done.cell.name).with_suffix(".failed.txt")
     error, reason = done.error, done.reason
     if done.values is not None:
@@ -177,20 +177,20 @@ def _keep(done: Done, folder: Path) -> str:
 def _require_distinct(cells: Sequence[Cell]) -> None:
     repeated = [name for name, count in Counter(cell.name for cell in cells).items() if count > 1]
     if repeated:
-        raise InvalidValue(f"several cells are named {repeated[0]!r}: put what they differ in into their names.")
+        raise InvalidValue(f"several cells are named {repeated[0]!r}: put the settings in which they differ into their names.")
 
 
-def _missing(cells: Sequence[Cell], folder: Path) -> list[Cell]:
-    """What is not done yet, the costly first, so that no core waits long for the last."""
+def _unfinished(cells: Sequence[Cell], folder: Path) -> list[Cell]:
+    """Return the cells that are not finished, the longest first, so that no core waits long for the last one."""
     done = load_cells(folder)
     for cell in cells:
-        if cell.name in done and _decided_by(cell) != _decided_by(done[cell.name].cell):
+        if cell.name in done and _identity(cell) != _identity(done[cell.name].cell):
             raise InvalidValue(f"{folder} holds the cell {cell.name} with other settings: begin a new run without --resume.")
     return sorted((cell for cell in cells if cell.name not in done), key=lambda cell: -cell.cost)
 
 
-def _decided_by(cell: Cell) -> tuple[int, object]:
-    return cell.seed, json.loads(json.dumps(cell.settings))  # as the disk has it: tuples are lists
+def _identity(cell: Cell) -> tuple[int, object]:
+    return cell.seed, json.loads(json.dumps(cell.settings))  # as on disk, where tuples are lists
 
 
 ENGINES = ("processes", "ray")
@@ -201,31 +201,31 @@ def sweep_arguments(parser: argparse.ArgumentParser, seeds: int = 10) -> None:
     parser.add_argument(
         "--seeds", type=positive_whole, default=seeds, metavar="N", help=f"repetitions with different seeds (default: {seeds})"
     )
-    parser.add_argument("--jobs", type=positive_whole, metavar="N", help="how many run at once (default: one a core)")
-    text = "processes of this machine, or a Ray cluster (extra `cluster`; one of this machine's cores is started where none is)"
+    parser.add_argument("--jobs", type=positive_whole, metavar="N", help="cells at the same time (default: one per core)")
+    text = "processes of this machine, or a Ray cluster (extra `cluster`; if none is running, one is started on this machine)"
     parser.add_argument("--engine", choices=ENGINES, default="processes", help=f"{text} (default: processes)")
-    parser.add_argument("--quick", action="store_true", help="a short version that shows whether it works")
+    parser.add_argument("--quick", action="store_true", help="a short version, to check that the experiment works")
 
 
 class TimeLeft:
-    """Counts costs of cells: `everything` there is, `left` at the moment `start` [s]."""
+    """Predicts the remaining time from the costs of cells: of all cells, and of those `left` at the time `start` [s]."""
 
     def __init__(self, everything: Sequence[float], left: Sequence[float], start: float) -> None:
         self._all, self._left, self._start = sum(everything), sum(left), start
         self._done, self._now = 0.0, start
 
     def finished(self, cost: float, now: float) -> None:
-        """One more cell is done, now [s]."""
+        """Record that a cell has finished at the time `now` [s]."""
         self._done, self._now = self._done + cost, now
 
     @property
     def fraction(self) -> float:
-        """Of all costs, those of earlier runs too."""
+        """The finished share of all costs, including cells of earlier runs."""
         return 1.0 - (self._left - self._done) / self._all if self._all else 1.0
 
     @property
     def seconds(self) -> float:
-        """At the pace so far."""
+        """The remaining time [s] at the average speed so far."""
         return (self._left - self._done) * (self._now - self._start) / self._done if self._done else float("inf")
 
     def __str__(self) -> str:

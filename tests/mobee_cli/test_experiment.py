@@ -12,7 +12,7 @@ import pytest
 
 from experiments.claims.ch2_model import model_throughput
 from experiments.claims.ch7_learning import hypercube_exploration
-from experiments.kit.run_folder import held
+from experiments.kit.run_folder import locked
 from experiments.registry import EXPERIMENTS
 from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main
@@ -56,9 +56,9 @@ def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path, capsys):
     main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
     folder = Path(json.loads(capsys.readouterr().out)["run"])
     before = (folder / "flood.csv").read_bytes()
-    with held(folder):
+    with locked(folder):
         assert main(["experiment", "run", "model-throughput", "--resume", str(folder)]) == 2
-    assert "another process is at this run" in capsys.readouterr().err
+    assert "another process works on this run" in capsys.readouterr().err
     assert (folder / "flood.csv").read_bytes() == before
 
 

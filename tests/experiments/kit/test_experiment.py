@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 import mobee
-from experiments.kit.experiment import LEAST_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.experiment import MIN_SEEDS, Claim, open_with_few_seeds
 
 CLAIM = Claim("thesis 7.1", "something is so", "about 3")
 
@@ -24,7 +24,7 @@ def test_there_is_no_other_verdict():
 
 def test_a_verdict_needs_enough_seeds():
     results = {"claims": [CLAIM.measured("3.1", False).record()], "runs": 7}
-    few = open_with_few_seeds(results, {"seeds": LEAST_SEEDS - 1})
+    few = open_with_few_seeds(results, {"seeds": MIN_SEEDS - 1})
     assert few["claims"][0]["verdict"] == "open" and few["claims"][0]["ours"] == "3.1 (4 seeds, too few for a verdict)"
-    assert open_with_few_seeds(few, {"seeds": LEAST_SEEDS - 1}) == few
-    assert open_with_few_seeds(results, {"seeds": LEAST_SEEDS}) == open_with_few_seeds(results, {}) == results
+    assert open_with_few_seeds(few, {"seeds": MIN_SEEDS - 1}) == few
+    assert open_with_few_seeds(results, {"seeds": MIN_SEEDS}) == open_with_few_seeds(results, {}) == results

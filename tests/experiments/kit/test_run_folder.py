@@ -5,7 +5,7 @@ import json
 import pytest
 
 import mobee
-from experiments.kit.run_folder import given_run, held, new_run, newest_run, options_of
+from experiments.kit.run_folder import given_run, locked, new_run, newest_run, options_of
 
 
 def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
@@ -43,9 +43,9 @@ def test_a_folder_that_is_not_there_is_answered_with_the_newest(tmp_path):
 
 def test_a_run_belongs_to_one_process_at_a_time(tmp_path):
     folder = new_run(tmp_path, "model-throughput", {})
-    with held(folder), pytest.raises(mobee.InvalidValue, match="another process is at this run. Wait until it ends"), held(folder):
+    with locked(folder), pytest.raises(mobee.InvalidValue, match="another process works on this run. Wait until it ends"), locked(folder):
         pytest.fail("two hold one run")
-    with held(folder):
+    with locked(folder):
         assert options_of(folder, "model-throughput") == {}
 
 
