@@ -1,12 +1,13 @@
-"""The forces of eq. 5.7, each beside its equation, as functions of what the law sees in a tick.
+"""The forces of the control law (thesis eqs. 5.7 to 5.17), each as a function beside its equation.
 
-The mass is 1, so a force is an acceleration: rad/s^2.  Of a motor that slides an angle of 1 rad counts as its `unit` in m
-(`mobee.robot.motor_units`); where all motors turn, every unit is 1.  `Gains` say which law is meant and hold its numbers.
+Every function takes the `State` of one tick and returns a force (n,), one number for each motor. The mass M of eq. 5.7 is 1, so a
+force is an acceleration in rad/s^2. For a motor that slides, 1 rad stands for its `unit` in m (`mobee.robot.motor_units`); where all
+motors turn, every unit is 1. `Gains` hold the numbers of the law and say which of its two variants is meant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -15,58 +16,53 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.model.contact import Contact
-from mobee.reference.contact_forces import projected
-from mobee.reference.kinematics import marker_jacobian
+from mobee.reference.kinematics import joint_column, joints_to, link_frames, marker_jacobian
 from mobee.robot.motor_units import limit_zones, motor_units
 from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """What the law sees in a tick; arrays (n,) in the order of `robot.motors`.
-
-    `force` is a client's force on the motors, `pushes` are its forces (3,), or forces and moments (6,), on markers.  `propagate`:
-    how far down the body a contact is felt, see `projected`.
-    """
+    """The input of the law in one tick; arrays (n,) in the order of `robot.motors`."""
 
     robot: Robot
     gains: Gains
-    q: Array  # rad, as the encoders say
-    velocity: Array  # rad/s, the law's own, never a difference of encoders
+    q: Array  # rad, measured
+    velocity: Array  # q', rad/s: the law's own state, never a difference of encoder values
     attractor: Array  # q*, rad
-    contacts: Sequence[Contact] = ()  # at q, as of `Model.evaluate(q).contacts`
-    force: Array | None = None  # rad/s^2
-    pushes: Mapping[str, Array] = field(default_factory=dict)
-    propagate: Literal["tree", "part"] = "tree"
+    contacts: Sequence[Contact] = ()  # at q, as `Model.evaluate(q).contacts` gives them
+    force: Array | None = None  # f of eq. 5.9, the client's force on the motors, rad/s^2
+    pushes: Mapping[str, Array] = field(default_factory=dict)  # f_m of eq. 5.10 by marker: force (3,), or force and moment (6,)
+    propagate: Literal["tree", "part"] = "tree"  # how far down the body a contact acts, see `projected`
 
 
 def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
-    """Eq. 5.8: L(v) = m v / (m / k + |v|), every dimension by itself: less than m, and of slope k at 0."""
+    """Saturate v element by element (eq. 5.8): L(v) = m v / (m / k + |v|), below m = `maximum` in size, of slope k = `slope` at 0."""
     return maximum * v / (maximum / slope + np.abs(v))
 
 
 def squash_norm(v: Array, maximum: float, slope: float) -> Array:
-    """The same of the norm of v, which keeps its direction."""
+    """Saturate the norm of v as eq. 5.8 does an element; the direction stays."""
     return maximum * v / (maximum / slope + float(np.linalg.norm(v)))
 
 
 def spring(s: State) -> Array:
-    """L(K (q* - q)) of eq. 5.7, on its right-hand side."""
+    """Return the pull of the attractor, L(K (q* - q)), on the right-hand side of eq. 5.7."""
     return squash(s.attractor - s.q, s.gains.of_robot("max_spring", s.robot), s.gains.of_robot("stiffness", s.robot))
 
 
 def damping(s: State) -> Array:
-    """-C q' of eq. 5.7."""
+    """Return the damping, -C q', on the right-hand side of eq. 5.7."""
     return -s.gains.of_robot("damping", s.robot) * s.velocity
 
 
 def config_force(s: State) -> Array:
-    """Eq. 5.9: f_config = L(f), f of a client."""
+    """Return f_config = L(f) (eq. 5.9), where f is the client's force on the motors."""
     return bounded_client(s.robot, s.gains, s.force) if s.force is not None else np.zeros(len(s.q))
 
 
 def work_force(s: State) -> Array:
-    """Eq. 5.10: f_work = L(sum over markers of J^T f)."""
+    """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10)."""
     torque = np.zeros(len(s.q))
     for marker, push in s.pushes.items():
         torque += marker_jacobian(s.robot, s.q, marker)[: len(push)].T @ push
@@ -74,7 +70,7 @@ def work_force(s: State) -> Array:
 
 
 def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
-    """L(f) as a client's force is bounded: every motor by itself (eq. 5.8 as printed), or in each part keeping the direction."""
+    """Saturate a client's force: every motor by itself (eq. 5.8 as printed), or the norm of each part, keeping its direction."""
     maximum, slope = gains.of_robot("max_client", robot), gains.of_robot("client_slope", robot)
     if gains.client_squash == "each":
         return squash(f, maximum, slope)
@@ -85,17 +81,17 @@ def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
 
 
 def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Array:
-    """L of the norm of some motors' force; where their bounds differ, the one that leaves least counts for all of them."""
+    """Saturate the norm of the force on several motors; where their bounds differ, the smallest factor counts for all of them."""
     length = float(np.linalg.norm(f / unit))
     shares = maximum / unit / (maximum / unit / slope + length)
     return f * shares.min(initial=np.inf) if len(f) else f
 
 
 def limit_force(s: State) -> Array:
-    """Eqs. 5.12-5.13: zero inside [q_min + zone, q_max - zone], then a ramp of slope f_max / delta inward, at the limits and beyond.
+    """Return f_lim (eqs. 5.12, 5.13): zero inside [q_min + zone, q_max - zone], beyond it a ramp inward of slope f_max / delta.
 
-    The thesis prints the ranges wrong; continuity and direction decide.  A zone is delta wide, less where a range is narrow or where it
-    ends at home (`limit_zones`).
+    The ramp goes on beyond the limit. The thesis prints the ranges of the cases wrong; here continuity and direction decide. A zone is
+    delta = `limit_width` wide, and narrower where a range is narrow or where the zone ends at home (`limit_zones`).
     """
     width = s.gains.of_robot("limit_width", s.robot)
     (low, high), (below, above) = s.robot.limits.T, limit_zones(s.robot, width).T
@@ -105,15 +101,18 @@ def limit_force(s: State) -> Array:
 
 
 def clause_force(s: State) -> Array:
-    """Eqs. 5.14-5.17: clauses, of which a robot wants all, push while none of their rows holds with margin.
+    """Return f_cst (eqs. 5.14 to 5.17): a clause pushes while none of its rows holds with margin; the robot wants all clauses to hold.
 
-    A row holds when a.q + b > 0: the robot files' convention, the thesis prints n.q < b.
+    A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
     """
     return clauses_2014(s) if s.gains.law == "published_2014" else clauses_default(s)
 
 
 def clauses_default(s: State) -> Array:
-    """A clause pushes along the unit normals of all its rows; the row that lacks least sets the size, so that the force is continuous."""
+    """Return f_cst of the default law: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
+
+    The row that is nearest to holding sets the size of the push, so that the force is continuous.
+    """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
         lengths = np.linalg.norm(clause.a * unit, axis=1)
@@ -124,7 +123,7 @@ def clauses_default(s: State) -> Array:
 
 
 def clauses_2014(s: State) -> Array:
-    """The 2014 program: the zone is in units of a.q + b, each row pushes by what it lacks, the sum is clipped to +-1 a motor."""
+    """Return f_cst of the 2014 program: the zone is in units of a.q + b, every row pushes by its own lack, the sum is clipped to +-1."""
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
         lack = 1.0 - (clause.a @ s.q + clause.b) / s.gains.constraint_width
@@ -134,12 +133,34 @@ def clauses_2014(s: State) -> Array:
 
 
 def contact_force(s: State) -> Array:
-    """Eq. 5.11: f_coll = L(sum over contacts of J^T f)."""
+    """Return the collision force f_coll = L(sum over contact points g of J(g)^T f_g) (eq. 5.11).
+
+    f_g = +-depth * normal, in m: each contact of fields pushes the two volumes that overlap apart, as strongly as it is deep.
+    The sum is `projected`, L is `bounded_contact`.
+    """
     return bounded_contact(s.robot, s.gains, projected(s.robot, s.q, s.contacts, s.propagate))
 
 
+def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Literal["tree", "part"] = "tree") -> Array:
+    """Return the sum in eq. 5.11: J(g)^T f_g over both sides g of every contact of fields, f_g = +-depth * normal; (n,) in m^2/rad.
+
+    `propagate`: "tree": a contact acts on all motors down to the base; "part": on those of the part that touches, as in the original
+    program. `Model` and python-fcl compute the depths, each by its own method.
+    """
+    frames, per_joint = link_frames(robot, q), np.zeros(len(robot.joints))
+    for contact in contacts:
+        if contact.kind == "field":
+            force = contact.depth * contact.normal
+            for link, push in ((contact.first_link, force), (contact.second_link, -force)):
+                for j in joints_to(robot, link) if propagate == "tree" else joints_of_part(robot, link):
+                    per_joint[j] += joint_column(robot, frames, j, contact.point)[:3] @ push
+    matrix, _ = robot.coupling
+    per_motor: Array = per_joint @ matrix
+    return per_motor
+
+
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
-    """L of the contacts' sum (n,), by its norm over each part; in the 2014 program it is squared before that, in degrees."""
+    """Saturate the sum of eq. 5.11, (n,), by its norm over each part (L of eq. 5.8); the 2014 program squares it first, in degrees."""
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit
     for part in robot.parts.values():
@@ -148,3 +169,23 @@ def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
             f = np.deg2rad(np.linalg.norm(f) * f)
         force[part.slice] = squash_norm(f, gains.max_contact, gains.contact_slope)
     return force * unit
+
+
+def joints_of_part(robot: Robot, link: int) -> list[int]:
+    """Return the joints between a link and the first link of its part."""
+    part, chain = part_of(robot, link), []
+    for j in joints_to(robot, link):
+        if part_of(robot, j + 1) != part:
+            break
+        chain.append(j)
+    return chain
+
+
+def part_of(robot: Robot, link: int) -> str | None:
+    """Return the part of a link: that of the first motor that drives its joint, else the part of its parent link; None for the base."""
+    matrix, _ = robot.coupling
+    for j in joints_to(robot, link):
+        driven = np.flatnonzero(matrix[j])
+        if driven.size:
+            return robot.motor_table[int(driven[0])].part
+    return None

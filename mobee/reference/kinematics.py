@@ -15,26 +15,26 @@ GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, root frame
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:
-    """What the motors q (n,) make of the joints, (J,) in rad or m: each joint an affine function of those that drive it."""
+    """Return the positions of the joints, (J,) in rad or m, at motor positions q (n,): an affine function of the motors."""
     matrix, offset = robot.coupling
     positions: Array = matrix @ q + offset
     return positions
 
 
 def cross_matrix(v: Array) -> Array:
-    """The matrix [v] (3, 3) with [v] w = v x w."""
+    """Return the matrix [v] (3, 3) with [v] w = v x w."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def rotation(axis: Array, angle: float) -> Array:
-    """Rodrigues' formula: R = I + sin(a) [u] + (1 - cos(a)) [u]^2."""
+    """Return the rotation by an angle about a unit axis u (Rodrigues): R = I + sin(a) [u] + (1 - cos(a)) [u]^2."""
     turn = cross_matrix(axis)
     turned: Array = np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * turn @ turn
     return turned
 
 
 def joint_motion(joint: Joint, position: float) -> Array:
-    """Where a joint alone brings what it carries, (4, 4): a turn about its line, x -> R (x - p) + p, or a shift along it."""
+    """Return the motion of one joint, (4, 4): a turn about its line, x -> R (x - p) + p, or a shift along it."""
     motion = np.eye(4)
     if joint.kind == "revolute":
         motion[:3, :3] = rotation(joint.axis, position)
@@ -45,7 +45,7 @@ def joint_motion(joint: Joint, position: float) -> Array:
 
 
 def link_frames(robot: Robot, q: Array) -> Array:
-    """Where every link has gone from its place at zero pose, (L, 4, 4): the product of the motions of the joints that carry it."""
+    """Return the motion of every link from its place at zero pose, (L, 4, 4): the product of the motions of the joints that carry it."""
     frames = [np.eye(4)]  # link 0 is the base
     for joint, position in zip(robot.joints, joint_positions(robot, q), strict=True):
         frames.append(frames[joint.parent] @ joint_motion(joint, position))  # joint j moves link j + 1
@@ -53,20 +53,20 @@ def link_frames(robot: Robot, q: Array) -> Array:
 
 
 def moved(frame: Array, point: Array) -> Array:
-    """Where a point (3,) of a link has gone."""
+    """Return where a frame (4, 4) takes a point (3,)."""
     found: Array = frame[:3, :3] @ point + frame[:3, 3]
     return found
 
 
 def marker_at(robot: Robot, frames: Array, name: str) -> tuple[Array, Array]:
-    """Place (3,) m and normal (3,) of a marker in the root frame."""
+    """Return position (3,) m and normal (3,) of a marker in the root frame."""
     marker = robot.marker(name)
     frame = frames[marker.link]
     return moved(frame, marker.position), frame[:3, :3] @ marker.normal
 
 
 def joints_to(robot: Robot, link: int) -> list[int]:
-    """The joints between a link and the base, the nearest to the link first."""
+    """Return the joints between a link and the base, the nearest to the link first."""
     chain = []
     while link > 0:
         chain.append(link - 1)
@@ -75,8 +75,8 @@ def joints_to(robot: Robot, link: int) -> list[int]:
 
 
 def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
-    """How a point (3,) of a link that joint j carries moves with the joint: velocity, then angular velocity, (6,)."""
-    joint, frame = robot.joints[j], frames[j + 1]  # a joint leaves its own axis where it is, so its link carries the axis, too
+    """Return one joint's column of the Jacobian (eq. 5.1) at a point (3,) that it carries: velocity, then angular velocity, (6,)."""
+    joint, frame = robot.joints[j], frames[j + 1]  # a joint leaves its own axis where it is, so its link carries the axis too
     axis = frame[:3, :3] @ joint.axis
     if joint.kind == "prismatic":
         return np.concatenate([axis, np.zeros(3)])
@@ -84,7 +84,7 @@ def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
 
 
 def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
-    """Eq. 5.1: how a point (3,) of a link, root frame now, moves with each motor, (6, n); velocity, then angular velocity."""
+    """Return J(q) = dx / dq of a point (3,) of a link, root frame now (eq. 5.1): (6, n), linear rows, then angular, per motor."""
     per_joint = np.zeros((6, len(robot.joints)))
     for j in joints_to(robot, link):
         per_joint[:, j] = joint_column(robot, frames, j, point)
@@ -94,13 +94,13 @@ def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
 
 
 def marker_jacobian(robot: Robot, q: Array, name: str) -> Array:
-    """The same of a marker, at q (n,) rad."""
+    """Return the Jacobian of a marker at q (n,) rad, (6, n)."""
     frames = link_frames(robot, q)
     return jacobian(robot, frames, robot.marker(name).link, marker_at(robot, frames, name)[0])
 
 
 def weight_torque(robot: Robot, q: Array) -> Array:
-    """What the motors need to carry the robot's weight, (n,) N m: -sum of J^T m g over the masses; zeros where the file names none."""
+    """Return the torques that carry the robot's weight, (n,) N m: -sum of J^T m g over the masses; zeros where the file has none."""
     frames, torque = link_frames(robot, q), np.zeros(len(q))
     for body in robot.bodies:
         centre = moved(frames[body.link], body.centre)

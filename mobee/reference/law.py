@@ -1,6 +1,8 @@
-"""The dynamical system of eq. 5.7: the sum of its forces, one step, and the command.
+"""The dynamical system of thesis eq. 5.7: M q" + C q' + L(K (q - q*)) = f_config + f_work + f_lim + f_cst + f_coll.
 
-A force of your own is a function of the `State`; put it behind the others and give the list to `acceleration`, or to
+This file has the sum of the forces, one step of the system, and the command. The forces themselves are in `forces`.
+
+A new force is a function of the `State`. Put it behind the others and give the list to `acceleration`, or to
 `mobee.reference.plant.Plant`:
 
     def viscous(s: State) -> Array:
@@ -28,22 +30,22 @@ Term = Callable[[State], Array]  # a force, (n,) rad/s^2
 
 TERMS: tuple[Term, ...] = (spring, damping, config_force, work_force, limit_force, clause_force, contact_force)
 
-INSIDE = 0.999  # of the motors' velocity and acceleration: rounding on the way is not to make the safety gate refuse
-LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
+INSIDE = 0.999  # share of the motors' velocity and acceleration limits, so that no rounding makes the safety gate refuse a command
+LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a blocked motor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Where the dynamical system is; arrays (n,)."""
+    """The state of the dynamical system; arrays (n,)."""
 
-    velocity: Array  # rad/s, its own
-    acceleration: Array  # rad/s^2, of what was sent
-    sent: Array  # rad/s, commanded last: the own velocity, but for a part just put in hold
+    velocity: Array  # rad/s, the system's own q'
+    acceleration: Array  # rad/s^2, of the commanded velocity
+    sent: Array  # rad/s, the velocity commanded last; differs from `velocity` only for a part that was just put in hold
     reference: Array  # rad, the position command
 
 
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
-    """Eq. 5.7 with mass 1, solved for q'': the sum of the terms, (n,) rad/s^2."""
+    """Return q" of eq. 5.7 with mass 1: the sum of the terms, (n,) rad/s^2."""
     total = np.zeros(len(state.q))
     for term in terms:
         total += term(state)
@@ -51,16 +53,16 @@ def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
 
 
 def at_rest(robot: Robot, gains: Gains, q: Array) -> Motion:
-    """At rest at the measured q (n,) rad; the reference of a motor that is never moved is within its limits."""
+    """Return the state at rest at the measured q (n,) rad; the reference of a motor of weight 0 is clipped to its limits."""
     still = np.zeros(len(q))
     return Motion(still, still, still, np.where(gains.weight(robot.motors) > 0, q, np.clip(q, *robot.limits.T)))
 
 
 def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt: float, speed_scale: float = 1.0) -> Motion:
-    """One step by dt [s], semi-implicit: velocity, then position, from the measured q and the acceleration that is wanted, (n,).
+    """Advance by dt [s], semi-implicitly: first the velocity, then the position, from the measured q and `wanted` = q" of eq. 5.7.
 
-    The motors' limits of velocity (times `speed_scale`) and acceleration hold for what is sent.  The position reference integrates
-    the velocity, but waits where it is `LEASH` ahead of the motor.  Motors of weight 0 are never moved.
+    The commanded velocity stays within the motors' limits of velocity (times `speed_scale`) and acceleration. The position reference
+    integrates it, but waits where it is `LEASH` ahead of the motor. Motors of weight 0 are never moved.
     """
     fastest = INSIDE * speed_scale * np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = INSIDE * np.array([motor.max_acceleration for motor in robot.motor_table])
@@ -80,23 +82,23 @@ def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt
 
 
 def hold(robot: Robot, motion: Motion, part: str) -> Motion:
-    """A part's own velocity is 0 from now on; what is sent follows as fast as the acceleration limit lets it."""
+    """Set a part's own velocity to 0; the commanded velocity follows as fast as the acceleration limit allows."""
     stopped = np.zeros(len(motion.velocity), dtype=bool)
     stopped[robot.part(part).slice] = True
     return replace(motion, velocity=np.where(stopped, 0.0, motion.velocity), acceleration=np.where(stopped, 0.0, motion.acceleration))
 
 
 def torque(robot: Robot, motion: Motion, q: Array) -> Array:
-    """The torque command (n,) N m: what gives a motor its velocity and acceleration, and what carries the weight at q (n,) rad."""
+    """Return the torque command (n,) N m: inertia, friction, and the robot's weight at q (n,) rad."""
     most = np.array([motor.max_torque for motor in robot.motor_table])
     wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + weight_torque(robot, q)
     return np.clip(wanted, -most, most)
 
 
 def is_settled(robot: Robot, gains: Gains, motion: Motion, part: str) -> bool:
-    """Whether a part is at rest (thesis 6.1): every motor commanded at most the settle speed and acceleration.
+    """Return whether a part has come to rest (thesis 6.1): no motor is commanded beyond the settle speed and acceleration.
 
-    It is looked at `first_look` s after the action began, then every `interval` s, up to `timeout`.
+    This is checked `first_look` s after the action began, then every `interval` s, until `timeout`.
     """
     where, unit = robot.part(part).slice, fine_units(robot)
     slow = np.abs(motion.velocity) <= gains.settle.speed * unit

@@ -1,6 +1,7 @@
-"""A plant tick by tick: robot, motors, model and law in one process, with the law as a list of terms.
+"""A plant in plain Python, tick by tick: robot, motors, model and law, with the law as a list of terms.
 
-A force of your own is tried here before it is compiled (see `law`): hundreds of times slower, the same numbers but for rounding.
+It is where a new force can be tried before it is compiled (see `law`): hundreds of times slower than `mobee.OfflinePlant`, with the
+same numbers up to rounding.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from mobee.simulation.motors import MotorParameters
 if TYPE_CHECKING:
     from mobee.model.model import Model
 
-ROUNDING = 1e-9  # s: times are sums of ticks
+ROUNDING = 1e-9  # s: tolerance of times, which are sums of ticks
 
 
 class Plant:
-    """A plant in the velocity modality, as the original was; a command moves the motors from the tick after it on."""
+    """A plant in the velocity modality, as the original; a command moves the motors from the next tick on."""
 
     def __init__(
         self,
@@ -32,21 +33,21 @@ class Plant:
         dt: float = 0.01,
         terms: Sequence[law.Term] = law.TERMS,
     ) -> None:
-        """At rest at the robot's home; `seed` is that of the encoders' noise, `dt` s the tick, `terms` are the forces of eq. 5.7."""
+        """Start at rest at the robot's home; `seed`: of the encoders' noise; `dt`: the tick [s]; `terms`: the forces of eq. 5.7."""
         self.model, self.robot, self.seed, self.dt, self.terms = model, model.robot, seed, dt, terms
         self.gains = Gains.default() if gains is None else gains
         self.parameters = MotorParameters() if parameters is None else parameters
         self.ticks = 0
         self.attractor = self.robot.home.copy()
-        self.force: Array | None = None  # of a client, as in `State`
+        self.force: Array | None = None  # f of eq. 5.9, see `State`
         self.pushes: dict[str, Array] = {}
         self.motion = law.at_rest(self.robot, self.gains, self.attractor)
         self._substeps = self.parameters.substeps(dt)
         self.motors = motors.at_rest(self.robot, self.parameters, self.robot.home.copy(), dt / self._substeps)
-        self.q = self.robot.home.copy()  # as the encoders said last
+        self.q = self.robot.home.copy()  # the last encoder values, rad
 
     def tick(self) -> None:
-        """Commands come into force, encoders, contacts, law; then the motors run."""
+        """Run one control tick: the command comes into force; encoders, contacts, law; then the motors move."""
         self.ticks += 1
         if self.ticks > 1:
             motors.command(self.motors, slice(None), "velocity", self.motion.velocity)
@@ -57,12 +58,12 @@ class Plant:
 
     @property
     def state(self) -> State:
-        """What the law sees at the encoders' last q."""
+        """The input of the law at the last encoder values."""
         contacts = self.model.evaluate(self.q).contacts
         return State(self.robot, self.gains, self.q, self.motion.velocity, self.attractor, contacts, self.force, self.pushes)
 
     def act(self, part: str, target: Array) -> bool:
-        """Go towards a target (n_part,) rad until the part has settled (thesis 6.1); False if its time is up before."""
+        """Go towards a target (n_part,) rad until the part has settled (thesis 6.1); return False if its time is up before."""
         self.attractor[self.robot.part(part).slice] = target
         settle, since = self.gains.settle, 0.0
         look = settle.first_look

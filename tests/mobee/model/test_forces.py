@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
-from mobee.reference.contact_forces import projected
+from mobee.reference.forces import projected
 from tests.mobee.model.random_scenes import loaded, posed, random_robot, random_world
 
 

@@ -15,7 +15,6 @@ from mobee.arrays import Array
 from mobee.control import Gains
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
-from mobee.reference.contact_forces import projected
 from mobee.reference.forces import (
     State,
     bounded_client,
@@ -25,6 +24,7 @@ from mobee.reference.forces import (
     contact_force,
     damping,
     limit_force,
+    projected,
     spring,
     squash,
     squash_norm,
