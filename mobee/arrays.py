@@ -1,4 +1,4 @@
-"""Array types, and the check of arrays that a caller gives."""
+"""Array types, and the checks of arguments that are arrays or numbers of threads."""
 
 from __future__ import annotations
 
@@ -12,18 +12,27 @@ from mobee.errors import InvalidValue
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+MAX_THREADS = 1024
+
 
 def real_array(what: str, given: ArrayLike) -> Array:
-    """A copy, row by row in memory; raises InvalidValue for what is no array of numbers, and for text and complex numbers.
+    """Return a copy as float64, C-contiguous; raises InvalidValue, with the name `what`, for anything but real numbers.
 
-    NumPy would convert these, too: read the text, and drop imaginary parts.
+    Text and complex numbers are refused too: NumPy would read the text and drop the imaginary parts.
     """
     try:
         value = np.array(given, order="C")
         if value.dtype.kind in "SU":
-            raise ValueError  # NumPy would read their digits
+            raise ValueError
         if value.dtype.kind != "c":
             return value if value.dtype == np.float64 else value.astype(np.float64)
     except (TypeError, ValueError):
         raise InvalidValue(f"{what} is {' '.join(reprlib.repr(given).split())}; it must be an array of numbers.") from None
     raise InvalidValue(f"{what} is complex, {value.ravel()[:1].tolist()} first; it must be real numbers.")
+
+
+def checked_threads(threads: int) -> int:
+    """Return the number of threads; raises InvalidValue if it is no whole number from 1 to MAX_THREADS."""
+    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
+        raise InvalidValue(f"threads={threads!r}: give a whole number from 1 to {MAX_THREADS}.")
+    return threads

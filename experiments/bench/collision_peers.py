@@ -16,8 +16,7 @@ from mobee.model.fcl_engine import (
     fcl,  # raises NotInstalled
     tested_pairs,
 )
-from mobee.model.hands import NO_HANDS
-from mobee.model.snapshot import Snapshot
+from mobee.model.snapshot import NO_HANDS, Snapshot
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape
 

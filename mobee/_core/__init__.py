@@ -1,7 +1,7 @@
 """The native core: a shared library, built from the sources in core/, called through ctypes.
 
-Each module here declares the functions of the source file with its name.  Whoever calls them has checked the arrays: the core
-itself is given addresses.
+Each module here declares the functions of the source files that its first line names. The core is given addresses, and checks no
+array: the callers do.
 """
 
 from __future__ import annotations

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
 from mobee.arrays import Array
-from mobee.control.checked import checked, checked_force
-from mobee.control.forces import Forces, Propagate, forces_of
+from mobee.control.forces import Forces, Propagate, checked, checked_force, forces_of
 from mobee.control.gains import Gains
 from mobee.control.law import Command, Law, Modality
 from mobee.control.reaches import Reaches

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache, reduce
 from typing import TYPE_CHECKING, Literal
@@ -10,7 +11,7 @@ import numpy as np
 
 from mobee._core.law import moving_names, term_names
 from mobee._core.tables import Table
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.control.gains import Gains
 from mobee.control.law import Law
 from mobee.errors import InvalidValue, UnknownName
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 # "tree": a contact is felt down to the base, so that a hand on the table also stops the torso; "part": by the part's own motors.
 Propagate = Literal["tree", "part"]
+
+_FLOAT = np.dtype(np.float64)
+LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far above what any squash lets through, far below an overflow in it
 
 
 class Forces(Mapping[str, Array]):
@@ -102,3 +106,25 @@ def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = 
 @lru_cache(maxsize=8)
 def _law(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
     return Law(robot, gains, contact_forces=contact_forces)
+
+
+def checked(what: str, value: Array, length: int) -> Array:
+    """Return a copy of an array (length,) of finite numbers; raises InvalidValue with the name `what`."""
+    # The first test is for the usual case: the general checks below take several times as long.
+    if type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == (length,) and all(map(math.isfinite, value.tolist())):
+        return value.copy()
+    array = real_array(what, value)
+    if array.shape != (length,):
+        raise InvalidValue(f"{what} of shape {array.shape}: must be {length} finite numbers")
+    if not np.isfinite(array).all():
+        worst = int(np.argmax(np.nan_to_num(np.abs(array), nan=np.inf)))
+        raise InvalidValue(f"{what}: number {worst} is {array[worst]}; must be {length} finite numbers")
+    return array
+
+
+def checked_force(what: str, value: Array, length: int) -> Array:
+    """Return a copy of an array (length,) of numbers of at most LARGEST_FORCE in size; raises InvalidValue with the name `what`."""
+    array = checked(what, value, length)
+    if np.abs(array).max(initial=0.0) > LARGEST_FORCE:
+        raise InvalidValue(f"{what}: {array[np.abs(array).argmax()]:.3g}; must be at most {LARGEST_FORCE:g} in size")
+    return array

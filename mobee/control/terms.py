@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from mobee._core.law import term_names
 from mobee.arrays import Array
-from mobee.control.checked import checked_force
-from mobee.control.forces import Forces
+from mobee.control.forces import Forces, checked_force
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 

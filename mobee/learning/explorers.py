@@ -120,9 +120,9 @@ def _next_counts(model: TransitionModel) -> tuple[Array, Array]:
 @cache
 def _core() -> ModuleType:
     """Loaded when it is first needed."""
-    from mobee._core import observations
+    from mobee._core import learning
 
-    return observations
+    return learning
 
 
 TIE = 1e-12

@@ -16,9 +16,8 @@ from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, Tabled
 
 if TYPE_CHECKING:
-    from mobee._core import observations
-    from mobee._core.observations import OutcomeCounts
-    from mobee._core.value_iteration import TransitionTable
+    from mobee._core import learning
+    from mobee._core.learning import OutcomeCounts, TransitionTable
 
 
 def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
@@ -79,7 +78,7 @@ class DebiasedCounts(Tabled):
         self._sum = stay + goal
         probabilities = (real + self._prior) / (weight[:, :, None] + self._sum)
         self._probabilities: Array = np.where(model.probabilities.any(axis=-1, keepdims=True), probabilities, 0.0)
-        self._believed: observations.DebiasedCounts | None = None
+        self._believed: learning.DebiasedCounts | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_believed": None, "_table": None}  # a copy has arrays of its own
@@ -94,7 +93,7 @@ class DebiasedCounts(Tabled):
         """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
         return read_only(self._probabilities)
 
-    def update(self, counts: observations.OutcomeCounts, state: int, action: int) -> None:
+    def update(self, counts: OutcomeCounts, state: int, action: int) -> None:
         """Follow the real counts of a state-action."""
         believed = self._believed or self._believe()
         _core().believe(counts.at, believed.at, state, action)
@@ -104,13 +103,13 @@ class DebiasedCounts(Tabled):
         self._prior, self._probabilities = np.append(self._prior, 0.0), widened(self._probabilities)
         self._believed = self._table = None
 
-    def _believe(self) -> observations.DebiasedCounts:
+    def _believe(self) -> learning.DebiasedCounts:
         """The probabilities where the core finds them."""
         self._believed = _core().DebiasedCounts(self._probabilities, self._prior, self._sum)
         return self._believed
 
     def _tabled(self) -> TransitionTable:
-        from mobee._core.value_iteration import TransitionTable
+        from mobee._core.learning import TransitionTable
 
         return TransitionTable(self._probabilities, self._model.outcomes)
 
@@ -118,9 +117,9 @@ class DebiasedCounts(Tabled):
 @cache
 def _core() -> Any:
     """Loaded when it is first needed."""
-    from mobee._core import observations
+    from mobee._core import learning
 
-    return observations
+    return learning
 
 
 INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # their imagined counts: Algorithm 8 and table 7.1
@@ -281,6 +280,6 @@ class TransitionModel(Tabled):
         return self._counted
 
     def _tabled(self) -> TransitionTable:
-        from mobee._core.value_iteration import TransitionTable
+        from mobee._core.learning import TransitionTable
 
         return TransitionTable(self._probabilities, self._outcomes, self._bins)

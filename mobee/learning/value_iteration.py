@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
@@ -14,7 +15,7 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
 
 if TYPE_CHECKING:
-    from mobee._core.value_iteration import TransitionTable
+    from mobee._core.learning import TransitionTable
 
 METHODS = ("jacobi", "modified")
 BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to take an action out of the plan."
@@ -90,7 +91,7 @@ def value_iteration(
     else:
         probabilities, outcomes, reward = tables(model, reward, discount)
         given = core.Table(address(probabilities), address(outcomes), None, *outcomes.shape)
-        table = core.addressof(given)
+        table = ctypes.addressof(given)
     states = len(reward)
     if not tolerance > 0.0:
         raise InvalidValue(f"tolerance={tolerance!r}: valid is a number above 0.")
@@ -135,9 +136,9 @@ def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Ar
 @cache
 def _core() -> tuple[ModuleType, Callable[[NDArray[Any]], int]]:
     """Loaded when it is first needed, with where arrays are."""
-    from mobee._core import address, value_iteration
+    from mobee._core import address, learning
 
-    return value_iteration, address
+    return learning, address
 
 
 _EQUAL = 1e-13  # of the largest value: a better action is better by more

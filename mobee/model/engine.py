@@ -11,11 +11,9 @@ from mobee._core.tables import ROW_BYTES
 from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.hands import NO_HANDS, Hands, hand_numbers
 from mobee.model.robot_tables import Carried, robot_tables
-from mobee.model.snapshot import ATTACHED, Snapshot
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Robot
+from mobee.model.snapshot import ATTACHED, NO_HANDS, Hands, Snapshot, hand_numbers
+from mobee.robot.robot import Robot, per_robot
 
 GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
 PER_CELL = 8  # objects, aimed at

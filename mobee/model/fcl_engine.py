@@ -14,9 +14,8 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.hands import NO_HANDS, Hands
 from mobee.model.kinematics import link_transforms, point_jacobian
-from mobee.model.snapshot import ATTACHED, OBSTACLE, TARGET, Snapshot
+from mobee.model.snapshot import ATTACHED, NO_HANDS, OBSTACLE, TARGET, Hands, Snapshot
 from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape

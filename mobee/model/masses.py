@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import link_transforms, tables
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Robot, per_robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

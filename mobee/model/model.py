@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model.hands import MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.pose import Engine, Pose
-from mobee.model.snapshot import EMPTY
+from mobee.model.snapshot import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.world import World, link_pose
 from mobee.model.world_object import seen_from, sphere
 from mobee.robot.robot import Robot

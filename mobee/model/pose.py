@@ -10,9 +10,8 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.contact import Contact, ContactTable
-from mobee.model.hands import Hands
 from mobee.model.kinematics import point_jacobian
-from mobee.model.snapshot import Snapshot
+from mobee.model.snapshot import Hands, Snapshot
 from mobee.model.world import link_pose
 from mobee.model.world_object import WorldObject, placed
 from mobee.robot.robot import Robot

@@ -1,8 +1,14 @@
-"""An immutable state of the world: its objects, and the arrays that the engine reads."""
+"""The arguments of an evaluation beside q: the world as an immutable snapshot, and the hands that reach.
+
+The hand of a marker is the marker's link with everything that this link carries: its contacts with targets are ignored while the
+marker reaches. The fields of the links before it in the same part belong to the hand too if the marker is inside one of them:
+otherwise they would keep the marker away from every target.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -79,3 +85,27 @@ def _with(old: Snapshot, new: WorldObject) -> MappingProxyType[str, WorldObject]
 
 def _code(thing: WorldObject) -> int:
     return (_FREE if thing.link is None else _CARRIED)[thing.role]
+
+
+MAX_HANDS = 2  # that reach at once; as in core/scene.hpp
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """The links of one hand, by index. Contacts with targets are ignored for both links and for all links that they carry."""
+
+    link: int  # all of its volumes are exempt
+    fields: int  # its fields are exempt; the same link, or one before it
+
+
+Hands = tuple[Hand, ...]
+NO_HANDS: Hands = ()
+
+
+@lru_cache(maxsize=64)
+def hand_numbers(reaching: Hands) -> tuple[int, ...]:
+    """Return the hands as the core takes them (`Hands` in core/scene.hpp): two links for each, -1 where there is no hand."""
+    found = [number for hand in reaching for number in (hand.link, hand.fields)]
+    if len(found) > 2 * MAX_HANDS:
+        raise ValueError(f"{len(reaching)} hands reach at once; at most {MAX_HANDS} may")
+    return (*found, *[-1] * (2 * MAX_HANDS - len(found)))

@@ -10,8 +10,7 @@ from mobee._core import engine as core
 from mobee.arrays import Array
 from mobee.model.contact import ContactTable
 from mobee.model.engine import Engine, Scene
-from mobee.model.hands import Hands, hand_numbers
-from mobee.model.snapshot import Snapshot
+from mobee.model.snapshot import Hands, Snapshot, hand_numbers
 
 if TYPE_CHECKING:
     from mobee.model.model import Model, Reaching

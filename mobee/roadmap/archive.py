@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.model.world_object import Geometry, WorldObject
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Robot, Shape
+from mobee.robot.robot import Robot, Shape, per_robot
 
 _DIGITS, _DECIMALS = 16, 9
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, checked_threads
 from mobee.errors import InvalidValue
 from mobee.model.model import Model, Reaching, engine_of
 from mobee.model.snapshot import Snapshot
@@ -15,7 +15,6 @@ from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
 from mobee.roadmap.ik.costs import lengths
 from mobee.roadmap.ik.problem import solid_model
-from mobee.threads import checked_threads
 
 STEP = 0.001  # m
 SKIN = 0.04  # m: an edge moves a hand by a centimetre, and an elbow by more

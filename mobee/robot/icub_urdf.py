@@ -10,7 +10,7 @@ import defusedxml.ElementTree
 import numpy as np
 
 from mobee.errors import MobeeError
-from mobee.robot.numbers import numbers
+from mobee.robot.writing import numbers
 
 MODEL = "iCubGazeboV2_5"
 LEGS = ("l_hip_pitch", "r_hip_pitch")

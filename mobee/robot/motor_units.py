@@ -12,8 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Motor, Robot
+from mobee.robot.robot import Motor, Robot, per_robot
 
 SLIDE_RANGE = np.deg2rad(200.0)  # rad: LIMIT_WIDTH is then 5 % of a slide's range
 LIMIT_WIDTH = np.deg2rad(10.0)  # rad: the limit zone of the shipped gains

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, wraps
+from typing import Literal, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from mobee.errors import UnknownName
 
 ShapeKind = Literal["sphere", "capsule", "cylinder", "box", "convex"]
 LinkPair = frozenset[int]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,3 +197,17 @@ def _fixed(array: Array) -> Array:
     """The array, which is shared from now on."""
     array.flags.writeable = False
     return array
+
+
+def per_robot(build: Callable[[Robot], T]) -> Callable[[Robot], T]:
+    """Decorate a function of a robot so that it is called once for each robot object; nobody may change what it returned."""
+    kept: WeakKeyDictionary[Robot, T] = WeakKeyDictionary()
+
+    @wraps(build)
+    def found(robot: Robot) -> T:
+        known = kept.get(robot)
+        if known is None:
+            known = kept[robot] = build(robot)
+        return known
+
+    return found

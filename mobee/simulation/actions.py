@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mobee._core.plant import PART
 from mobee._core.tables import Table
 from mobee.arrays import Array, real_array
-from mobee.control.settle import VERDICTS
+from mobee.control.gains import VERDICTS
 from mobee.errors import InvalidValue
 from mobee.plant import Outcome
 from mobee.robot.robot import Robot

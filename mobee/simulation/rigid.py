@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.kinematics import link_transforms
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Joint, Motor, Robot
+from mobee.robot.robot import Joint, Motor, Robot, per_robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:

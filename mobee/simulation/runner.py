@@ -16,9 +16,9 @@ from mobee._core.law import term_names
 from mobee._core.tables import Table, View, view
 from mobee.arrays import Array
 from mobee.control import Controller
-from mobee.model.hands import Hand, Hands
 from mobee.model.masses import gravity_torque
 from mobee.model.model import engine_of
+from mobee.model.snapshot import Hand, Hands
 from mobee.model.track import Neighbours
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened

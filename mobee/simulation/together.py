@@ -13,11 +13,11 @@ from typing import TypeVar
 import numpy as np
 
 from mobee._core import plant as core
+from mobee.arrays import checked_threads
 from mobee.errors import BatchInterrupted, InvalidValue
 from mobee.plant import Outcome
 from mobee.simulation.plant import OfflinePlant
 from mobee.simulation.runner import Trace, Work
-from mobee.threads import checked_threads
 
 T = TypeVar("T")
 

@@ -19,7 +19,7 @@ from bus_schema.rpc import World as WorldReply
 from mobee import Gains, Model, World
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.world_object import Geometry
 from mobee.roadmap.archive import robot_digest, world_digest
 from mobee.roadmap.playback import PERIOD, Played, attractors, moving, timed, watched
@@ -114,7 +114,7 @@ def running_system(endpoint: str) -> Iterator[Running]:
             ) from None
         robot, world = load_robot(settings["robot"]), World()
         for one in objects:
-            shape, turn = Geometry(one.geometry.kind, tuple(one.geometry.size)), to_matrix(np.array(one.quaternion))
+            shape, turn = Geometry(one.geometry.kind, tuple(one.geometry.size)), matrix_from_quaternion(np.array(one.quaternion))
             world.add(one.name, shape, position=one.position, rotation=turn, role=one.role)
         with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the motion, and that the verb has to tell

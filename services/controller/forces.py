@@ -10,14 +10,12 @@ from bus_schema.messages import ContactItem
 from bus_schema.messages import Forces as ForcesMessage
 from mobee.arrays import Array
 from mobee.control import Forces
-from mobee.control.checked import LARGEST_FORCE
-from mobee.control.forces import told_terms
+from mobee.control.forces import LARGEST_FORCE, told_terms
 from mobee.control.terms import Term, valid_terms
 from mobee.learning.named import imported
 from mobee.model.contact import KINDS, ContactTable
-from mobee.model.hands import Hands
 from mobee.model.pose import Pose
-from mobee.model.snapshot import Snapshot
+from mobee.model.snapshot import Hands, Snapshot
 from mobee.robot.robot import Robot
 
 MAX_TICKS = 3  # age of forces beyond which the robot holds, and ticks that the law catches up at most

@@ -11,7 +11,7 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.rpc import Done, Force, Goal, ReachFor, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee.arrays import Array
-from mobee.control.checked import LARGEST_FORCE
+from mobee.control.forces import LARGEST_FORCE
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.contact import links_moved
 from mobee.robot.robot import Robot

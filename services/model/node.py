@@ -16,9 +16,9 @@ from mobee.control import constraint_forces
 from mobee.control.forces import needs_contacts, told_terms
 from mobee.errors import MobeeError
 from mobee.model.contact import KINDS, Contact, touched
-from mobee.model.hands import MAX_HANDS
+from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.pose import Pose as ModelPose
-from mobee.model.quaternion import from_matrix
+from mobee.model.snapshot import MAX_HANDS
 from mobee.robot.robot import Robot
 from services.common.lockstep import Participant
 from services.common.rate import Percentiles
@@ -122,7 +122,9 @@ class ModelNode:
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
         if self._pose.heard:
             markers = [
-                MarkerPose(name=name, position=pose.position(name).tolist(), quaternion=from_matrix(pose.rotation(name)).tolist())
+                MarkerPose(
+                    name=name, position=pose.position(name).tolist(), quaternion=quaternion_from_matrix(pose.rotation(name)).tolist()
+                )
                 for name in self._robot.markers
             ]
             self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)

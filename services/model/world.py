@@ -15,7 +15,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model import WorldObject as Thing
 from mobee.model import world_object as geometry
-from mobee.model.quaternion import from_matrix, to_matrix
+from mobee.model.kinematics import matrix_from_quaternion, quaternion_from_matrix
 from mobee.model.world import placed
 from mobee.model.world_object import valid_position, valid_shape
 from mobee.reach import TARGET
@@ -136,7 +136,7 @@ class WorldDesk:
                 name=o.name,
                 geometry=_geometry(o),
                 position=here.position.tolist(),
-                quaternion=from_matrix(here.rotation).tolist(),
+                quaternion=quaternion_from_matrix(here.rotation).tolist(),
                 role=o.role,
                 link=o.link or "",
             )
@@ -168,4 +168,4 @@ def _rotation(quaternion: list[float]) -> Array:
     """The matrix (3, 3) of a quaternion wxyz that may need normalising, but not inventing."""
     if not 0.5 < np.linalg.norm(quaternion) < 2.0:
         raise InvalidValue(f"quaternion {quaternion}: must be of length 1")
-    return to_matrix(np.array(quaternion))
+    return matrix_from_quaternion(np.array(quaternion))

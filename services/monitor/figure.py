@@ -7,9 +7,8 @@ import rerun as rr
 
 from mobee.arrays import Array
 from mobee.model.contact import Contact
-from mobee.model.kinematics import link_transforms
+from mobee.model.kinematics import link_transforms, quaternion_from_matrix
 from mobee.model.model import Model
-from mobee.model.quaternion import from_matrix
 from mobee.model.world import World
 from mobee.rendering import palette
 from mobee.rendering.palette import Rgba
@@ -21,7 +20,7 @@ def drawn(
     kind: ShapeKind, size: tuple[float, ...], position: Array, rotation: Array, color: Rgba, vertices: Array | None = None
 ) -> rr.AsComponents:
     """The volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
-    w, x, y, z = from_matrix(rotation)
+    w, x, y, z = quaternion_from_matrix(rotation)
     turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
     if kind == "convex":
         return _mesh(position + (np.empty((0, 3)) if vertices is None else vertices) @ rotation.T, color)
@@ -88,7 +87,7 @@ class Figure:
         """The robot in poses (k, n) rad, the first at `begin` [s] and then `rate` a second, with what touches in each."""
         times = begin + np.arange(len(poses)) / rate
         transforms = link_transforms(self._robot, poses)
-        turns = from_matrix(transforms[..., :3, :3])[..., [1, 2, 3, 0]]
+        turns = quaternion_from_matrix(transforms[..., :3, :3])[..., [1, 2, 3, 0]]
         for index, link in enumerate(self._robot.links):
             columns = rr.Transform3D.columns(translation=transforms[:, index, :3, 3], quaternion=turns[:, index])
             self._columns(["robot", link], times, columns)

@@ -15,8 +15,7 @@ from bus_schema.messages import ContactItem, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.model.kinematics import link_transforms
-from mobee.model.quaternion import from_matrix, to_matrix
+from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quaternion_from_matrix
 from mobee.rendering import palette
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Robot, Shape
@@ -40,7 +39,7 @@ class Solids:
 
     def move(self, transforms: Array) -> None:
         """The links as they are now; `transforms`: (L, 4, 4), from link_transforms."""
-        turns = from_matrix(transforms[:, :3, :3])[:, [1, 2, 3, 0]]
+        turns = quaternion_from_matrix(transforms[:, :3, :3])[:, [1, 2, 3, 0]]
         for link, frame in self._frames.items():
             place = rr.Transform3D(
                 translation=transforms[link, :3, 3], quaternion=rr.Quaternion(xyzw=turns[link]), parent_frame=ROOT, child_frame=frame
@@ -102,7 +101,7 @@ class Scene:
         """An object where it is believed to be."""
         self._objects[thing.name] = thing
         color = palette.of_object(thing.geometry.kind, thing.role)
-        turn = to_matrix(np.array(thing.quaternion))
+        turn = matrix_from_quaternion(np.array(thing.quaternion))
         body = drawn(thing.geometry.kind, tuple(thing.geometry.size), np.array(thing.position), turn, color)
         self._stream.log(f"scene/objects/{thing.name}", rr.CoordinateFrame(ROOT), body)
 
@@ -119,7 +118,7 @@ class Scene:
                 lengths=lengths,
                 radii=[shape.size[0] for shape in capsules],
                 translations=starts,
-                quaternions=[rr.Quaternion(xyzw=wxyz[[1, 2, 3, 0]]) for wxyz in from_matrix(turns)],
+                quaternions=[rr.Quaternion(xyzw=wxyz[[1, 2, 3, 0]]) for wxyz in quaternion_from_matrix(turns)],
                 colors=[_field_color(shape, touched) for shape in capsules],
                 fill_mode="solid",
             ),

@@ -13,8 +13,8 @@ from msgspec import Struct
 from pybullet_utils.bullet_client import BulletClient
 
 from mobee.arrays import Array
+from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.masses import gravity_torque
-from mobee.model.quaternion import from_matrix
 from mobee.model.world import World, WorldObject
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Robot
@@ -142,5 +142,5 @@ class BulletScene:
         else:
             kind = pybullet.GEOM_CYLINDER if thing.kind == "cylinder" else pybullet.GEOM_CAPSULE
             shape = client.createCollisionShape(kind, radius=size[0], height=size[1])
-        w, x, y, z = from_matrix(thing.rotation).tolist()
+        w, x, y, z = quaternion_from_matrix(thing.rotation).tolist()
         return int(client.createMultiBody(0.0, shape, basePosition=thing.position.tolist(), baseOrientation=[x, y, z, w]))

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array
-from mobee.model.kinematics import link_transforms
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import link_transforms, matrix_from_quaternion
 from mobee.model.world import World, WorldObject
 from mobee.rendering.camera import Raster, eye_camera
 from mobee.rendering.solid import Color, Solid
@@ -46,7 +45,7 @@ class Scene:
     def place(self, name: str, position: Array, quaternion: Array) -> None:
         """Put an object of the world at (3,) m, quaternion wxyz; a name that the world does not have is ignored."""
         if name in self._objects:
-            self._objects[name] = replace(self._objects[name], position=position, rotation=to_matrix(quaternion))
+            self._objects[name] = replace(self._objects[name], position=position, rotation=matrix_from_quaternion(quaternion))
 
     def draw(self, eye: str) -> Picture:
         """Return the picture of the eye "left" or "right": (height, width, 3) bytes, red, green, blue."""

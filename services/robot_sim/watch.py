@@ -11,7 +11,7 @@ import numpy as np
 from bus_schema.messages import ObjectTruth, Truth
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.model.quaternion import from_matrix
+from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
@@ -153,7 +153,7 @@ class Watch:
             pair=self._deepest.pair,
             gap=gap,
             objects=[
-                ObjectTruth(name=thing.name, position=thing.position.tolist(), quaternion=from_matrix(thing.rotation).tolist())
+                ObjectTruth(name=thing.name, position=thing.position.tolist(), quaternion=quaternion_from_matrix(thing.rotation).tolist())
                 for thing in self._backend.world.objects.values()
             ],
         )

@@ -20,8 +20,7 @@ import pytest
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, State, Transition, Truth, WorldObject
 from bus_schema.rpc import ObjectState
-from mobee.model.kinematics import link_transforms
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import link_transforms, matrix_from_quaternion
 from mobee.robot.load import load_robot
 from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
@@ -175,7 +174,7 @@ def mesh_pose(scene: Scene, link: str, angles: np.ndarray) -> np.ndarray:
         sent = joint.compute_transform(float(angles[index[joint.name]]) if joint.name in index else 0.0, clamp=False)
         step = np.eye(4)
         x, y, z, w = sent.quaternion.as_arrow_array().to_pylist()[0]
-        step[:3, :3] = to_matrix(np.array([w, x, y, z]))
+        step[:3, :3] = matrix_from_quaternion(np.array([w, x, y, z]))
         step[:3, 3] = sent.translation.as_arrow_array().to_pylist()[0]
         pose, link = step @ pose, joint.parent_link
     return pose

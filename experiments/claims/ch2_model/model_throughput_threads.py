@@ -14,8 +14,8 @@ import numpy as np
 from mobee import Model
 from mobee.arrays import Array
 from mobee.model import Geometry, box
+from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.pose import Pose
-from mobee.model.quaternion import to_matrix
 from mobee.robot.robot import Robot
 
 CONTROL_PERIOD = 0.01  # s (thesis 2.4)
@@ -121,5 +121,5 @@ def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:
     for _ in range(count):
         quaternion = rng.normal(size=4)
         place = middle + rng.uniform(-SPACE / 2.0, SPACE / 2.0, 3)
-        boxes.append(Box(box(*rng.uniform(*EDGES, 3)), place, to_matrix(quaternion / np.linalg.norm(quaternion))))
+        boxes.append(Box(box(*rng.uniform(*EDGES, 3)), place, matrix_from_quaternion(quaternion / np.linalg.norm(quaternion))))
     return boxes

@@ -10,8 +10,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.control.reflex import Violation, Watch
+from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.model import Model
-from mobee.model.quaternion import from_matrix
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
@@ -146,7 +146,7 @@ class Table:
         q = q.copy()
         for _ in range(30):
             pose = self.model.evaluate(q)
-            turn = from_matrix(rotation @ pose.rotation(MARKER).T)
+            turn = quaternion_from_matrix(rotation @ pose.rotation(MARKER).T)
             error = np.concatenate([position - pose.position(MARKER), 2.0 * np.sign(turn[0]) * turn[1:]])
             if np.abs(error).max() < PRECISE:
                 return q

@@ -9,7 +9,7 @@ import numpy as np
 
 from mobee import OfflinePlant, Outcome
 from mobee.arrays import Array
-from mobee.control.settle import SettleTest
+from mobee.control.gains import SettleTest
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,9 +95,9 @@ class AlikeFailures:
 @cache
 def _core() -> ModuleType:
     """Loaded when it is first needed."""
-    from mobee._core import histories
+    from mobee._core import learning
 
-    return histories
+    return learning
 
 
 FAILURES = ("spread", "local", "alike")

@@ -90,6 +90,6 @@ class Histories:
 @cache
 def _core() -> ModuleType:
     """Loaded when it is first needed."""
-    from mobee._core import histories
+    from mobee._core import learning
 
-    return histories
+    return learning

@@ -7,13 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, checked_threads
 from mobee.errors import InvalidValue
 from mobee.roadmap.ik.aims import KINDS
 from mobee.roadmap.ik.problem import Flags, Problem, needed
 from mobee.roadmap.ik.term import Aim
 from mobee.robot.robot import Robot
-from mobee.threads import checked_threads
 
 RESTARTS, AT_ONCE = 40, 4
 STEPS = 60  # of one start at most

@@ -17,8 +17,7 @@ from mobee.model.pose import Pose
 from mobee.roadmap.ik.aims import MOTOR
 from mobee.roadmap.ik.costs import term
 from mobee.roadmap.ik.term import Aim, Term
-from mobee.robot.per_robot import per_robot
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Robot, per_robot
 
 _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 

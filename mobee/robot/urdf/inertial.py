@@ -9,11 +9,11 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.robot.bodies import ball_of_water, from_six, one_a_link, to_six
-from mobee.robot.numbers import number, numbers
 from mobee.robot.robot import Body
 from mobee.robot.urdf.frames import Frame, bounded, child, read_origin
 from mobee.robot.urdf.layout import Skeleton
 from mobee.robot.urdf.tree import Tree
+from mobee.robot.writing import number, numbers
 from mobee.robot.xml.node import SMALLEST, Node
 
 SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

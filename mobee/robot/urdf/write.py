@@ -11,13 +11,12 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.drives import drives_of
-from mobee.robot.numbers import number, numbers
 from mobee.robot.robot import Marker, Motor, Robot, Shape
 from mobee.robot.urdf.frames import rpy_of
 from mobee.robot.urdf.hull import facets
 from mobee.robot.urdf.inertial import inertial_element
 from mobee.robot.urdf.write_srdf import write_srdf
+from mobee.robot.writing import drives_of, number, numbers
 from mobee.robot.xml.pairs import role_elements
 
 

@@ -12,9 +12,9 @@ from xml.etree import ElementTree as ET
 from xml.sax.saxutils import quoteattr
 
 from mobee.errors import RobotFileError
-from mobee.robot.numbers import number
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.pairs import adjacent_links
+from mobee.robot.writing import number
 from mobee.robot.xml.node import Node, read_xml
 
 

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.robot.numbers import degrees, number
 from mobee.robot.pairs_2014 import near_root
+from mobee.robot.writing import degrees, number
 from mobee.robot.xml.node import Node, Remark, descendants, shown
 from mobee.robot.xml.volume import AXIS, PLACE, Y, align, direction, height_and_angle, link_step, turn_about
 

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.robot.numbers import degrees
+from mobee.robot.writing import degrees
 from mobee.robot.xml.node import Node, Remark, shown
 from mobee.robot.xml.original import VOLUMES, at_line, free_name, vector_texts
 from mobee.robot.xml.volume import AXIS, PLACE, UPRIGHT, Y, direction, height_along, height_and_angle, turn_about

@@ -21,7 +21,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import OlderVersion
-from mobee.robot.numbers import degrees, number, numbers
+from mobee.robot.writing import degrees, number, numbers
 from mobee.robot.xml.node import VERSION, Node, Remark, descendants, shown
 from mobee.robot.xml.original import find_evidence, rewrite_original
 from mobee.robot.xml.original_world import rewrite_world_list

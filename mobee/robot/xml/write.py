@@ -11,9 +11,8 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.robot.bodies import to_six
-from mobee.robot.drives import Drive, drives_of
-from mobee.robot.numbers import degrees, number, numbers
 from mobee.robot.robot import Body, Clause, Joint, Motor, Robot, Shape
+from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
 from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
 from mobee.robot.xml.pairs import ignore_elements
 from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.bench import workload
 from mobee.model.fcl_engine import tested_pairs as rules
-from mobee.model.hands import NO_HANDS
+from mobee.model.snapshot import NO_HANDS
 
 
 def test_it_has_the_size_that_it_says() -> None:

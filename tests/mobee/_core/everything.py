@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 import mobee
-from mobee._core.histories import gaussian_sums
+from mobee._core.learning import gaussian_sums
 from mobee.learning.reaching.histories import Histories
 from mobee.learning.tabular import TabularPlant, half_space
 from mobee.roadmap.edges import check_edges

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mobee.control import Controller, Forces, Gains
-from mobee.control.checked import LARGEST_FORCE
+from mobee.control.forces import LARGEST_FORCE
 from mobee.control.law import FRICTION, INERTIA
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.masses import gravity_torque

@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from mobee._core import observations
+from mobee._core import learning as core
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.explorers import _next_counts
 from mobee.learning.transitions import TransitionModel
@@ -35,7 +35,7 @@ def expected(model, state, action):
 
 def expected_gains(model):
     gains = model.reward.copy()
-    observations.expected_gains(model.debiased().table, *_next_counts(model), model.tries, gains)
+    core.expected_gains(model.debiased().table, *_next_counts(model), model.tries, gains)
     return gains
 
 
@@ -55,7 +55,7 @@ def test_gains_along_a_plan_fall_as_if_its_most_likely_outcomes_were_observed(se
     beliefs, gains = model.debiased(), expected_gains(model)
     _, q = value_iteration(beliefs, gains)
     left = gains.copy()
-    observations.deplete(beliefs.table, *_next_counts(model), q, 3, 25, left)
+    core.deplete(beliefs.table, *_next_counts(model), q, 3, 25, left)
     later, state, met = copy.deepcopy(model), 3, set()
     for _ in range(25):
         action = int(q[state].argmax())

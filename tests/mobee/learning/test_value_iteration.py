@@ -81,7 +81,7 @@ def test_without_any_reward_a_relative_tolerance_is_an_absolute_one():
 def test_it_reads_the_tables_of_a_model_where_they_are(monkeypatch):
     model = experienced(16, seed=6)
     seen = []
-    from mobee._core import value_iteration as core
+    from mobee._core import learning as core
 
     known, solve = core.Table, core.solve
     monkeypatch.setattr(core, "Table", lambda *given: seen.extend(given[:2]) or known(*given))

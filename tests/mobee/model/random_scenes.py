@@ -12,8 +12,8 @@ import mobee
 from mobee._core.narrow import Volumes, overlaps
 from mobee.arrays import Array, Ints
 from mobee.model.fcl_engine import tested_pairs
-from mobee.model.hands import NO_HANDS, Hands
 from mobee.model.kinematics import link_transforms
+from mobee.model.snapshot import NO_HANDS, Hands
 from mobee.model.world_object import Role, WorldObject
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 

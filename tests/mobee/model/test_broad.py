@@ -9,7 +9,7 @@ import mobee
 from mobee._core.engine import span
 from mobee.model import engine as engines
 from mobee.model.engine import Engine
-from mobee.model.hands import NO_HANDS
+from mobee.model.snapshot import NO_HANDS
 from tests.mobee.model.random_scenes import loaded, posed, random_world
 
 Places = Callable[[np.random.Generator, int], np.ndarray]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 import mobee
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET
 from mobee.model.volumes import VOLUME, volume_row
 from tests.mobee.planar import planar_arm
@@ -28,7 +28,7 @@ SHAPES = st.one_of(
 )
 COORDINATE = st.floats(-2.0, 2.0)
 POSITIONS = st.tuples(COORDINATE, COORDINATE, COORDINATE)
-ROTATIONS = st.integers(0, 2**32 - 1).map(lambda seed: to_matrix(unit(np.random.default_rng(seed).normal(size=4))))
+ROTATIONS = st.integers(0, 2**32 - 1).map(lambda seed: matrix_from_quaternion(unit(np.random.default_rng(seed).normal(size=4))))
 CODES = {
     ("obstacle", False): OBSTACLE,
     ("target", False): TARGET,

@@ -16,7 +16,7 @@ from bus_schema.rpc import (
 )
 from mobee import Gains, constraint_forces
 from mobee.control.forces import told_terms
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.model.stage import TICK, Stage, library, on_the_table
@@ -59,7 +59,7 @@ def test_markers_are_where_the_library_has_them(run: Stage, rng: np.random.Gener
     assert {m.name for m in said.markers} == set(run.rig.robot.markers)
     for marker in said.markers:
         np.testing.assert_allclose(marker.position, pose.position(marker.name), atol=1e-12)
-        np.testing.assert_allclose(to_matrix(np.array(marker.quaternion)), pose.rotation(marker.name), atol=1e-9)
+        np.testing.assert_allclose(matrix_from_quaternion(np.array(marker.quaternion)), pose.rotation(marker.name), atol=1e-9)
 
 
 def test_nothing_is_said_before_every_part_has_reported(run: Stage) -> None:

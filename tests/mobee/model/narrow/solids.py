@@ -8,7 +8,7 @@ import coal
 import numpy as np
 
 from mobee._core.narrow import Volumes, distances, overlaps
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 
 
 @dataclass
@@ -29,7 +29,7 @@ def solid(kind, half, position=(0.0, 0.0, 0.0), rotation=None) -> Solid:
 
 
 def random_turn(rng) -> np.ndarray:
-    return to_matrix(rng.normal(size=4))
+    return matrix_from_quaternion(rng.normal(size=4))
 
 
 def random_solid(rng, kind, spread=0.1, size=1.0) -> Solid:

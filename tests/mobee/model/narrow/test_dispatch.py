@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee._core.narrow import KINDS
-from mobee.model.quaternion import to_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 from tests.mobee.model.narrow.solids import (
     coal_distance,
     distance,
@@ -65,7 +65,7 @@ def test_no_direction_separates_plates_and_rods_sooner(second, seed):
         return solid(kind, 10.0 ** rng.uniform(-2.5, -0.5, 3 if kind == "box" else 2), rng.uniform(-0.03, 0.03, 3), turn)
 
     turn = random_turn(rng)
-    tilt = to_matrix(np.append(1.0, rng.normal(size=3) * 10.0 ** rng.uniform(-8.0, 0.0)))  # often nearly parallel
+    tilt = matrix_from_quaternion(np.append(1.0, rng.normal(size=3) * 10.0 ** rng.uniform(-8.0, 0.0)))  # often nearly parallel
     a, b = any_size("cylinder", turn), any_size(second, tilt @ turn)
     assert overlap(a, b).depth <= max(sampled_depth(a, b, rng), 0.0) + 1e-8
 

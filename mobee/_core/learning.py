@@ -1,4 +1,4 @@
-"""Outcome counts and information gains; declares core/observations.cpp."""
+"""Learning and planning: declares core/value_iteration.cpp, core/observations.cpp and core/histories.cpp."""
 
 from __future__ import annotations
 
@@ -10,10 +10,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee._core import ADDRESS, INTEGER, REAL, address, function
-from mobee._core.value_iteration import TransitionTable
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of sweeps
+
+
+class Table(ctypes.Structure):
+    """`TransitionTable` of core/transitions.hpp.  Who makes one keeps the arrays alive."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("probability", "outcome", "used")),
+        *((name, INTEGER) for name in ("states", "actions", "bins")),
+    )
+
+
+class TransitionTable:
+    """A `Table` that keeps its arrays alive: probabilities and outcomes (S, A, B), C-contiguous.
+
+    `used` (S, A): how many bins of each state-action may have a probability, the first ones; None: all may.
+    """
+
+    def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
+        self._arrays = probabilities, outcomes, used
+        at = None if used is None else address(used)
+        self._table = Table(address(probabilities), address(outcomes), at, *outcomes.shape)
+        self.at = ctypes.addressof(self._table)
+        self.rows = outcomes.shape[:2]
+
+
+solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
+    "value_iteration", ADDRESS, ADDRESS, ADDRESS, ADDRESS, REAL, REAL, INTEGER, INTEGER, result=INTEGER
+)
+"""Sweep until no value changes by the tolerance; returns the number of sweeps over all actions, or what is wrong.
+
+Of the addresses of a table, a reward (S, A), values (S,), which change in place, and action values (S, A), which are filled; the
+discount and the tolerance; whether this is in units of the largest reward, and whether it is modified policy iteration.
+"""
 
 
 class DebiasedCounts(ctypes.Structure):
@@ -80,3 +114,39 @@ def deplete(table: TransitionTable, counts: Array, totals: Array, action_values:
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))
+
+
+class _History(ctypes.Structure):
+    """`History` of core/histories.cpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("targets", "keys", "sums")),
+        *((name, INTEGER) for name in ("known", "used")),
+        *((name, REAL) for name in ("scale", "near")),
+    )
+
+
+_weighted_sums = function("weighted_sums", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
+_gaussian_sums = function("gaussian_sums", ADDRESS, INTEGER, INTEGER, ADDRESS, INTEGER, ADDRESS)
+
+
+def weighted_sums(
+    targets: Array, keys: Ints, sums: Array, sizes: tuple[int, int], weighing: tuple[float, float], target: Array, out: Array
+) -> None:
+    """Add to `out` (2, actions) what each action brought on targets near this one (3,) m, and how much that counts.
+
+    `targets` (..., 3) m, `keys` (..., 2): action and number of the target of each entry, `sums` (..., 2): sum and number of its values;
+    `sizes`: how many targets and entries there are.  `weighing`: a scale and a distance [m]: the weight of a target at a distance d is
+    1 / (1 + d / scale), none beyond that distance.
+    """
+    history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
+    totals = address(out)
+    _weighted_sums(ctypes.addressof(history), address(target), totals, totals + out[0].nbytes)
+
+
+def gaussian_sums(asked: Array, events: Array, sums: Array) -> None:
+    """Add to `sums` (2, n), at each point asked about (n, d), the weights times values of events, and the weights.
+
+    Events are rows of a point and a value, (..., d + 1).  The weight at a distance r is exp(-r^2 / 2).
+    """
+    _gaussian_sums(address(asked), *asked.shape, address(events), len(events), address(sums))

@@ -1,8 +1,11 @@
-"""Which motor drives each joint, for formats with one motor a joint."""
+"""Helpers of the writers of robot files: the drive of each joint, and numbers as text that reads back as the same numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
 
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
@@ -10,7 +13,7 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Joint = scale * motor + offset."""
+    """How one motor drives a joint: joint = scale * motor + offset."""
 
     motor: int
     scale: float
@@ -18,7 +21,7 @@ class Drive:
 
 
 def drives_of(robot: Robot) -> tuple[Drive, ...]:
-    """The drive of every joint; raises InvalidValue for a joint that no motor drives, or more than one."""
+    """Return the drive of every joint; raises InvalidValue for a joint that no motor drives, or more than one."""
     drives: dict[int, Drive] = {}
     for column, motor in enumerate(robot.motor_table):
         for index, scale, offset in motor.joints:
@@ -31,3 +34,20 @@ def drives_of(robot: Robot) -> tuple[Drive, ...]:
         if index not in drives:
             raise InvalidValue(f"joint {idle.name!r} is driven by no motor. Give it one, or make it part of the link that carries it.")
     return tuple(drives[index] for index in range(len(robot.joints)))
+
+
+def number(value: float) -> str:
+    """Return the shortest text that reads back as this number."""
+    return repr(float(value)) if value % 1 or abs(value) > 1e15 else str(int(value))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return the shortest texts of numbers, with blanks between them."""
+    return " ".join(map(number, values))
+
+
+def degrees(radians: float) -> str:
+    """Return an angle as text in degrees, rounded where that reads back as exactly the same radians."""
+    exact = float(np.rad2deg(radians))
+    rounded = round(exact, 9)
+    return number(rounded if np.deg2rad(rounded) == radians else exact)
