@@ -18,7 +18,7 @@ class Wanderer:
         self.space, self.plant = space, plant
         self.model = mobee.TransitionModel(space)
         self.rng = np.random.default_rng(seed)
-        self.state = space.state_of(plant.measure(space.part)[space.columns])
+        self.state = space.state_of(plant.measure(space.part))
         self.visits = np.zeros(len(space), dtype=int)
 
     def decide(self, state: int) -> int:
@@ -28,7 +28,7 @@ class Wanderer:
 
     def observe(self, state: int, action: int, outcome: mobee.Outcome) -> float:
         """Learn from how the action ended; returns the information gain in nats."""
-        self.state = self.space.state_of(outcome.q[self.space.columns])
+        self.state = self.space.state_of(outcome.q)
         self.visits[self.state] += 1
         return self.model.observe(state, action, self.state)
 

@@ -26,19 +26,13 @@ print(f"in advance: {path.end} after {len(path.q) - 1} steps, {1000 * path.dista
 
 plant = mobee.OfflinePlant(model, seed=0)
 
-
-def measured() -> np.ndarray:
-    """What the encoders of all motors say, in rad."""
-    return np.concatenate([plant.measure(part) for part in robot.parts])
-
-
 for name, target in targets.items():
     reacher = mobee.Reacher(plant.controller, "left_palm", target)
     begin, status = plant.time, "reaching"
     while status == "reaching" and plant.time < begin + PATIENCE:
-        status = reacher.update(measured(), plant.dt)
+        status = reacher.update(plant.q, plant.dt)
         plant.tick()
-    reacher.stop(measured())
+    reacher.stop(plant.q)
     pose = model.evaluate(plant.motors.q)
     solids = sum(contact.kind == "solid" for contact in pose.contacts)
     away = 100 * np.linalg.norm(pose.position("left_palm") - target)

@@ -24,12 +24,12 @@ print(f"{agent.transitions} transitions: each of {space.state_actions} state-act
 
 def walk(planner: mobee.Planner) -> int:
     """Do what the planner says, asked anew wherever an action ends, until a target is reached; how many actions it took."""
-    state = space.state_of(plant.measure(space.part)[space.columns])
+    state = space.state_of(plant.measure(space.part))
     for taken in range(PATIENCE):
         if state in planner.targets:
             return taken
         goal = space.goal(state, int(planner.policy[state]))
-        state = space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
+        state = space.state_of(plant.act(space.part, space.target(goal)).q)
     return PATIENCE
 
 

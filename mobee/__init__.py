@@ -10,8 +10,10 @@ if TYPE_CHECKING:
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent
     from mobee.learning.lattice import Lattice
+    from mobee.learning.learner import CuriousSettings
     from mobee.learning.parallel import run
     from mobee.learning.planner import Plan, Planner
+    from mobee.learning.reaching.learner import ReachSettings
     from mobee.learning.reaching.reach_agent import ReachAgent
     from mobee.learning.space import Space
     from mobee.learning.transitions import TransitionModel
@@ -45,8 +47,10 @@ _MODULES = {
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent",
     "mobee.learning.lattice": "Lattice",
+    "mobee.learning.learner": "CuriousSettings",
     "mobee.learning.parallel": "run",
     "mobee.learning.planner": "Plan Planner",
+    "mobee.learning.reaching.learner": "ReachSettings",
     "mobee.learning.reaching.reach_agent": "ReachAgent",
     "mobee.learning.space": "Space",
     "mobee.learning.transitions": "TransitionModel",
@@ -85,6 +89,7 @@ __all__ = [
     "Contact",
     "Controller",
     "CuriousAgent",
+    "CuriousSettings",
     "Forces",
     "Front",
     "Gains",
@@ -107,6 +112,7 @@ __all__ = [
     "ReachOutcome",
     "ReachPath",
     "ReachPlant",
+    "ReachSettings",
     "ReachTarget",
     "Reacher",
     "Restart",

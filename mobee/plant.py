@@ -13,7 +13,7 @@ from mobee.robot.robot import Robot
 class Outcome:
     """How an action ended.
 
-    `q`: (n_part,) rad as the encoders say.  `settled`: False means timeout, still an observation.
+    `q`: (n_part,) rad by the encoders.  `settled`: False means timeout, which is still an observation.
     `duration`: s of plant time.  `touched`: names of world objects in contact (fields included) at the end.
     """
 
@@ -24,12 +24,17 @@ class Outcome:
 
 
 class Plant(Protocol):
-    """A robot one can act on (DESIGN section 2)."""
+    """A robot that an agent acts on, offline or live."""
 
     robot: Robot
 
+    @property
+    def q(self) -> Array:
+        """Positions of all motors by the encoders now, shape (n,), in [rad], in the order of `robot.motors`."""
+        ...
+
     def measure(self, part: str) -> Array:
-        """The part's motor positions as the encoders say now, shape (n_part,), in [rad]."""
+        """Return the positions of the part's motors by the encoders now, shape (n_part,), in [rad]."""
         ...
 
     def act(self, part: str, target: Array) -> Outcome:
@@ -42,9 +47,9 @@ class Plant(Protocol):
 
 @runtime_checkable
 class Described(Protocol):
-    """A plant that tells what it is; an agent keeps that with its record, and goes on only on such a plant."""
+    """A plant with settings that can be recorded; an agent continues a record only on a plant of equal settings."""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that decides how actions end, but for chance, as plain JSON values."""
+        """Settings that determine how actions end, without the seed, as plain JSON values."""
         ...

@@ -75,7 +75,8 @@ def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:
         raise UserError(f"{' '.join(place)!r} is no place: give the number of a state, or angles in rad", BAD_INPUT) from None
     if len(place) == 1 and place[0].lstrip("+-").isdigit():
         return int(target_states(learned.space, int(place[0]))[0])
-    state = learned.space.state_of(numbers)
+    space = learned.space
+    state = space.state_of_joints(numbers) if len(numbers) == len(space.joints) else space.state_of(numbers)
     _require_within(learned.space, numbers)
     poses[" ".join(place)] = state
     return state

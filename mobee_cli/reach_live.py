@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Commands, Reach, Tick
+from bus_schema.messages import Commands, Reach
 from bus_schema.rpc import Config, Empty, World
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
@@ -45,20 +45,16 @@ class LivePlant(BusPlant):
     def __init__(self, service: Service, robot: Robot, part: str, modality: str) -> None:
         super().__init__(service, robot, (part,))
         self._link, self._where, self._moves = service, robot.part(part).slice, MOVES[modality]
-        self._q: Array | None = None
         self._asked = self._begun = np.inf  # s, monotonic clock: the request, and when the controller began
         self._commands: list[tuple[float, Array]] = []  # when sent, what: the last before the request, and those after
-        service.on_newest(Tick, self._note_tick)
         service.on_each(Reach, self._note_reach, part)
         service.on_each(Commands, self._note_commands)
 
+    @property
     def q(self) -> Array:
-        """All motors, (n,) rad, as the encoders say."""
-        give_up = time.monotonic() + CONTROL
-        self._link.spin(give_up, lambda: self._q is not None)
-        if self._q is None:
-            raise UserError(f"no tick of the robot in {CONTROL:g} s: `mobee status` says whether robot_sim runs", ENVIRONMENT)
-        return self._q
+        """As of a BusPlant, but raises UserError if no tick comes for 8 s."""
+        with self._at_most(CONTROL, f"no tick of the robot in {CONTROL:g} s: `mobee status` says whether robot_sim runs"):
+            return super().q
 
     def measure(self, part: str) -> Array:
         """As a BusPlant, but with an end: raises UserError while somebody holds the part."""
@@ -101,9 +97,6 @@ class LivePlant(BusPlant):
         finally:
             waits = False
 
-    def _note_tick(self, tick: Tick) -> None:
-        self._q = np.array(tick.q)
-
     def _note_reach(self, reach: Reach) -> None:
         """Its sender's clock is this machine's."""
         if reach.phase == "reaching" and reach.tw * 1e-9 > self._asked:
@@ -142,7 +135,7 @@ def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Stage]:
             logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
             plant = LivePlant(service, robot, hand.part, settings["modality"])
             service.ready()
-            yield Stage(robot, plant, hand, plant.q, plant.present_object, plant.first_motion)
+            yield Stage(robot, plant, hand, lambda: plant.q, plant.present_object, plant.first_motion)
             plant.leave()
 
 

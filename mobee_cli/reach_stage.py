@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import numpy as np
-
 from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.model.model import Model
@@ -82,4 +80,4 @@ def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> 
         plant.present(target)
         return target
 
-    yield Stage(robot, plant, hand, lambda: np.concatenate([plant.measure(part) for part in robot.parts]), present_object, lambda: None)
+    yield Stage(robot, plant, hand, lambda: plant.q, present_object, lambda: None)

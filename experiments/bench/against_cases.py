@@ -121,8 +121,8 @@ def _chapter_8() -> Work:
     arm = _first("experiments.kit.reaching.arm", "experiments.reaching.scene")
     learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
     targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")
-    from mobee.learning.reaching.predictors.predictor import SCALE
     from mobee.learning.reaching.reach_agent import ReachAgent
+    from mobee.learning.reaching.reaches import SCALE
 
     problems = targets.targets_at(targets.grid(), arm.laws()["published"].aim)
     beliefs = arm.learned_beliefs(arm.reach_plant(0), 0, 3000)

@@ -6,63 +6,49 @@ from typing import Any
 
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
-from mobee.learning.decider import Decider
 from mobee.learning.explorers import Explorer
-from mobee.learning.goal import Goal
+from mobee.learning.learner import CuriousLearner, CuriousSettings
+from mobee.learning.settings import accepts
 from mobee.learning.space import Space
 from mobee.plant import Described, Outcome, Plant
 from mobee.store import Transition, TransitionStore
 
 
-class CuriousAgent(Decider):
-    """Learns the transition model of one part by trying what it expects to learn most from.
+class CuriousAgent(CuriousLearner):
+    """Learns the transition model of one part by trying the actions from which it expects to learn most.
 
-    Everything it decides follows from its settings and the transitions so far, so an agent that is started again on
-    its store goes on as if it had never stopped.  The store is written before the agent learns from a transition.
+    Its decisions follow from its settings and its transitions alone, so an agent that is restarted with its store continues as if it
+    had never stopped.  Each transition is stored before the agent learns from it.
 
     Args:
         space: states and actions of one part.
-        plant: through which it acts; its robot must be the space's.
-        explorer: a name in `mobee.learning.explorers.EXPLORERS`, "curious", "random", "least_tried", ...; or your own, see `Explorer`:
-            a function, or `module:name` of one that can be imported.
-        seed: decides ties; agents of different parts draw differently under the same seed.
-        discount: of future rewards in the plan.
-        initial: what actions are imagined to do before they are tried, "50-50" or "60-40".
-        store: where transitions go and come from.
-        divergence: what an outcome is worth, "kail" or "kl".
-        forgetting: factor of a state-action's counts before each new observation of it, in (0, 1].
-        tolerance: of plans, see `value_iteration`.
-        relative: whether the tolerance is in units of the largest reward (the rewards fall below any fixed one), and a plan
-            starts from the values of the one before.  False, with tolerance=1e-3: Algorithm 7 as published.
-        beliefs: what plans trust, "counts" with the imagined outcomes, or "debiased" without them.
-        goal: an external reward to pursue: target states, an array (S, A), or a function of state, action and goal state.
-        goal_weight: the external reward times this is added to the intrinsic one; None: it replaces it.
+        plant: the robot it acts on; must have the motors of the space's robot.
+        explorer: see `CuriousSettings`; None: as in `settings`.
+        seed: likewise.
+        settings: None: the defaults.
+        store: where transitions are written, and read from at the start; None: they are not kept.
+        **changes: fields of `CuriousSettings` by keyword, in place of those in `settings`.
 
     Raises:
-        UnknownName: no such explorer, initialisation, divergence or beliefs.
-        InvalidValue: a plant of another robot, a goal that the space does not have, or that the explorer ignores.
-        MobeeError: the store holds transitions of this agent that were made under other settings, or through another plant.
+        UnknownName: no such setting, explorer, initialisation, divergence or beliefs.
+        InvalidValue: a plant of another robot, a value out of range, a goal that the space does not have, or that the explorer ignores.
+        MobeeError: the store holds transitions of this agent that were made with other settings, or on another plant.
     """
 
+    @accepts(CuriousSettings)
     def __init__(
         self,
         space: Space,
         plant: Plant,
-        explorer: str | Explorer = "curious",
-        seed: int = 0,
-        discount: float = 0.9,
-        initial: str = "50-50",
-        store: TransitionStore | None = None,
+        explorer: str | Explorer | None = None,
+        seed: int | None = None,
         *,
-        divergence: str = "kail",
-        forgetting: float = 1.0,
-        tolerance: float = 0.01,
-        relative: bool = True,
-        beliefs: str = "counts",
-        goal: Goal | None = None,
-        goal_weight: float | None = None,
+        settings: CuriousSettings | None = None,
+        store: TransitionStore | None = None,
+        **changes: Any,
     ) -> None:
-        super().__init__(space, explorer, seed, discount, initial, divergence, forgetting, tolerance, relative, beliefs, goal, goal_weight)
+        changes |= {name: value for name, value in (("explorer", explorer), ("seed", seed)) if value is not None}
+        super().__init__(space, CuriousSettings.made(settings, changes))
         if plant.robot.motors != space.robot.motors:
             raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
         self.plant, self.store = plant, store
@@ -74,35 +60,34 @@ class CuriousAgent(Decider):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that decides what the agent does, as plain JSON values; the plant's too, where it can tell them."""
+        """The record of its settings and its space, and of the plant's settings if it has any, as plain JSON values."""
         return super().settings | ({"plant": self.plant.settings} if isinstance(self.plant, Described) else {})
 
     @property
     def state(self) -> int:
-        """Where the part is: measured at first and after an interruption, else from the last outcome."""
+        """The state of the part: measured at first and after an interruption, else from the last outcome."""
         if self._state is None:
-            self._state = self.space.state_of_part(self.plant.measure(self.part).tolist())
+            self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
 
     def decide(self, state: int) -> int:
-        """The action to take in a state."""
+        """Choose the action to take in a state."""
         action = self._choose(state)
         self._pending = state, action
         return action
 
     def target(self, action: int) -> Array:
-        """The pose of the part at which the action just decided aims, shape (n_part,), in [rad]."""
+        """Return the pose of the part at which the action just decided aims, shape (n_part,), in [rad]."""
         state, _ = self._decided()
         return self.space.target(self.space.goal(state, action))
 
     def observe(self, outcome: Outcome) -> float:
-        """Learn from how the action just decided ended; returns the reward in nats.
+        """Learn from the outcome of the action just decided; returns the reward in nats.
 
-        With a store the transition is on disk when this returns; if it cannot be written nothing is learnt.
+        With a store the transition is on disk when this returns; if it cannot be written, nothing is learned.
         """
         state, action = self._decided()
-        q = outcome.q.tolist()
-        following = self.space.state_of_part(q)
+        following = self.space.state_of(outcome.q)
         weigh = self.model.observe if self.store is None else self.model.gain
         transition = Transition(
             n=self.transitions + 1,
@@ -112,7 +97,7 @@ class CuriousAgent(Decider):
             reward=weigh(state, action, following),
             settled=outcome.settled,
             duration=outcome.duration,
-            q=tuple(q),
+            q=tuple(outcome.q.tolist()),
             touched=outcome.touched,
         )
         if self.store is None:
@@ -124,14 +109,14 @@ class CuriousAgent(Decider):
         return transition.reward
 
     def interrupt(self) -> None:
-        """Forget the action just decided: it ended without an outcome, and where the part is must be measured again."""
+        """Forget the action just decided, which ended without an outcome; the state is measured again."""
         self._state = self._pending = None
         self._plans.undo()
 
     def step(self) -> float:
         """Decide, act and observe once; returns the reward in nats.
 
-        Raises ActionInterrupted if the plant does; nothing is stored then and the next step measures again.
+        Raises ActionInterrupted if the plant does; nothing is stored then, and the next step measures again.
         """
         action = self.decide(self.state)
         try:
@@ -142,7 +127,7 @@ class CuriousAgent(Decider):
         return self.observe(outcome)
 
     def run(self, transitions: int) -> None:
-        """Observe that many more transitions; an interrupted action does not count and is decided anew."""
+        """Observe so many more transitions; an interrupted action does not count and is decided again."""
         end = self.transitions + transitions
         while self.transitions < end:
             try:

@@ -12,7 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.learning.transitions import TransitionModel
+from mobee.errors import InvalidValue
+from mobee.learning.transitions import DIVERGENCES, TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 
 
@@ -94,6 +95,8 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     the agent's beliefs.
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
+    if model.divergence not in DIVERGENCES:
+        raise InvalidValue(f"depleting cannot expect rewards of the divergence {model.divergence!r}: take {' or '.join(DIVERGENCES)}.")
     beliefs, counts, totals = model.debiased(), *_next_counts(model)
     gains = model.reward.copy()
     _core().expected_gains(beliefs.table, counts, totals, model.tries, gains)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -12,7 +12,6 @@ from mobee.learning.agent import CuriousAgent
 from mobee.plant import Outcome, Plant
 
 
-@runtime_checkable
 class ConcurrentPlant(Plant, Protocol):
     """A plant on which actions of several parts may be under way at once."""
 
@@ -20,13 +19,13 @@ class ConcurrentPlant(Plant, Protocol):
         """Start an action of a part; target (n_part,) rad."""
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Let time pass until at least one action has ended; returns every one that ended then."""
+        """Run until at least one action has ended; returns part and outcome of all that have."""
 
 
 def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
-    """Let agents of different parts act at once on their common plant until they have made that many more transitions in all.
+    """Let agents of different parts act at once on their common plant until they have made so many more transitions in all.
 
-    No action is begun beyond that number, so the run ends with every part settled and every transition observed.
+    No action is begun beyond that number, so at the end every part has settled and every transition was observed.
     Raises InvalidValue unless each agent has its own part and all share a plant with `begin` and `advance`.
     """
     plant = _common_plant(agents)
@@ -52,6 +51,6 @@ def _common_plant(agents: Sequence[CuriousAgent]) -> ConcurrentPlant:
     shared = [part for part, count in Counter(agent.part for agent in agents).items() if count > 1]
     if shared:
         raise InvalidValue(f"several agents move {shared[0]}: valid is one agent a part.")
-    if not isinstance(plant, ConcurrentPlant):
+    if not (hasattr(plant, "begin") and hasattr(plant, "advance")):
         raise InvalidValue(f"{type(plant).__name__} has no begin and advance: run each agent with agent.run in a process of its own.")
-    return plant
+    return cast(ConcurrentPlant, plant)

@@ -68,13 +68,13 @@ def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[T
 
     States are found by their samples; where a transition ended, by where the part came to rest.
     """
-    same = {state: new.state_of(sample) for state, sample in enumerate(old.samples)}
+    same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}
     found: list[Transition] = []
     for made in transitions:
         state, goal = same.get(made.s), same.get(old.goal(made.s, made.a))
         row = [] if state is None else new.actions(state).tolist()
         if state is not None and goal in row:
-            ended = new.state_of(np.array(made.q)[new.columns])
+            ended = new.state_of(made.q)
             found.append(replace(made, n=len(found) + 1, s=state, a=row.index(goal), s_next=ended))
     return found

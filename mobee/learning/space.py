@@ -88,24 +88,27 @@ class Space:
         return self.goals.item(state, action)
 
     def state_of(self, q: ArrayLike) -> int:
-        """The state whose sample is nearest in fractions of the joint ranges; a lattice takes the lower one on a border.
+        """Return the state whose sample is nearest to a pose of the part, in fractions of the joint ranges.
 
-        `q`: rad, shape (d,): the joints in their order here, or shape (n_part,): all motors of the part.  When both
-        have the same length it is read as the joints; `q_part[space.columns]` is right in either case.
+        `q`: rad, shape (n_part,): all motors of the part, as a plant measures them.  Where the space has fewer joints than the part
+        has motors, the joints alone are accepted too, shape (d,), in the order of `joints`.
+        On a border between states a lattice returns the lower one.  Raises InvalidValue for another shape or values that are not finite.
         """
         given = real_array(f"q of {self.part}", q)
-        if given.shape == self._targets.shape[1:] != self.columns.shape:
-            given = given[self.columns]
+        if given.shape == self._targets.shape[1:]:
+            values = given.tolist()
+            return self._state_of([values[column] for column in self._columns])
+        return self.state_of_joints(given)
+
+    def state_of_joints(self, q: ArrayLike) -> int:
+        """Return the state of a pose of the space's joints alone, shape (d,) rad, in the order of `joints`; otherwise as `state_of`."""
+        given = real_array(f"q of {self.part}", q)
         if given.shape != self.columns.shape:
             raise InvalidValue(
                 f"q has shape {given.shape}: give the {len(self.joints)} joints ({', '.join(self.joints)}) "
                 f"or all {self._targets.shape[1]} motors of {self.part}, in rad."
             )
         return self._state_of(given.tolist())
-
-    def state_of_part(self, q: Sequence[float]) -> int:
-        """The state of a pose of the whole part, one number for each of its motors, in rad; see `state_of`."""
-        return self._state_of([q[column] for column in self._columns])
 
     def target(self, state: int) -> Array:
         """The state's sample as a pose of the whole part, its other motors at rest: shape (n_part,), in [rad]."""

@@ -72,6 +72,13 @@ class TabularPlant:
         reached = np.where(self._probabilities > 0.0, self._outcomes, NO_ACTION).astype("<i8")
         return {"table": hashlib.sha256(reached.tobytes() + np.round(self._probabilities, 9).tobytes()).hexdigest()[:16]}
 
+    @property
+    def q(self) -> Array:
+        """Positions of all motors, shape (n,), in [rad]: the part as measured, all others at home."""
+        q = self.robot.home.copy()
+        q[self.robot.part(self.space.part).slice] = self.space.target(self.state)
+        return q
+
     def measure(self, part: str) -> Array:
         """The sample of the state the part is in, shape (n_part,), in [rad]."""
         self._checked_part(part)
@@ -80,7 +87,7 @@ class TabularPlant:
     def act(self, part: str, target: Array) -> Outcome:
         """Draw where the action ends that aims at `target` (n_part,) rad from the state the part is in; each takes 1 s."""
         self._checked_part(part)
-        goal = self.space.state_of(target[self.space.columns])
+        goal = self.space.state_of(target)
         action = self._action[self.state].get(goal)
         if action is None:
             raise InvalidValue(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from math import log1p
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.settings import named
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, Tabled
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
-    """KL(P || T) in nats of two distributions over the same bins, given as counts or probabilities (thesis eq. 6.5).
+    """Return KL(P || T) in nats of two distributions over the same bins, given as counts or probabilities (thesis eq. 6.5).
 
     `p`, `t`: shape (bins,), every component above zero (else it is undefined, thesis 6.4.2); they are normalised here.
     """
@@ -35,7 +37,7 @@ def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
 
 
 def information_gain(count: float, total: float) -> float:
-    """KL(P || T) in nats when one bin of T grows by one: its count before, above 0, and that of all bins, at least `count`.
+    """Return KL(P || T) in nats when one bin of T grows by one, from its count before, above 0, and the total of all bins.
 
     The closed form of eq. 6.5 for this case: the other bins only share the factor total / (total + 1).
     """
@@ -47,12 +49,12 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def widened(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """A copy with room for one more bin, zero."""
+    """Return a copy with one more bin, zero."""
     return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, 1)])
 
 
 def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """A view that cannot be written to."""
+    """Return a view that cannot be written to."""
     view = array.view()
     view.setflags(write=False)
     return view
@@ -61,14 +63,14 @@ def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
 class DebiasedCounts(Tabled):
     """Probabilities from real counts over a weak prior: an OutcomeModel that its transition model keeps up to date.
 
-    The counts that Algorithm 6 and 8 imagine keep the reward finite, but they make an action that never failed
-    look as if it failed 2 times in 4 + n.
+    The counts that Algorithms 6 and 8 imagine keep the reward finite, but after n successes they give an action that never failed a
+    probability of 2 / (4 + n) to fail.
 
     Args:
-        model: whose bins they are.
+        model: the outcome model with the same bins.
         real: how often each outcome was really observed, shape (S, A, B).
-        weight: their sums, shape (S, A).
-        goal, stay: counts imagined for the first two bins; none for the others.
+        weight: sums of `real` over the bins, shape (S, A).
+        goal, stay: prior counts of the first two bins, for reaching the goal and for staying; the others have none.
     """
 
     def __init__(self, model: OutcomeModel, real: Array, weight: Array, goal: float, stay: float) -> None:
@@ -94,17 +96,17 @@ class DebiasedCounts(Tabled):
         return read_only(self._probabilities)
 
     def update(self, counts: OutcomeCounts, state: int, action: int) -> None:
-        """Follow the real counts of a state-action."""
+        """Take over the real counts of a state-action."""
         believed = self._believed or self._believe()
         _core().believe(counts.at, believed.at, state, action)
 
     def widen(self) -> None:
-        """Make room for one more bin."""
+        """Add one more bin."""
         self._prior, self._probabilities = np.append(self._prior, 0.0), widened(self._probabilities)
         self._believed = self._table = None
 
     def _believe(self) -> learning.DebiasedCounts:
-        """The probabilities where the core finds them."""
+        """Return the probabilities as the core reads them."""
         self._believed = _core().DebiasedCounts(self._probabilities, self._prior, self._sum)
         return self._believed
 
@@ -116,15 +118,20 @@ class DebiasedCounts(Tabled):
 
 @cache
 def _core() -> Any:
-    """Loaded when it is first needed."""
+    """Import the native functions when they are first needed."""
     from mobee._core import learning
 
     return learning
 
 
-INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # their imagined counts: Algorithm 8 and table 7.1
-NEW_BIN = 1.0  # the imagined count of bins beyond the first two, which are for staying and for the goal: Algorithm 6
-DIVERGENCES = ("kail", "kl")
+INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # imagined counts of staying and of reaching the goal: Algorithm 8 and table 7.1
+NEW_BIN = 1.0  # imagined count of the bins beyond these two: Algorithm 6
+
+Divergence = Callable[[Array, Array], float]
+"""Reward of an observation in nats, from the distributions after it and before it over the same bins, each (bins,), above 0, of sum 1."""
+
+DIVERGENCES: dict[str, Divergence] = {"kail": kl_divergence, "kl": kl_divergence}
+"""KL divergence over the bins of the state-action, and over all states; the core computes both in closed form."""
 
 
 class TransitionModel(Tabled):
@@ -135,22 +142,23 @@ class TransitionModel(Tabled):
     Args:
         space: the states and actions.
         initial: "50-50" (each action is imagined to fail once and succeed once) or "60-40" (to succeed twice).
-        divergence: what an observation pays: "kail" (Algorithm 6: over the bins of the state-action) or "kl" (thesis 6.4.2: over all
-            states, each imagined once).  The probabilities are the same with both.
+        divergence: the reward of an observation: "kail" (Algorithm 6: KL divergence over the bins of the state-action), "kl" (thesis
+            6.4.2: over all states, each imagined once), a function of the distributions over the bins after and before the
+            observation, or `module:name` of one, see `Divergence`.  The probabilities are the same with all.
         forgetting: in (0, 1]; the real counts of a state-action are multiplied by it before each of its observations.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
     """
 
-    def __init__(self, space: Space, initial: str = "50-50", divergence: str = "kail", forgetting: float = 1.0) -> None:
+    def __init__(self, space: Space, initial: str = "50-50", divergence: str | Divergence = "kail", forgetting: float = 1.0) -> None:
         if initial not in INITIAL:
             raise UnknownName("initial", initial, INITIAL)
-        if divergence not in DIVERGENCES:
-            raise UnknownName("divergence", divergence, DIVERGENCES)
+        name, function = named("divergence", divergence, DIVERGENCES)
         if not 0.0 < forgetting <= 1.0:
             raise InvalidValue(f"forgetting={forgetting!r}: valid are 0 (exclusive) to 1, which forgets nothing.")
-        self.space, self.initial, self.divergence, self.forgetting = space, initial, divergence, float(forgetting)
+        self.space, self.initial, self.divergence, self.forgetting = space, initial, name, float(forgetting)
+        self._function = None if name in DIVERGENCES else function
         stay, goal = INITIAL[initial]
         goals = np.ascontiguousarray(space.goals)
         exists = goals != NO_ACTION
@@ -162,8 +170,10 @@ class TransitionModel(Tabled):
         self._bins: Ints = np.where(exists, 2, 0)
         self._weight: Array = np.zeros(exists.shape)  # sum of the real counts
         self._tries: Ints = np.zeros(exists.shape, dtype=np.intp)
-        dense = divergence == "kl"
+        dense = name == "kl"
         first = information_gain(1.0, len(space)) if dense else information_gain(goal - 1.0, stay + goal - 1.0)
+        if self._function is not None:
+            first = self._valued(np.array([stay, goal]), np.array([stay, goal - 1.0]))
         self._reward: Array = np.where(exists, first, -np.inf)
         self._totals: Array = np.where(exists, float(len(space)) if dense else stay + goal, 0.0)
         self._debiased: dict[tuple[float, float], DebiasedCounts] = {}
@@ -226,8 +236,10 @@ class TransitionModel(Tabled):
         return self._debiased[goal, stay]
 
     def gain(self, state: int, action: int, outcome: int) -> float:
-        """The reward that observing this outcome would pay now, in nats; changes nothing."""
+        """Return the reward that observing this outcome would give now, in nats; changes nothing."""
         self._check(state, action, outcome)
+        if self._function is not None:
+            return self._own_gain(int(state), int(action), int(outcome))
         counted = self._counted or self._count()
         found: float = _core().gain(counted.at, int(state), int(action), int(outcome))
         return found
@@ -239,6 +251,7 @@ class TransitionModel(Tabled):
         """
         self._check(state, action, outcome)
         observed, counted = (int(state), int(action), int(outcome)), self._counted or self._count()
+        own = None if self._function is None else self._own_gain(*observed)
         reward: float = _core().observe(counted.at, *observed)
         if reward < 0.0:
             self._widen()
@@ -246,7 +259,29 @@ class TransitionModel(Tabled):
             reward = _core().observe(counted.at, *observed)
         for beliefs in self._debiased.values():
             beliefs.update(counted, *observed[:2])
+        if own is not None:
+            reward = self._reward[state, action] = own
         return reward
+
+    def _own_gain(self, state: int, action: int, outcome: int) -> float:
+        """The reward of an observation by the divergence function of the user, from the counts that Algorithm 6 would then have."""
+        states, counts = self.bins(state, action)
+        imagined = self._imagined[: len(counts)]
+        before = (counts - imagined) * self.forgetting + imagined
+        same = np.flatnonzero(states == outcome)
+        if not len(same):
+            before = np.append(before, NEW_BIN)
+        after = before.copy()
+        after[same[0] if len(same) else -1] += 1.0
+        return self._valued(after, before)
+
+    def _valued(self, after: Array, before: Array) -> float:
+        """The divergence function of the user for counts; raises InvalidValue if it does not return a finite number."""
+        assert self._function is not None
+        value = self._function(after / after.sum(), before / before.sum())
+        if not (isinstance(value, int | float | np.integer | np.floating) and np.isfinite(value)):
+            raise InvalidValue(f"divergence {self.divergence!r} returned {value!r}: return a finite number, in nats.")
+        return float(value)
 
     def _check(self, state: int, action: int, outcome: int) -> None:
         self.space.goal(state, action)
@@ -254,7 +289,7 @@ class TransitionModel(Tabled):
             raise InvalidValue(f"{self.space.part} has no state {outcome!r}: valid are 0 to {len(self.space) - 1}.")
 
     def _widen(self) -> None:
-        """Make room for one more bin."""
+        """Add one more bin."""
         self._imagined = np.append(self._imagined, NEW_BIN)
         self._counts, self._probabilities = widened(self._counts), widened(self._probabilities)
         self._outcomes = widened(self._outcomes)
@@ -263,7 +298,7 @@ class TransitionModel(Tabled):
             beliefs.widen()
 
     def _count(self) -> OutcomeCounts:
-        """The counts where the core finds them."""
+        """Return the counts as the core reads and writes them."""
         arrays = {
             "count": self._counts,
             "probability": self._probabilities,

@@ -146,8 +146,13 @@ class OfflinePlant:
             raise InvalidValue("this plant keeps no hash: make it with hashed=True")
         return self._digest.hexdigest()
 
+    @property
+    def q(self) -> Array:
+        """Positions of all motors by the encoders at the last tick, shape (n,), in [rad]."""
+        return self._q.copy()
+
     def measure(self, part: str) -> Array:
-        """The part's motor positions as the encoders said at the last tick, shape (n_part,), in [rad]."""
+        """Return the positions of the part's motors by the encoders at the last tick, shape (n_part,), in [rad]."""
         return self._q[self.robot.part(part).slice].copy()
 
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:

@@ -58,7 +58,7 @@ def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
         trm = here(trm, running, arguments.other_world)
         plant = BusFollower(running.service, running.robot)
         running.service.ready()
-        way = way_of(trm, np.clip(plant.q(), *running.robot.limits.T), arguments.to)
+        way = way_of(trm, np.clip(plant.q, *running.robot.limits.T), arguments.to)
         require_free(trm, way, arguments.anyway)
         try:
             played = _played(plant, running, np.array(way["poses"]), arguments.speed)

@@ -1,26 +1,56 @@
-"""Settings of an agent."""
+"""Configuration of an agent: the settings of the library's agents, and the task."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import fields
+from typing import Annotated, Any, get_args
 
+import msgspec
 from msgspec import Meta
 
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
-from mobee.learning.named import require_name
+from mobee.learning.learner import CuriousSettings
+from mobee.learning.reaching.learner import ReachSettings
+from mobee.learning.reaching.predictors import PREDICTORS
+from mobee.learning.reaching.strategies import STRATEGIES
+from mobee.learning.settings import Range, Settings, hints_of, require_name
 from mobee.learning.space import MAX_STATES
+from mobee.learning.transitions import DIVERGENCES
 from mobee.reach import RADIUS
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 from services.common.hands import hand_of, moved_markers
 
 ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
+NAMED = {"explorer": EXPLORERS, "divergence": DIVERGENCES, "predictor": PREDICTORS, "strategy": STRATEGIES}
+TASK = ("goal", "goal_weight")  # settings of other types in a file, see Config
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
-    """An agent's settings; the joints default to the published ones of its part (thesis 7.4)."""
+def _of_file(hint: Any) -> Any:
+    """The type of a setting in a scenario file: text where the library takes a name or an object, and bounds as msgspec has them."""
+    if str in get_args(hint):
+        return str
+    kind, *valid = get_args(hint) if hasattr(hint, "__metadata__") else (hint,)
+    bounds = [{name: getattr(one, name) for name in ("ge", "gt", "le", "lt")} for one in valid if isinstance(one, Range)]
+    return Annotated[kind, Meta(**bounds[0])] if bounds else kind
+
+
+def _fields_of(settings: type[Settings]) -> dict[str, tuple[str, Any, Any]]:
+    """Name, type and default of each setting."""
+    hints = hints_of(settings)
+    return {one.name: (one.name, _of_file(hints[one.name]), one.default) for one in fields(settings) if one.name not in TASK}
+
+
+_FIELDS = _fields_of(ReachSettings) | _fields_of(CuriousSettings)
+_FIELDS.pop("seed")  # of every service
+LearningConfig = msgspec.defstruct("LearningConfig", _FIELDS.values(), bases=(ServiceConfig,), frozen=True, kw_only=True, module=__name__)
+LearningConfig.__doc__ = "\n".join([ReachSettings.__doc__ or "", *(CuriousSettings.__doc__ or "").partition("Args:\n")[2:]])
+
+
+class Config(LearningConfig, frozen=True, kw_only=True):
+    """An agent's configuration; the joints default to the published ones of its part (thesis 7.4)."""
 
     part: str = "left_arm"
     """The part it moves."""
@@ -29,55 +59,34 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     levels: tuple[float, ...] = (0.25, 0.5, 0.75)
     """Fractions of each joint's range at which the samples lie."""
     neighbours: Annotated[int, Meta(ge=0)] = 0
-    """How many nearest states it can go to; 0: the published 8 of the torso, 16 of an arm."""
+    """Number of nearest states that each state has actions to; 0: the published 8 of the torso, 16 of an arm."""
     tie_seed: int = 0
     """Seed of the draw among equally near neighbours."""
-    explorer: str = "curious"
-    """How it chooses: a name of the library, or `module:name` of your own."""
-    discount: Annotated[float, Meta(ge=0, lt=1)] = 0.9
-    """Of future rewards."""
-    initial: Literal["50-50", "60-40"] = "50-50"
-    """What it believes of an action before it has tried it."""
-    divergence: Literal["kail", "kl"] = "kail"
-    """What an outcome is worth: 'Kail' divergence, or plain KL over all states."""
-    forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
-    """Factor of what it counted of an action before each new try of it; below 1 it keeps up with a world that changes."""
-    beliefs: Literal["counts", "debiased"] = "counts"
-    """What its plans trust: the counts with what it imagined, as published, or without."""
-    tolerance: Annotated[float, Meta(gt=0)] = 0.01
-    """At which a plan is good enough."""
-    relative: bool = True
-    """The tolerance is in units of the largest reward, and plans start from the one before; false: as published, with 0.001."""
     goal: tuple[Annotated[int, Meta(ge=0)], ...] = ()
-    """States to go to, instead of where curiosity draws it; empty: curiosity alone."""
+    """States whose actions are rewarded, instead of information gain; empty: curiosity alone."""
     goal_weight: float = 0.0
-    """Reward of an action in such a state that is added to curiosity's, in nats; 0: the goal replaces curiosity."""
+    """Reward of an action in such a state, nats, added to the information gain; 0: it replaces the information gain."""
     run_dir: str = ""
-    """Folder of the run, where its transitions are kept and found again; empty: they are not kept."""
+    """Folder of the run, where its transitions are written and read again; empty: they are not kept."""
     transitions: Annotated[int, Meta(ge=0)] = 0
-    """End after so many in all; 0: go on indefinitely."""
+    """Number of transitions after which it ends; 0: it does not end."""
     targets: tuple[tuple[float, float, float], ...] = ()
-    """Places to learn to reach for, m, root frame; empty: it learns its space."""
+    """Positions to learn to reach for, m, root frame; empty: it explores its space."""
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
-    """Of what is presented there, m."""
+    """Radius of the sphere presented there, m."""
     marker: str = ""
-    """What is to come there; empty: the palm of its part, or the marker at an end of the part that most motors move."""
-    predictor: str = "weighted"
-    """Of the rewards of reaching."""
-    strategy: str = "intrinsic"
-    """What it pursues while it learns to reach."""
-    failures: Literal["spread", "local", "alike"] = "spread"
-    """How transitions that failed are remembered: for all targets, for those nearby, or as a hint to transitions like them."""
+    """Marker to be put there; empty: the palm of its part, or the marker that most motors of the part move."""
     learned: str = ""
-    """Folder of a run whose transitions it plans its ways to reaches with; empty: it believes that most actions work."""
+    """Folder of a run with whose transitions it plans paths to reaches; empty: it assumes that most actions reach their goals."""
     tries: Annotated[int, Meta(ge=0)] = 0
-    """End after so many problem-tries in all; 0: go on indefinitely."""
+    """Number of problem-tries after which it ends; 0: it does not end."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: the part must span a state space, have a marker to reach with if there are targets, and what is named exist."""
+        """Raise MobeeError if a name is unknown, the part spans no state space, or it has no marker for the targets."""
         super().check_robot(robot)
-        require_name("explorer", self.explorer, EXPLORERS)
-        if not self.learned:  # else the space is that of the record
+        for kind, table in NAMED.items():
+            require_name(kind, getattr(self, kind), table)
+        if not self.learned:  # else the space is read from that run
             self.space(robot)
         if not self.targets:
             return
@@ -86,8 +95,16 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
             valid = ", ".join(moved_markers(robot, self.part))
             raise InvalidValue(f"{self.part} does not move the marker {marker!r} that is to reach. Valid: {valid or 'none'}.")
 
+    def curious(self) -> CuriousSettings:
+        """Return the settings of a curious agent."""
+        return CuriousSettings(goal=self.goal or None, goal_weight=self.goal_weight or None, **self._given(CuriousSettings))
+
+    def reaching(self) -> ReachSettings:
+        """Return the settings of a reach agent."""
+        return ReachSettings(**self._given(ReachSettings))
+
     def space(self, robot: Robot) -> Lattice:
-        """The lattice of thesis 7.4 for the part, unless the settings say otherwise; raises MobeeError where it cannot be made."""
+        """Make the lattice, by default that of thesis 7.4 for the part; raises MobeeError if the settings make none."""
         part = robot.part(self.part)
         is_arm = any(name.endswith("elbow") for name in part.motors)
         joints = self.joints or tuple(name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS))
@@ -97,6 +114,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
                 f"have {MAX_STATES}: choose some motors of {self.part!r}, for example joints = {_listed(joints[:4])}."
             )
         return Lattice(robot, joints, self.levels, self.neighbours or (16 if is_arm else 8), tie_seed=self.tie_seed)
+
+    def _given(self, settings: type[Settings]) -> dict[str, Any]:
+        return {one.name: getattr(self, one.name) for one in fields(settings) if one.name not in TASK}
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -22,22 +22,7 @@ class AgentNode:
         self._config = config
         self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
         plant = BusPlant(service, robot, (config.part,))
-        self._agent = CuriousAgent(
-            config.space(robot),
-            plant,
-            explorer=config.explorer,
-            seed=config.seed,
-            discount=config.discount,
-            initial=config.initial,
-            store=self._store,
-            divergence=config.divergence,
-            forgetting=config.forgetting,
-            tolerance=config.tolerance,
-            relative=config.relative,
-            beliefs=config.beliefs,
-            goal=config.goal or None,
-            goal_weight=config.goal_weight or None,
-        )
+        self._agent = CuriousAgent(config.space(robot), plant, settings=config.curious(), store=self._store)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
         self._work = Work(service, plant)

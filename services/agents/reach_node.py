@@ -33,11 +33,7 @@ class ReachNode:
             plant,
             None if known is None else known.model.debiased(),
             marker=config.marker or hand_of(robot, config.part),
-            predictor=config.predictor,
-            strategy=config.strategy,
-            failures=config.failures,
-            discount=config.discount,
-            seed=config.seed,
+            settings=config.reaching(),
             store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
         )
         self._told = ReachStream(service.bus, self._agent)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Motion, Turn
+from bus_schema.messages import Clock, Motion, Tick, Turn
 from bus_schema.rpc import Done, Goal, ReachFor, Request, Started, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
@@ -40,6 +40,8 @@ class BusPlant:
         self._refused_since: dict[str, float] = {}  # monotonic clock
         self._motion: dict[str, Motion] = {}
         self._tick = 0.0  # s
+        self._q: Array | None = None  # of all motors, from the first use of `q` on
+        self._reads_all = False
         self._runs = 0
         self._participant = Participant(service)
         self._wanted: set[str] = set()  # parts that somebody measured
@@ -53,6 +55,17 @@ class BusPlant:
             service.on_clock(self._note_clock)
         service.on_run(self._new_run)
         self._reaches = ReachClient(service, parts)
+
+    @property
+    def q(self) -> Array:
+        """Positions of all motors by the encoders, (n,) rad, of the newest tick; the first use waits for one."""
+        if not self._reads_all:
+            self._service.on_newest(Tick, self._note_q)
+            self._reads_all = True
+        while self._q is None:
+            self._service.check_router()
+            self._wait(lambda: self._q is not None)
+        return self._q.copy()
 
     def measure(self, part: str) -> Array:
         """The part's motor positions, (n_part,) rad, as soon as the part is under control and its goal is ours."""
@@ -215,10 +228,14 @@ class BusPlant:
 
         return note
 
+    def _note_q(self, tick: Tick) -> None:
+        self._q = np.array(tick.q)
+
     def _note_clock(self, clock: Clock) -> None:
         self._tick = clock.dt * 1e-9
 
     def _new_run(self) -> None:
         self._runs += 1
         self._motion.clear()
+        self._q = None
         self._to_answer = None

@@ -12,7 +12,7 @@ from mobee.arrays import Array
 from mobee.control import Forces
 from mobee.control.forces import LARGEST_FORCE, told_terms
 from mobee.control.terms import Term, valid_terms
-from mobee.learning.named import imported
+from mobee.learning.settings import imported
 from mobee.model.contact import KINDS, ContactTable
 from mobee.model.pose import Pose
 from mobee.model.snapshot import Hands, Snapshot

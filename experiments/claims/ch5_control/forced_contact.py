@@ -177,7 +177,7 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
 
     def pull(tick: int) -> None:
         nonlocal reacher
-        q = np.concatenate([plant.measure(part) for part in robot.parts])
+        q = plant.q
         if tick and tick % ticks == 0:
             reacher.stop(q)
             reacher = Reacher(plant.controller, MARKER, targets[tick // ticks])

@@ -113,13 +113,13 @@ def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, 
     arriving = np.where(beliefs.outcomes == goal, beliefs.probabilities, 0.0).sum(axis=-1)
     reward = np.where(beliefs.probabilities.any(axis=-1), arriving, -np.inf)
     scores = value_iteration(beliefs, reward, DISCOUNT, TOLERANCE)[1]
-    state = space.state_of(plant.act(space.part, space.target(start)).q[space.columns])
+    state = space.state_of(plant.act(space.part, space.target(start)).q)
     for done in range(most + 1):
         if state == goal:
             return Attempt(True, done)
         if done < most:
             action = int(np.argmax(scores[state]))
-            state = space.state_of(plant.act(space.part, space.target(space.goal(state, action))).q[space.columns])
+            state = space.state_of(plant.act(space.part, space.target(space.goal(state, action))).q)
     return Attempt(False, most)
 
 

@@ -34,8 +34,8 @@ from experiments.kit.statistics import all_hold, better, changes, decides, estim
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
 from mobee.arrays import Array
-from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.reaches import SCALE
 from mobee.rendering.picture import Picture
 from mobee.rendering.sheet import pictures_of
 from mobee.rendering.solid import Solid, ball, robot_solids

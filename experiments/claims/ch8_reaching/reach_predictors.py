@@ -34,8 +34,8 @@ from experiments.kit.statistics import decides, estimate, interquartile_mean, in
 from experiments.kit.sweep import grouped, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.predictors.predictor import SCALE
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.reaches import SCALE
 
 ORACLE, TRUTH = "oracle", "truth"
 RECOMMENDED = "gp-ucb-alike"  # by docs/reaching.md

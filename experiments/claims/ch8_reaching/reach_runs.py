@@ -13,7 +13,7 @@ from experiments.kit.reaching.arm import MARKER, reach_space
 from experiments.kit.reaching.targets import grid
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.evaluation import NOWHERE
-from mobee.learning.reaching.where import hands_of
+from mobee.learning.reaching.reaches import hands_of
 
 STRATEGIES = ("intrinsic", "greedy", "random")
 CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which the agents are evaluated

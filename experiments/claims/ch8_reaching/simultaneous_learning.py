@@ -174,7 +174,7 @@ class BlamingPlant:
         return self.inner.reach(part, marker, stay)
 
     def _state(self, q: Array) -> int:
-        return self._space.state_of(q[self._space.columns])
+        return self._space.state_of(q)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,9 +21,9 @@ def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
 
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
     """Move the part to a random neighbour of its state, unobserved, for that action begins at no sample; returns the state."""
-    state = space.state_of(plant.measure(space.part)[space.columns])
+    state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))
-    return space.state_of(plant.act(space.part, space.target(goal)).q[space.columns])
+    return space.state_of(plant.act(space.part, space.target(goal)).q)
 
 
 def newest(agent: CuriousAgent) -> Transition:
@@ -92,6 +92,6 @@ def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transi
             log.settled.append(outcome.settled)
             log.durations.append(outcome.duration)
             log.ends.append(plant.time)
-            log.poses.append(np.concatenate([plant.measure(name) for name in plant.robot.parts]))
+            log.poses.append(plant.q)
             waiting.append(agent)
     return logs

@@ -108,7 +108,7 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
             values, found = value_iteration(model.debiased(), lacking, DISCOUNT, TOLERANCE, values)
             action = choose(found[state], rng)
         outcome = plant.act(space.part, space.target(space.goal(state, action)))
-        reached = space.state_of(outcome.q[space.columns])
+        reached = space.state_of(outcome.q)
         model.observe(state, action, reached)
         lacking[state, action] = max(0.0, 1.0 - model.tries[state, action] / tries)
         seen.append((state, action, reached))

@@ -185,6 +185,11 @@ class JudgedPlant:
         errors = {"turns": self.errors.turns.tolist(), "shift": self.errors.shift.tolist()}
         return self.inner.settings | {"errors": errors, "unseen": sorted(self._unseen)}
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self.inner.q
+
     def measure(self, part: str) -> Array:
         """See Plant."""
         return self.inner.measure(part)
@@ -216,7 +221,7 @@ class JudgedPlant:
 
     def marker_at(self, marker: str, part: str | None = None, q: Array | None = None) -> Array:
         """The true position of the marker, (3,) m: now, or with the part's motors at encoder readings q (n_part,) rad."""
-        whole = np.concatenate([self.inner.measure(name) for name in self.robot.parts])
+        whole = self.inner.q
         if part is not None and q is not None:
             whole[self.robot.part(part).slice] = q
         found: Array = self.model.evaluate(whole + self.errors.turns).position(marker)

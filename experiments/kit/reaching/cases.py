@@ -187,7 +187,7 @@ def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: Motor
 
 def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
     """The distance of the palm from its aim, now, m."""
-    whole = np.concatenate([plant.measure(part) for part in plant.robot.parts])
+    whole = plant.q
     return case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
 
 

@@ -143,7 +143,7 @@ class Course:
     def go(self) -> None:
         """Follow the plan to the state from which to reach, or until the actions are used up."""
         space = self._agent.space
-        self._state = space.state_of(self._plant.measure(space.part)[space.columns])
+        self._state = space.state_of(self._plant.measure(space.part))
         for _ in range(LIMIT - 1):
             target, asked = self._where(), time.process_time()
             worth = np.maximum(self._worth(target), 0.0)

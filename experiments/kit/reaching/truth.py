@@ -132,7 +132,7 @@ class _Measuring:
     def _at(self, goal: int) -> int:
         """Go to a state from wherever the part is; returns the state it comes to."""
         outcome = self.plant.act(self.space.part, self.space.target(goal))
-        return self.space.state_of(outcome.q[self.space.columns])
+        return self.space.state_of(outcome.q)
 
     def _try(self, state: int) -> int:
         """Make one of the remaining tries of a state; returns the state after it."""

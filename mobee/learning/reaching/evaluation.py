@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 def move(plant: Plant, space: Space, state: int, action: int) -> tuple[Outcome, int]:
     """Make a transition: how it ended, and in which state."""
     outcome = plant.act(space.part, space.target(space.goal(state, action)))
-    return outcome, space.state_of(outcome.q[space.columns])
+    return outcome, space.state_of(outcome.q)
 
 
 def reach(plant: ReachPlant, space: Space, marker: str) -> tuple[ReachOutcome, int]:
     """Reach for what is presented: how it ended, and the state in which the part came to rest afterwards."""
     outcome = plant.reach(space.part, marker)
-    return outcome, space.state_of(outcome.after.q[space.columns])
+    return outcome, space.state_of(outcome.after.q)
 
 
 NOWHERE = -1  # instead of a state
@@ -85,7 +85,7 @@ class _Trial:
 
     def __init__(self, agent: ReachAgent, rng: np.random.Generator) -> None:
         self.agent, self.rng, self.failures = agent, rng, agent.failures.copy()
-        self.state = agent.space.state_of(agent.plant.measure(agent.part)[agent.space.columns])
+        self.state = agent.space.state_of(agent.plant.measure(agent.part))
 
     def go_to(self, goal: int) -> None:
         """Go to a state with nothing presented, or as far as the limit of actions allows."""

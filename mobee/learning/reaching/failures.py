@@ -12,7 +12,7 @@ from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.reaching.histories import Histories, forget
-from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.reaches import Reaches
 from mobee.learning.space import Space
 
 WAY = 0.08  # m: as far apart as

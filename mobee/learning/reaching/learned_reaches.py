@@ -7,10 +7,11 @@ from typing import Any
 
 from mobee.arrays import Array
 from mobee.errors import MobeeError, UnknownName
+from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.reaches import reaches_of
 from mobee.learning.reaching.store import ReachStore, reaching_parts
-from mobee.learning.reaching.where import reaches_of
 from mobee.learning.record import load_learned, space_from
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
@@ -44,18 +45,21 @@ def load_reaches(
     marker, scale = bound["marker"], bound["scale"]
     reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)
     model = _model(file, space)
+    settings = ReachSettings(
+        predictor=_predictor(file, learner["predictor"], reaches),
+        strategy="greedy",
+        scale=scale,
+        **{name: learner[name] for name in ("failures", "discount", "penalty", "limit", "seed")},
+    )
     agent = ReachAgent(
         space,
         plant,
         model.debiased(),
         marker=marker,
-        predictor=_predictor(file, learner["predictor"], reaches),
-        strategy="greedy",
+        settings=settings,
         model=model if learner["learns the model"] else None,
         hands=reaches.hands,
         jacobians=reaches.jacobians,
-        scale=scale,
-        **{name: learner[name] for name in ("failures", "discount", "penalty", "limit", "seed")},
     )
     agent.replay(targets, steps)
     return agent

@@ -1,9 +1,9 @@
-"""The reach learner without a plant: predictor, failures, plans, choices (thesis 8.1 to 8.3)."""
+"""The reach learner: predictor, failures, plans and choices, without a plant (thesis 8.1 to 8.3)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -11,67 +11,96 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.draws import Draws
 from mobee.learning.explorers import choose
-from mobee.learning.named import named
 from mobee.learning.reaching.failures import failures_of, has_failed
 from mobee.learning.reaching.planning import REACH, ReachPlanning
-from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
+from mobee.learning.reaching.predictors import PREDICTORS, PredictorOf, Reaches, RewardPredictor
+from mobee.learning.reaching.reaches import SCALE
 from mobee.learning.reaching.strategies import STRATEGIES, StrategyOf
 from mobee.learning.reaching.tries import Problems, Step, Try, made_of
+from mobee.learning.settings import Range, Settings, named
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachTarget
 
 
-class ReachLearner:
-    """Learns from the steps of problem-tries and chooses the next; what it chooses follows from its settings and the steps so far.
+@dataclass(frozen=True, kw_only=True)
+class ReachSettings(Settings):
+    """Settings of a `ReachAgent`.
 
-    The settings, and what they raise, are those of `ReachAgent`.
+    Args:
+        predictor: predicts rewards: a name in `predictors.PREDICTORS` ("weighted" is the thesis'), a class or function that makes one from
+            the `Reaches`, `module:name` of one, or a `RewardPredictor` that has learned nothing yet.
+        strategy: the reward that it plans for while it learns: a name in `strategies.STRATEGIES` ("intrinsic", "greedy" and "random" are
+            the thesis'), a class or function that makes one, see `StrategyOf`, or `module:name` of one.
+        failures: how failed transitions are remembered: "spread" over all targets, as published, "local" to nearby targets, or "alike",
+            as evidence about similar transitions.
+        discount: factor of future rewards in plans.
+        scale: m, unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
+        penalty: reward of a failed transition, below 0.
+        limit: number of actions after which a problem-try ends, the reach included.
+        seed: of ties and draws; agents of different parts draw differently under the same seed.
+    """
+
+    predictor: str | RewardPredictor | PredictorOf = "weighted"
+    strategy: str | StrategyOf = "intrinsic"
+    failures: Literal["spread", "local", "alike"] = "spread"
+    discount: Annotated[float, Range(ge=0, lt=1)] = 0.9
+    scale: Annotated[float, Range(gt=0)] = SCALE
+    penalty: Annotated[float, Range(lt=0)] = -10.0
+    limit: Annotated[int, Range(ge=1)] = 10
+    seed: int = 0
+
+
+class ReachLearner:
+    """Learns from the steps of problem-tries and chooses the next; its choices follow from its settings and its steps alone.
+
+    Args:
+        space: states and transitions of the part.
+        reaches: the marker's position in each state, and the unit of distances.
+        settings: see `ReachSettings`.
+        beliefs: outcomes of transitions; None: those of `model`, or of an untrained model, debiased.
+        model: transition model to be learned at the same time; None: none.
+
+    Raises:
+        UnknownName: no such predictor or strategy.
     """
 
     def __init__(
         self,
         space: Space,
         reaches: Reaches,
-        beliefs: OutcomeModel | None,
-        predictor: str | RewardPredictor,
-        strategy: str | StrategyOf,
-        failures: str,
-        discount: float,
-        penalty: float,
-        limit: int,
-        seed: int,
-        model: TransitionModel | None,
+        settings: ReachSettings,
+        beliefs: OutcomeModel | None = None,
+        model: TransitionModel | None = None,
     ) -> None:
-        if not (penalty < 0.0 and limit >= 1):
-            raise InvalidValue(f"penalty={penalty!r}, limit={limit!r}: valid are a reward below 0, and at least 1 action a problem-try.")
         self.space, self.part, self.reaches, self.model = space, space.part, reaches, model
-        self._strategy_name, make_strategy = named("strategy", strategy, STRATEGIES)
-        self.predictor = named("predictor", predictor, PREDICTORS)[1](reaches) if isinstance(predictor, str) else predictor
-        self.failures = failures_of(space, reaches, failures)
-        """What is known of failed transitions."""
+        self._strategy_name, make_strategy = named("strategy", settings.strategy, STRATEGIES)
+        self.predictor = made_predictor(settings.predictor, reaches)
+        self.failures = failures_of(space, reaches, settings.failures)
+        """Rewards of transitions, learned from failures."""
         self.problems = Problems()
-        """What was reached for."""
+        """The targets so far."""
         self.steps, self.tries = 0, 0
-        """How many actions and how many problem-tries have ended, those of the store included."""
+        """Number of actions and of problem-tries that have ended, those of the store included."""
         self.last: Try | None = None
         """The newest problem-try that ended."""
         if beliefs is None:
             beliefs = (TransitionModel(space) if model is None else model).debiased()
-        self.planning = ReachPlanning(space, beliefs, discount)
-        self.discount, self.penalty, self.limit, self.seed = discount, penalty, limit, seed
-        self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), failures
+        self.planning = ReachPlanning(space, beliefs, settings.discount)
+        self.discount, self.penalty, self.limit, self.seed = settings.discount, settings.penalty, settings.limit, settings.seed
+        self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), settings.failures
         self._draws, self._draws_of_try, self._draws_of_problem = (
-            Draws(f"{space.part} {what}") for what in ("reaching", "problem-try", "problem")
+            Draws(f"{space.part} {purpose}") for purpose in ("reaching", "problem-try", "problem")
         )
         self._problem: int | None = None  # of the problem-try under way
-        self._made: list[Step] = []  # in it
-        self._worth: Array | None = None  # of the reaches, in it
+        self._made: list[Step] = []  # steps of the problem-try under way
+        self._worth: Array | None = None  # (S,) rewards of the reaches in it
         self._plan: tuple[Array, Array] | None = None
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that decides what it does but for its space and its beliefs, as plain JSON values."""
+        """The record of its settings, without its space and its beliefs, as plain JSON values."""
         return {
             "predictor": self.predictor.settings,
             "strategy": self._strategy_name,
@@ -85,18 +114,21 @@ class ReachLearner:
 
     @property
     def under_way(self) -> int | None:
-        """The problem of the problem-try that has not ended, None between two."""
+        """Number of the problem of the problem-try that has not ended; None between two."""
         return self._problem
 
     def begin(self, target: ReachTarget) -> None:
-        """Start a problem-try, or go on with the one under way if it is at this place; one at another place ends as it is."""
+        """Start a problem-try, or continue the one under way if it has this position; one at another position ends as it is."""
         problem = self.problems.index(target)
         if problem != self._problem:
             self._end()
             self._problem = problem
 
     def planned(self) -> tuple[Array, Array]:
-        """V (S,) and Q (S, A + 1) of the plan of the problem-try under way, see `ReachPlanning.values`; InvalidValue between two."""
+        """Return V (S,) and Q (S, A + 1) of the plan of the problem-try under way, see `ReachPlanning.values`.
+
+        Raises InvalidValue if none is under way.
+        """
         if self._plan is None:
             if self._worth is None:
                 self._worth = self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries))
@@ -104,20 +136,20 @@ class ReachLearner:
         return self._plan
 
     def decide(self, state: int) -> int:
-        """The action to take in a state, or REACH."""
+        """Choose the action to take in a state, or REACH."""
         chosen = choose(self.planned()[1][state], self._draws.at(self.seed, self.steps))
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
-        """Whether a transition did not climb the values of the plan under way."""
+        """Whether a transition did not lead to a state of higher value in the plan under way."""
         return has_failed(self.planned()[0], state, following)
 
     def expected(self, state: int) -> float:
-        """The reward expected of reaching from a state, for the target of the problem-try."""
+        """Return the expected reward of reaching for the target of the problem-try from a state."""
         return float(self.predictor.mean(self._target)[state])
 
     def observe(self, step: Step) -> None:
-        """Take in a step of the problem-try under way."""
+        """Learn from a step of the problem-try under way."""
         self._made.append(step)
         self.steps = step.n
         if step.a == REACH:
@@ -129,7 +161,7 @@ class ReachLearner:
             self._end()
 
     def replay(self, targets: list[ReachTarget], steps: list[Step]) -> None:
-        """Take in what is on record; the plans of a problem-try that has not ended are made anew, as it needs them to go on."""
+        """Learn from recorded steps; the plans of a problem-try that has not ended are made again, because it continues with them."""
         for target in targets:
             self.problems.index(target)
         last = [step for step in steps if step.number == steps[-1].number]
@@ -143,7 +175,7 @@ class ReachLearner:
             self.observe(step)
 
     def problem_draws(self) -> np.random.Generator:
-        """Random numbers for the choice of the next problem."""
+        """Return the random generator for the choice of the next problem."""
         return self._draws_of_problem.at(self.seed, self.tries)
 
     @property
@@ -153,7 +185,7 @@ class ReachLearner:
         return self.problems.targets[self._problem].position
 
     def _observe_transition(self, step: Step) -> None:
-        """In simultaneous learning a failure without contact with the world is the model's, not the problem's (thesis 9.4.1)."""
+        """Learn from a transition; with a model, a failure that touches nothing is the model's, not the target's (thesis 9.4.1)."""
         if self.model is None or step.touched or not step.failed:
             self.failures.add(step.s, step.a, self._target, step.reward)
         if self.model is not None and not step.touched:
@@ -170,56 +202,9 @@ class ReachLearner:
         self._problem, self._made, self._worth, self._plan = None, [], None, None
 
 
-@dataclass(frozen=True, slots=True)
-class ReachPlan:
-    """A way to a state and the reach from there.
-
-    `path`: states from start to the pre-reach state.  `actions`: what to do in each but the last.  `probabilities`: that each ends
-    where the path says; `success`: that all of them do.  `state`: from which to reach.  `expected`: the reward then (thesis eq. 8.4).
-    `avoided`: transitions, as (state, goal), that the way would consist of but for failures remembered.
-    """
-
-    path: tuple[int, ...]
-    actions: tuple[int, ...]
-    probabilities: tuple[float, ...]
-    success: float
-    state: int
-    expected: float
-    avoided: tuple[tuple[int, int], ...]
-
-
-def way_to_reach(learner: ReachLearner, target: ReachTarget, start: int) -> ReachPlan:
-    """The way on which a learner expects most, from a state; raises InvalidValue if the space has no such state."""
-    learner.space.actions(start)
-    expected = np.maximum(learner.predictor.mean(target.position), 0.0)  # no reward is below 0, and the plan would put off one that is
-    failures = learner.failures.rewards(target.position)
-    path, actions, probabilities = _walk(learner, start, *learner.planning.values(expected, failures))
-    freely, chosen, _ = _walk(learner, start, *learner.planning.values(expected, 0.0))
-    taken = set(zip(path, actions, strict=False))
-    avoided = [(s, a) for s, a in zip(freely, chosen, strict=False) if failures[s, a] < 0.0 and (s, a) not in taken]
-    return ReachPlan(
-        path=tuple(path),
-        actions=tuple(actions),
-        probabilities=tuple(probabilities),
-        success=float(np.prod(probabilities)),
-        state=path[-1],
-        expected=float(expected[path[-1]]),
-        avoided=tuple((s, learner.space.goal(s, a)) for s, a in avoided),
-    )
-
-
-def _walk(learner: ReachLearner, start: int, values: Array, action_values: Array) -> tuple[list[int], list[int], list[float]]:
-    """Follow the best actions through their likeliest outcomes that are worth more, until reaching is best."""
-    path, actions, chances = [start], list[int](), list[float]()
-    best = action_values.argmax(axis=1)
-    while best[path[-1]] != action_values.shape[1] - 1:
-        here, action = path[-1], int(best[path[-1]])
-        outcomes, probabilities = learner.planning.outcomes[here, action], learner.planning.probabilities[here, action]
-        nearer = np.where(values[outcomes] > values[here], probabilities, 0.0)
-        if not nearer.any():
-            break  # nothing is worth going for
-        likeliest = int(nearer.argmax())
-        path.append(int(outcomes[likeliest]))
-        actions.append(action)
-        chances.append(float(probabilities[likeliest]))
-    return path, actions, chances
+def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches) -> RewardPredictor:
+    """Make the predictor of a name, a class or a function; one that is made already is returned as it is."""
+    if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
+        make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]
+        return make(reaches)
+    return given

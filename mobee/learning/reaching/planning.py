@@ -1,6 +1,8 @@
-"""Plans that end in a reach: a further action of every state, after which the episode ends (thesis 8.2, 8.3.1)."""
+"""Plans that end in a reach: one more action of every state, after which the problem-try ends (thesis 8.2, 8.3.1)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,17 +10,17 @@ from mobee.arrays import Array, Ints
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
 
-REACH = -1  # the reach action of a state, on record and among its action values
+REACH = -1  # number of the reach action of a state, in records and among its action values
 TOLERANCE = 1e-6  # of values; the largest are about 1
 
 
 class ReachPlanning:
-    """Values of states and actions when every state can end the plan with a reach.
+    """Values of states and actions where every state has a reach action, which ends the plan.
 
     Args:
         space: states and transitions.
-        beliefs: where transitions lead.
-        discount: a factor a step, in [0, 1).
+        beliefs: outcomes of the transitions.
+        discount: factor a step, in [0, 1).
     """
 
     def __init__(self, space: Space, beliefs: OutcomeModel, discount: float) -> None:
@@ -38,7 +40,7 @@ class ReachPlanning:
         return self._probabilities
 
     def refresh(self) -> None:
-        """Take over what the beliefs say now."""
+        """Copy the outcomes of the beliefs as they are now."""
         states, actions = self._states, self._actions
         bins = self._beliefs.probabilities.shape[2]
         self._outcomes: Ints = np.full((states + 1, actions + 1, bins), states, dtype=np.int64)
@@ -48,11 +50,68 @@ class ReachPlanning:
         self._probabilities[:states, actions, 0] = 1.0
 
     def values(self, reaches: Array, moves: Array | float) -> tuple[Array, Array]:
-        """V (S,) and Q (S, A + 1), of which the last column is the reach's.
+        """Compute V (S,) and Q (S, A + 1), with the reach in the last column of Q.
 
-        `reaches`: (S,) what reaching is worth, -inf where it may not be.  `moves`: (S, A) rewards of the transitions.
+        `reaches`: (S,) rewards of the reaches, -inf where none is allowed.  `moves`: (S, A) rewards of the transitions.
         """
         self._reward[:-1, :-1], self._reward[:-1, -1] = moves, reaches
-        start = np.append(np.where(reaches == -np.inf, 0.0, reaches), 0.0)  # to reach at once is a policy too
+        start = np.append(np.where(reaches == -np.inf, 0.0, reaches), 0.0)  # the values of reaching at once
         values, action_values = value_iteration(self, self._reward, self.discount, TOLERANCE, start, method="modified")
         return values[:-1], action_values[:-1]
+
+
+@dataclass(frozen=True, slots=True)
+class ReachPlan:
+    """A path to a state and the reach from there.
+
+    `path`: states from start to the pre-reach state.  `actions`: the action in each but the last.  `probabilities`: that each action ends
+    in the next state of the path; `success`: that all of them do.  `state`: from which to reach.  `expected`: the reward of that reach
+    (thesis eq. 8.4).  `avoided`: transitions, as (state, goal), that the path would contain but for failures remembered.
+    """
+
+    path: tuple[int, ...]
+    actions: tuple[int, ...]
+    probabilities: tuple[float, ...]
+    success: float
+    state: int
+    expected: float
+    avoided: tuple[tuple[int, int], ...]
+
+
+def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
+    """Plan the path and the reach of highest value from a state.
+
+    `expected`: (S,) rewards of the reaches, at least 0, or the plan would put off a reach of negative reward.  `failures`: (S, A) rewards
+    of the transitions.  Raises InvalidValue if the space has no such state.
+    """
+    space.actions(start)
+    path, actions, probabilities = _best_path(planning, start, *planning.values(expected, failures))
+    free_path, free_actions, _ = _best_path(planning, start, *planning.values(expected, 0.0))
+    taken = set(zip(path, actions, strict=False))
+    avoided = [(s, a) for s, a in zip(free_path, free_actions, strict=False) if failures[s, a] < 0.0 and (s, a) not in taken]
+    return ReachPlan(
+        path=tuple(path),
+        actions=tuple(actions),
+        probabilities=tuple(probabilities),
+        success=float(np.prod(probabilities)),
+        state=path[-1],
+        expected=float(expected[path[-1]]),
+        avoided=tuple((s, space.goal(s, a)) for s, a in avoided),
+    )
+
+
+def _best_path(planning: ReachPlanning, start: int, values: Array, action_values: Array) -> tuple[list[int], list[int], list[float]]:
+    """Return states, actions and probabilities of following the best actions through their most probable outcomes of higher value."""
+    path, actions, chances = [start], list[int](), list[float]()
+    best = action_values.argmax(axis=1)
+    while best[path[-1]] != action_values.shape[1] - 1:
+        here, action = path[-1], int(best[path[-1]])
+        outcomes, probabilities = planning.outcomes[here, action], planning.probabilities[here, action]
+        nearer = np.where(values[outcomes] > values[here], probabilities, 0.0)
+        if not nearer.any():
+            break  # no state of higher value can be reached
+        likeliest = int(nearer.argmax())
+        path.append(int(outcomes[likeliest]))
+        actions.append(action)
+        chances.append(float(probabilities[likeliest]))
+    return path, actions, chances

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.reaching.evaluation import Evaluation, evaluate, move, reach
-from mobee.learning.reaching.learner import ReachLearner, ReachPlan, way_to_reach
-from mobee.learning.reaching.planning import REACH
-from mobee.learning.reaching.predictors import Reaches, RewardPredictor
-from mobee.learning.reaching.predictors.predictor import SCALE
+from mobee.learning.reaching.learner import ReachLearner, ReachSettings
+from mobee.learning.reaching.planning import REACH, ReachPlan, plan_reach
+from mobee.learning.reaching.reaches import Reaches, reaches_of
 from mobee.learning.reaching.store import ReachStore
-from mobee.learning.reaching.strategies import StrategyOf
 from mobee.learning.reaching.tries import Step, Try
-from mobee.learning.reaching.where import reaches_of
+from mobee.learning.settings import accepts
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
@@ -23,37 +24,31 @@ from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, reward_of
 
 
 class ReachAgent(ReachLearner):
-    """Learns to put a marker of one part on targets: each place is a problem, and every problem-try tells something of all others.
+    """Learns to put a marker of one part on targets: each position is a problem, and every problem-try informs about all others.
 
-    All it knows follows from its settings and its steps so far; with a store, an agent that is started again on it goes on as
-    if it had never stopped.  Targets may be any number: new ones are new problems.
+    All it knows follows from its settings and its steps, so an agent that is restarted with its store continues as if it had never
+    stopped.  There may be any number of targets: new ones are new problems.
 
     Args:
         space: states and transitions of the part.
-        plant: through which it acts; its robot must be the space's.
-        beliefs: where transitions lead, e.g. `load_learned(file).model.debiased()`.  None: as `model` says, else mostly to the goal.
-        marker: what is to come to the targets.
-        predictor: of rewards, a name in `predictors.PREDICTORS` ("weighted" is the thesis'), `module:name` of what makes your own, or
-            an object that has seen nothing yet.
-        strategy: what it pursues while it learns, a name in `strategies.STRATEGIES` ("intrinsic", "greedy" and "random" are the thesis'),
-            or what makes your own, see `StrategyOf`: a class, or its `module:name`.
-        failures: how failed transitions are remembered, "spread" over all targets as published, "local", or as a hint to others "alike".
-        discount: of future rewards in the plan.
-        scale: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
-        penalty: the reward of a failed transition.
-        limit: actions after which a problem-try ends, the reach included.
-        seed: decides ties and draws; agents of different parts draw differently under the same seed.
-        store: where steps go and come from.
-        model: to be learned at the same time (thesis 9.4.1): transitions that touch nothing of the world are observed with it.
-        hands: (S, 3) m, root frame, where the marker is in each state; None: by the robot's kinematics, other parts at home.
-        jacobians: (S, 3, d) m/rad, how the joints of the space move it there, where `hands` are given and these are known.
+        plant: the robot it acts on; must have the motors of the space's robot.
+        beliefs: outcomes of transitions, e.g. `load_learned(file).model.debiased()`.  None: those of `model`, else mostly the goal.
+        marker: the marker to be put on the targets.
+        settings: None: the defaults.
+        store: where steps are written, and read from at the start; None: they are not kept.
+        model: transition model to be learned at the same time (thesis 9.4.1): transitions without contact with the world are
+            observed with it.
+        hands: (S, 3) m, root frame, position of the marker in each state; None: by the robot's kinematics, other parts at home.
+        jacobians: (S, 3, d) m/rad, of that position by the joints of the space, if `hands` are given and these are known.
+        **changes: fields of `ReachSettings` by keyword, in place of those in `settings`.
 
     Raises:
-        UnknownName: no such predictor, strategy, way to remember failures, or marker.
+        UnknownName: no such setting, predictor, strategy, kind of failures, or marker.
         InvalidValue: a plant of another robot, or a value out of range.
         MobeeError: the store holds reaches of another space, marker or scale.
     """
 
+    @accepts(ReachSettings)
     def __init__(
         self,
         space: Space,
@@ -61,23 +56,19 @@ class ReachAgent(ReachLearner):
         beliefs: OutcomeModel | None = None,
         *,
         marker: str,
-        predictor: str | RewardPredictor = "weighted",
-        strategy: str | StrategyOf = "intrinsic",
-        failures: str = "spread",
-        discount: float = 0.9,
-        scale: float = SCALE,
-        penalty: float = -10.0,
-        limit: int = 10,
-        seed: int = 0,
+        settings: ReachSettings | None = None,
         store: ReachStore | None = None,
         model: TransitionModel | None = None,
         hands: Array | None = None,
         jacobians: Array | None = None,
+        **changes: Any,
     ) -> None:
         if plant.robot.motors != space.robot.motors:
             raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
+        chosen = ReachSettings.made(settings, changes)
+        scale = chosen.scale
         reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)
-        super().__init__(space, reaches, beliefs, predictor, strategy, failures, discount, penalty, limit, seed, model)
+        super().__init__(space, reaches, chosen, beliefs, model)
         self.plant, self.marker, self.store = plant, marker, store
         self._state: int | None = None
         if store is not None:
@@ -87,15 +78,15 @@ class ReachAgent(ReachLearner):
 
     @property
     def state(self) -> int:
-        """Where the part is: measured at first and after whatever broke off a step, else from the last outcome."""
+        """The state of the part: measured at first and after a step that did not end, else from the last outcome."""
         if self._state is None:
-            self._state = self.space.state_of(self.plant.measure(self.part)[self.space.columns])
+            self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
 
     def try_problem(self, target: ReachTarget) -> Try:
-        """One problem-try: present the target, go where reaching is worth most, plan again after each failure, reach, learn (thesis 8.3.1).
+        """Make one problem-try: present the target, go to the best pre-reach state, plan again after failures, reach, learn (thesis 8.3.1).
 
-        Raises ActionInterrupted if the plant does; the problem-try stays under way, and the next call for the same place goes on with it.
+        Raises ActionInterrupted if the plant does; the problem-try stays under way, and the next call for the same position continues it.
         """
         self.begin(target)
         self.plant.present(target)
@@ -105,7 +96,7 @@ class ReachAgent(ReachLearner):
         return self.last
 
     def learn(self, problems: Sequence[ReachTarget], tries: int) -> None:
-        """Make that many more problem-tries, each of the problem least tried, ties random; interrupted actions are decided anew (8.3.2)."""
+        """Make so many more problem-tries, each of the least-tried problem, ties random; interrupted actions are decided again (8.3.2)."""
         end = self.tries + tries
         while self.tries < end:
             target = self.problems.targets[self.under_way] if self.under_way is not None else None
@@ -115,21 +106,23 @@ class ReachAgent(ReachLearner):
                 continue
 
     def plan(self, target: ReachTarget, state: int | None = None) -> ReachPlan:
-        """What it would do to reach for a target from a state, from where it is if None; nothing moves or is learned."""
-        return way_to_reach(self, target, self.state if state is None else state)
+        """Plan a reach for a target from a state; None: from the state of the part.  Nothing moves, and nothing is learned."""
+        expected = np.maximum(self.predictor.mean(target.position), 0.0)
+        start = self.state if state is None else state
+        return plan_reach(self.space, self.planning, expected, self.failures.rewards(target.position), start)
 
     def evaluate(self, problems: Sequence[ReachTarget], repetitions: int = 1) -> Evaluation:
-        """How well it reaches for the problems by now (thesis 8.3.3): the robot moves, but nothing is learned."""
+        """Reach for the problems with what was learned so far (thesis 8.3.3): the robot moves, but nothing is learned."""
         try:
             return evaluate(self, problems, repetitions)
         finally:
             self._state = None
 
     def step(self) -> Step:
-        """One action of the problem-try under way, whose target is presented; raises ActionInterrupted if the plant does."""
+        """Make one action of the problem-try under way, whose target is presented; raises ActionInterrupted if the plant does."""
         state = self.state
         action = self.decide(state)
-        self._state = None  # whatever breaks off the action, or its record
+        self._state = None  # unknown if the action is interrupted, or its record fails
         step = self._reached(state) if action == REACH else self._moved(state, action)
         if self.store is not None:
             self.store.append(step, self.problems.targets)
@@ -138,28 +131,22 @@ class ReachAgent(ReachLearner):
         return step
 
     def _moved(self, state: int, action: int) -> Step:
+        """Make a transition; a failure costs the penalty."""
         outcome, following = move(self.plant, self.space, state, action)
         failed = self.failed(state, following)
-        reward = self.penalty if failed else 0.0
-        return self._step_of(state, action, following, failed, reward, 0.0, 0.0, outcome)
+        return self._step(outcome, state, action, following, failed=failed, reward=self.penalty if failed else 0.0)
 
     def _reached(self, state: int) -> Step:
+        """Reach from a state."""
         expected = self.expected(state)
         outcome, following = reach(self.plant, self.space, self.marker)
         reward = reward_of(outcome.missing, self.reaches.scale)
-        return self._step_of(state, REACH, following, False, reward, expected, outcome.missing, outcome)
+        return self._step(outcome, state, REACH, following, reward=reward, expected=expected, missing=outcome.missing)
 
-    def _step_of(
-        self,
-        state: int,
-        action: int,
-        following: int,
-        failed: bool,
-        reward: float,
-        expected: float,
-        missing: float,
-        outcome: Outcome | ReachOutcome,
+    def _step(
+        self, outcome: Outcome | ReachOutcome, state: int, action: int, following: int, *, failed: bool = False, **rewards: float
     ) -> Step:
+        """Return the next step of the problem-try; `rewards`: reward, and of a reach the expected reward and the remaining error [m]."""
         assert self.under_way is not None
         return Step(
             n=self.steps + 1,
@@ -169,11 +156,9 @@ class ReachAgent(ReachLearner):
             a=action,
             s_next=following,
             failed=failed,
-            reward=reward,
-            expected=expected,
-            missing=missing,
             settled=outcome.settled,
             duration=outcome.duration,
             q=tuple(outcome.q.tolist()),
             touched=outcome.touched,
+            **{"expected": 0.0, "missing": 0.0} | rewards,
         )

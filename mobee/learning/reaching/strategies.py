@@ -10,7 +10,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.learning.reaching.histories import Histories
-from mobee.learning.reaching.predictors.predictor import Reaches, RewardPredictor
+from mobee.learning.reaching.predictors.predictor import RewardPredictor
+from mobee.learning.reaching.reaches import Reaches
 
 WINDOW = 8  # reaches of a state that are compared, the newer half with the older
 AT_RANDOM = 0.2  # share of problem-tries that reach from a random state

@@ -65,7 +65,7 @@ class ReachTable(TabularPlant):
     def act(self, part: str, target: Array) -> Outcome:
         """As of the TabularPlant, if the presented target does not block it; each takes 1 s."""
         if self._presented is not None:
-            action = self._action[self.state].get(self.space.state_of(target[self.space.columns]))
+            action = self._action[self.state].get(self.space.state_of(target))
             if action is not None and self._chance() < self._presented[1].item(self.state, action):
                 self.actions += 1
                 return Outcome(self.measure(part), settled=True, duration=1.0, touched=(TARGET,))

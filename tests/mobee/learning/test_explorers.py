@@ -74,7 +74,7 @@ def test_only_curiosity_plans(monkeypatch):
     def no_plan(*_, **__):
         raise AssertionError("planned")
 
-    monkeypatch.setattr("mobee.learning.decider.value_iteration", no_plan)
+    monkeypatch.setattr("mobee.learning.learner.value_iteration", no_plan)
     agent("random").step()
     agent("least_tried").step()
     with pytest.raises(AssertionError, match="planned"):

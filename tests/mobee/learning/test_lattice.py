@@ -102,9 +102,10 @@ def test_a_whole_part_and_its_lattice_joints_give_the_same_state():
     assert space.state_of(space.target(5)) == space.state_of(space.samples[5]) == 5
 
 
-def test_joints_in_another_order_than_the_part_s_are_read_in_the_lattice_s_order():
+def test_joints_are_read_in_the_lattice_s_order_and_a_pose_of_the_part_in_the_part_s():
     space = Lattice(toy_robot(), list(TORSO)[::-1], neighbours=8)
-    assert [space.state_of(space.samples[s]) for s in range(27)] == list(range(27))
+    assert [space.state_of_joints(space.samples[s]) for s in range(27)] == list(range(27))
+    assert [space.state_of(space.target(s)) for s in range(27)] == list(range(27))
 
 
 def test_settings_tell_spaces_apart():

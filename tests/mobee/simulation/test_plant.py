@@ -181,3 +181,11 @@ def test_a_target_that_is_none_is_refused(target: Any) -> None:
     assert plant.acting == ()
     plant.begin(part, robot.home[robot.parts[part].slice].tolist())
     assert part in plant.acting
+
+
+def test_q_holds_the_encoders_of_all_parts() -> None:
+    plant = arm_plant(seed=1)
+    plant.act("arm", np.array([0.4, -0.3]))
+    assert np.array_equal(plant.q, np.concatenate([plant.measure(part) for part in plant.robot.parts]))
+    plant.q[:] = 0.0
+    assert plant.q.any()

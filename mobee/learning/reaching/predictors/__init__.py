@@ -7,13 +7,17 @@ from mobee.learning.reaching.predictors.gaussian_process import GaussianProcess
 from mobee.learning.reaching.predictors.kernel import Kernel
 from mobee.learning.reaching.predictors.nearest import Nearest
 from mobee.learning.reaching.predictors.networks import Networks
-from mobee.learning.reaching.predictors.predictor import Reaches, RewardPredictor
+from mobee.learning.reaching.predictors.predictor import RewardPredictor
 from mobee.learning.reaching.predictors.table import Table
 from mobee.learning.reaching.predictors.thesis import Weighted
+from mobee.learning.reaching.reaches import Reaches
 
-__all__ = ["PREDICTORS", "Reaches", "RewardPredictor"]
+__all__ = ["PREDICTORS", "PredictorOf", "Reaches", "RewardPredictor"]
 
-PREDICTORS: dict[str, Callable[[Reaches], RewardPredictor]] = {
+PredictorOf = Callable[[Reaches], RewardPredictor]
+"""Makes the predictor of a learner from its reaches: a class, or a function."""
+
+PREDICTORS: dict[str, PredictorOf] = {
     "weighted": Weighted,
     "table": Table,
     "kernel": Kernel,
@@ -22,4 +26,4 @@ PREDICTORS: dict[str, Callable[[Reaches], RewardPredictor]] = {
     "networks": Networks,
     "gp": GaussianProcess,
 }
-"""Name -> maker of a predictor that has seen nothing yet."""
+"""Makes a predictor that has learned nothing yet, by name."""

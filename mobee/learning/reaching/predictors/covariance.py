@@ -13,8 +13,8 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.reaches import Reaches
 
 OFFSET = 0.3**2  # variance of what all rewards have in common
 USUAL = {  # variances of rewards, which are in [0, 1], and lengths in m

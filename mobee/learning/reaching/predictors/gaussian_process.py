@@ -14,8 +14,8 @@ from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import Covariance, Points, joint_squares, most_likely, points, usual
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.reaches import Reaches
 
 BLOCK = 32  # rows
 KEPT = 300e6  # bytes of rows and covariances of targets in memory, but those of one at least: of 256 states 31 targets, at the fullest

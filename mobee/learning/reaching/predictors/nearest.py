@@ -9,8 +9,8 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import joint_squares
-from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import Independent, around
+from mobee.learning.reaching.reaches import Reaches
 
 NEIGHBOURS = 5
 WAY = 0.1  # m: as far apart as one joint at both ends of its samples, divided by:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.reaches import Reaches
 
 NETWORKS, HIDDEN = 5, 32
 STEPS, BATCH = 4, 64  # of descent after each reach

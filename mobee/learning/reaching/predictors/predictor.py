@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors.reached import Reached, around
-
-SCALE = 0.01  # m: the unit of distances in the published equations, which the thesis leaves open
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reaches:
-    """The reach actions of a space, one a state.
-
-    `samples`: (S, d) rad, the joints' poses at which they begin.  `hands`: (S, 3) m, root frame, where the marker is then.
-    `scale`: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.  `jacobians`: (S, 3, d) m/rad, how the joints move the
-    marker there; None: not known.
-    """
-
-    samples: Array
-    hands: Array
-    scale: float = SCALE
-    jacobians: Array | None = None
-
-    def __post_init__(self) -> None:
-        """Check; raises InvalidValue."""
-        if self.samples.ndim != 2 or self.hands.shape != (len(self.samples), 3):
-            raise InvalidValue(
-                f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row a state."
-            )
-        shape = len(self.samples), 3, self.samples.shape[1]
-        if self.jacobians is not None and not (self.jacobians.shape == shape and np.isfinite(self.jacobians).all()):
-            raise InvalidValue(f"jacobians of shape {self.jacobians.shape}: give finite m/rad, one (3, d) a state, in all {shape}.")
-        if not (np.isfinite(self.samples).all() and np.isfinite(self.hands).all() and 0.0 < self.scale < np.inf):
-            raise InvalidValue(f"samples, hands and scale={self.scale!r}: all must be finite, and the scale a length above 0 m.")
-
-    def __len__(self) -> int:
-        return len(self.samples)
+from mobee.learning.reaching.reaches import Reaches
 
 
+@runtime_checkable
 class RewardPredictor(Protocol):
     """Predicts rewards of reaching from each of S states.
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.learning.reaching.predictors.predictor import Reaches
 from mobee.learning.reaching.predictors.reached import IMAGINED, Independent, around
+from mobee.learning.reaching.reaches import Reaches
 
 NOISE = 0.05  # standard deviation of a reward around its mean, before repeats tell
 

@@ -9,7 +9,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.histories import Histories
-from mobee.learning.reaching.predictors.predictor import Reaches
+from mobee.learning.reaching.reaches import Reaches
 
 _NO_DEVIATION = (
     "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."

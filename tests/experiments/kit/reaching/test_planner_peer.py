@@ -110,7 +110,7 @@ def test_a_judge_says_what_is_truly_missing():
     turns[body().motor_index("r_elbow")] = 0.1
     plant = JudgedPlant(arm_plant(0), Errors(turns, np.array([0.0, 0.0, 0.02])))
     plant.present(TARGET)
-    q = np.concatenate([plant.measure(part) for part in body().parts])
+    q = plant.q
     true = Model(body()).evaluate(q + turns).position(MARKER)
     assert plant.missing(MARKER) == pytest.approx(np.linalg.norm(TARGET.position + [0.0, 0.0, 0.02] - true) - TARGET.radius)
     outcome = plant.reach(PART, MARKER)

@@ -5,7 +5,7 @@ import pytest
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.lattice import Lattice
-from mobee.learning.reaching.where import hands_of, reaches_of
+from mobee.learning.reaching.reaches import hands_of, reaches_of
 from mobee.model.model import Model
 from mobee.robot.load import load_robot
 

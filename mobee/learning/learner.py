@@ -1,0 +1,191 @@
+"""The curious learner: learns from transitions and chooses actions by planning, without acting (thesis Algorithms 7 and 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.learning.draws import Draws
+from mobee.learning.explorers import EXPLORERS, Explorer, choose
+from mobee.learning.goal import Goal, pursued
+from mobee.learning.settings import Range, Settings, named
+from mobee.learning.space import Space
+from mobee.learning.transitions import Divergence, TransitionModel
+from mobee.learning.value_iteration import OutcomeModel, value_iteration
+from mobee.store import Transition
+
+
+@dataclass(frozen=True, kw_only=True)
+class CuriousSettings(Settings):
+    """Settings of a `CuriousAgent`.
+
+    Args:
+        explorer: how it chooses actions: a name in `mobee.learning.explorers.EXPLORERS`, "curious", "random", "least_tried", ...; a
+            function, see `Explorer`; or `module:name` of one.
+        seed: of the draws among equally good actions; agents of different parts draw differently under the same seed.
+        discount: factor of future rewards in plans.
+        initial: which outcomes of an action are imagined before it is tried, "50-50" or "60-40", see `TransitionModel`.
+        divergence: the reward of an observation: "kail", "kl", a function, or `module:name` of one, see `TransitionModel`.
+        forgetting: factor of the counts of a state-action before each new observation of it; 1 forgets nothing.
+        tolerance: at which a plan has converged, see `value_iteration`.
+        relative: whether the tolerance is in units of the largest reward, and each plan starts from the values of the one before.
+            False, with tolerance=1e-3: Algorithm 7 as published.
+        beliefs: what plans are made with: "counts", which include the imagined outcomes, or "debiased", which leave them out.
+        goal: an external reward: target states, an array (S, A), or a function of state, action and goal state; None: curiosity alone.
+        goal_weight: the external reward times this factor is added to the intrinsic reward; None: the external reward replaces it.
+    """
+
+    explorer: str | Explorer = "curious"
+    seed: int = 0
+    discount: Annotated[float, Range(ge=0, lt=1)] = 0.9
+    initial: Literal["50-50", "60-40"] = "50-50"
+    divergence: str | Divergence = "kail"
+    forgetting: Annotated[float, Range(gt=0, le=1)] = 1.0
+    tolerance: Annotated[float, Range(gt=0)] = 0.01
+    relative: bool = True
+    beliefs: Literal["counts", "debiased"] = "counts"
+    goal: Goal | None = None
+    goal_weight: float | None = None
+
+
+class _Made(NamedTuple):
+    """A plan, and the reward and beliefs that it was requested for."""
+
+    reward: Array | None
+    beliefs: OutcomeModel | None
+    plan: tuple[Array, Array]
+
+
+class Plans:
+    """Caches plans by key within one transition; the values of the last transition's plan are where the next plan starts.
+
+    `relative`: the tolerance is in units of the largest reward, and plans start from earlier values; else Algorithm 7 as published,
+    with an absolute tolerance and all values zero at the start.
+    """
+
+    def __init__(self, discount: float, tolerance: float, relative: bool) -> None:
+        self.discount, self.tolerance, self.relative = discount, tolerance, relative
+        self._starts: dict[str, Array] = {}
+        self._made: dict[str, _Made] = {}
+
+    def made(self, key: str, reward: Array | None, beliefs: OutcomeModel | None) -> tuple[Array, Array] | None:
+        """Return the plan of a key if it was made since the last transition, for the same reward and beliefs objects."""
+        made = self._made.get(key)
+        return made.plan if made is not None and made.reward is reward and made.beliefs is beliefs else None
+
+    def make(
+        self, key: str, requested: tuple[Array | None, OutcomeModel | None], reward: Array, beliefs: OutcomeModel
+    ) -> tuple[Array, Array]:
+        """Plan for a reward (S, A) with beliefs; `requested`: the objects, or None for the agent's own, to compare with in `made`."""
+        if self.relative:
+            before = self._made.get(key)
+            start = self._starts.get(key) if before is None else before.plan[0]
+            plan = value_iteration(beliefs, reward, self.discount, self.tolerance, start, relative=True, method="modified")
+        else:
+            plan = value_iteration(beliefs, reward, self.discount, self.tolerance)
+        for values in plan:
+            values.setflags(write=False)
+        self._made[key] = _Made(*requested, plan)
+        return plan
+
+    def keep(self) -> None:
+        """After a transition was observed: start the next plans from the values of these."""
+        for key, made in self._made.items():
+            self._starts[key] = made.plan[0]
+        self._made.clear()
+
+    def undo(self) -> None:
+        """After an interrupted action: discard the plans made for it."""
+        self._made.clear()
+
+
+class CuriousLearner:
+    """Learns from transitions and chooses actions; its choices follow from its settings and its transitions alone.
+
+    Args:
+        space: states and actions of one part.
+        settings: see `CuriousSettings`.
+
+    Raises:
+        UnknownName: no such explorer or divergence.
+        InvalidValue: a goal that the space does not have, or that the explorer ignores.
+    """
+
+    def __init__(self, space: Space, settings: CuriousSettings) -> None:
+        self.space, self.part = space, space.part
+        self.explorer, self._score = named("explorer", settings.explorer, EXPLORERS)
+        self.seed, self.discount = settings.seed, settings.discount
+        self.model = TransitionModel(space, settings.initial, settings.divergence, settings.forgetting)
+        self.beliefs: OutcomeModel = self.model.debiased() if settings.beliefs == "debiased" else self.model
+        """The outcome model that plans are made with."""
+        self.transitions = 0
+        """Number of transitions observed, those of its store included."""
+        self.last: Transition | None = None
+        """The newest transition."""
+        self._settings = settings
+        self._external = pursued(space, settings.goal, settings.goal_weight, self.explorer)
+        self._plans = Plans(settings.discount, settings.tolerance, settings.relative)
+        self._draws = Draws(space.part)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The record of its settings and its space, as plain JSON values; a store continues only under an equal record."""
+        record = vars(self._settings) | {
+            "space": self.space.settings,
+            "explorer": self.explorer,
+            "divergence": self.model.divergence,
+            "forgetting": self.model.forgetting,
+            "goal": None if self._external is None else self._external.settings,
+        }
+        del record["goal_weight"]  # recorded with the goal
+        return record
+
+    def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
+        """Compute state and action values, shapes (S,) and (S, A), once a transition (Algorithm 7).
+
+        `reward`: (S, A); None: the agent's reward, intrinsic, or of its goal.  `beliefs`: None: the agent's.
+        `key`: each plan starts from the values of the previous plan of the same key.
+        """
+        plan = self._plans.made(key, reward, beliefs)
+        if plan is None:
+            wanted = self._pursued() if reward is None else reward
+            plan = self._plans.make(key, (reward, beliefs), wanted, self.beliefs if beliefs is None else beliefs)
+        return plan
+
+    def _choose(self, state: int) -> int:
+        draws = self._draws.at(self.seed, self.transitions)
+        scores = self._score(self, state, draws)
+        if self.explorer not in EXPLORERS:
+            self._require_scores(scores, state)
+        return choose(scores, draws)
+
+    def _require_scores(self, scores: Array, state: int) -> None:
+        """Raise InvalidValue unless an explorer of the user gives a number for each action of the state."""
+        actions = len(self.space.actions(state))
+        if np.shape(scores) != (actions,) or np.isnan(scores).any():
+            raise InvalidValue(
+                f"explorer {self.explorer!r} returned {scores!r} in state {state}: give a score for each action, shape ({actions},)."
+            )
+
+    def _learn(self, transition: Transition) -> None:
+        self.model.observe(transition.s, transition.a, transition.s_next)
+        self._go_on(transition)
+
+    def _go_on(self, transition: Transition) -> None:
+        """Note a transition that the model has observed already."""
+        self.transitions, self.last = transition.n, transition
+        self._plans.keep()
+
+    def _replay(self, transitions: list[Transition]) -> None:
+        """Learn from recorded transitions; each decision is repeated, so that the next plan starts from the same values as before."""
+        for transition in transitions:
+            self._score(self, transition.s, self._draws.at(self.seed, self.transitions))
+            self._learn(transition)
+
+    def _pursued(self) -> Array:
+        """The reward (S, A) to plan with."""
+        return self.model.reward if self._external is None else self._external.combined(self.model.reward)

@@ -1,0 +1,76 @@
+"""Reach actions of a space: the marker's position and Jacobian in each state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.learning.space import Space
+from mobee.model.model import Model
+
+SCALE = 0.01  # m, unit of distances in the published equations; the thesis leaves it open
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reaches:
+    """The reach actions of a space, one a state.
+
+    `samples`: (S, d) rad, poses of the joints at which the reaches begin.  `hands`: (S, 3) m, root frame, positions of the marker in
+    them.  `scale`: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.  `jacobians`: (S, 3, d) m/rad, of the marker's
+    position by the joints; None: unknown.
+    """
+
+    samples: Array
+    hands: Array
+    scale: float = SCALE
+    jacobians: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Check; raises InvalidValue."""
+        if self.samples.ndim != 2 or self.hands.shape != (len(self.samples), 3):
+            raise InvalidValue(
+                f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row a state."
+            )
+        shape = len(self.samples), 3, self.samples.shape[1]
+        if self.jacobians is not None and not (self.jacobians.shape == shape and np.isfinite(self.jacobians).all()):
+            raise InvalidValue(f"jacobians of shape {self.jacobians.shape}: give finite m/rad, one (3, d) a state, in all {shape}.")
+        if not (np.isfinite(self.samples).all() and np.isfinite(self.hands).all() and 0.0 < self.scale < np.inf):
+            raise InvalidValue(f"samples, hands and scale={self.scale!r}: all must be finite, and the scale a length above 0 m.")
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+
+def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:
+    """Compute the marker's positions and Jacobians in all states of a space, all other parts at home; `scale` m: see `Reaches`.
+
+    Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
+    """
+    robot = space.robot
+    part = robot.part(space.part)
+    jacobians = Model(robot).jacobian(_poses(space), marker)[:, :3, part.start + space.columns]
+    return Reaches(space.samples, hands_of(space, marker), scale, jacobians)
+
+
+def hands_of(space: Space, marker: str) -> Array:
+    """Compute the marker's position at the sample of each state, all other parts at home: shape (S, 3), in [m] in the root frame.
+
+    Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
+    """
+    robot = space.robot
+    robot.marker(marker)
+    hands = Model(robot).evaluate(_poses(space)).position(marker)
+    if np.ptp(hands, axis=0).max() == 0.0:
+        raise InvalidValue(f"the marker {marker!r} is moved by none of {', '.join(space.joints)}: take one that {space.part} carries.")
+    return hands
+
+
+def _poses(space: Space) -> Array:
+    """Return all motors in each state, (S, n) rad."""
+    robot = space.robot
+    q = np.tile(robot.home, (len(space), 1))
+    q[:, robot.part(space.part).slice] = [space.target(state) for state in range(len(space))]
+    return q
