@@ -6,7 +6,6 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -54,7 +53,7 @@ class Settings:
     """
 
     def __post_init__(self) -> None:
-        for name, hint in hints_of(type(self)).items():  # type: ignore[arg-type]
+        for name, hint in hints_of(type(self)).items():
             _check(name, getattr(self, name), hint)
 
     @classmethod
@@ -67,11 +66,10 @@ class Settings:
         return replace(cls() if settings is None else settings, **changes)
 
 
-@cache
-def hints_of(settings: Callable[..., Settings]) -> dict[str, Any]:
+def hints_of(settings: type[Settings]) -> dict[str, Any]:
     """Return the type of each field of a class of settings by name, with its `Range` if it has one."""
     hints = get_type_hints(settings, include_extras=True)
-    return {field.name: hints[field.name] for field in fields(settings)}  # type: ignore[arg-type]
+    return {field.name: hints[field.name] for field in fields(settings)}
 
 
 def accepts(settings: type[Settings]) -> Callable[[C], C]:

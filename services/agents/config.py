@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import msgspec
 from msgspec import Meta
@@ -24,7 +25,7 @@ from services.common.config import ServiceConfig
 from services.common.hands import hand_of, moved_markers
 
 ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
-NAMED = {"explorer": EXPLORERS, "divergence": DIVERGENCES, "predictor": PREDICTORS, "strategy": STRATEGIES}
+NAMED: dict[str, Mapping[str, object]] = {"explorer": EXPLORERS, "divergence": DIVERGENCES, "predictor": PREDICTORS, "strategy": STRATEGIES}
 TASK = ("goal", "goal_weight")  # settings of other types in a file, see Config
 
 
@@ -43,10 +44,15 @@ def _fields_of(settings: type[Settings]) -> dict[str, tuple[str, Any, Any]]:
     return {one.name: (one.name, _of_file(hints[one.name]), one.default) for one in fields(settings) if one.name not in TASK}
 
 
-_FIELDS = _fields_of(ReachSettings) | _fields_of(CuriousSettings)
-_FIELDS.pop("seed")  # of every service
-LearningConfig = msgspec.defstruct("LearningConfig", _FIELDS.values(), bases=(ServiceConfig,), frozen=True, kw_only=True, module=__name__)
-LearningConfig.__doc__ = "\n".join([ReachSettings.__doc__ or "", *(CuriousSettings.__doc__ or "").partition("Args:\n")[2:]])
+if TYPE_CHECKING:
+    LearningConfig = ServiceConfig
+else:  # a field for each setting of the library's agents; `seed` is one of every service
+    _FIELDS = _fields_of(ReachSettings) | _fields_of(CuriousSettings)
+    _FIELDS.pop("seed")
+    LearningConfig = msgspec.defstruct(
+        "LearningConfig", _FIELDS.values(), bases=(ServiceConfig,), frozen=True, kw_only=True, module=__name__
+    )
+    LearningConfig.__doc__ = "\n".join([ReachSettings.__doc__, *CuriousSettings.__doc__.partition("Args:\n")[2:]])
 
 
 class Config(LearningConfig, frozen=True, kw_only=True):

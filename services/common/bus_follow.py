@@ -32,8 +32,9 @@ class BusFollower(BusPlant):
         self._seen: list[tuple[float, Array]] = []  # s of the robot's clock, encoders (n,)
         service.on_newest(Tick, self._note_tick)
 
+    @property
     def q(self) -> Array:
-        """All motors, (n,) rad, as the encoders say; raises MobeeError where there is no robot."""
+        """Positions of all motors by the encoders, (n,) rad; raises MobeeError if there is no robot."""
         self._service.spin(time.monotonic() + CONTROL, lambda: bool(self._seen))
         if not self._seen:
             raise MobeeError("no tick of the robot came: `mobee status` says whether robot_sim runs")
