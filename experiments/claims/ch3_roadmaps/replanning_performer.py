@@ -67,6 +67,11 @@ class Crosser:
         self._ended = 0.0  # s of processor time
         hand.on_forces = self._tick
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._hand.q
+
     def measure(self, part: str) -> Array:
         """See Plant."""
         return self._hand.measure(part)

@@ -44,6 +44,11 @@ class TablePlant:
         """Put the table's top at that height [m]."""
         self.world.move("table", position=_middle(height))
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self.inner.q
+
     def measure(self, part: str) -> Array:
         """See Plant."""
         return self.inner.measure(part)

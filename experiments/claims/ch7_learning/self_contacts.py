@@ -28,6 +28,11 @@ class SelfContactPlant:
         self.robot = plant.robot
         self.contacts: list[SelfContact | None] = []
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._plant.q
+
     def measure(self, part: str) -> Array:
         """As the plant's."""
         return self._plant.measure(part)

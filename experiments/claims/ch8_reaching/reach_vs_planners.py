@@ -227,7 +227,7 @@ def _followed(both: PeerBelief, path: Array, seed: int) -> float:
         waiting = set(SIDES)
         while waiting:
             waiting -= {part for part, _ in plant.advance()}
-    reached = plant.model.evaluate(np.concatenate([plant.measure(part) for part in body().parts]))
+    reached = plant.model.evaluate(plant.q)
     goal = both.model.evaluate(both.whole(path[-1]))
     palms = [f"{part.removesuffix('_arm')}_palm" for part in SIDES]
     return max(float(np.linalg.norm(reached.position(palm) - goal.position(palm))) for palm in palms)

@@ -155,6 +155,11 @@ class BlamingPlant:
     def __init__(self, plant: ReachPlant, space: Space, blame: Blame) -> None:
         self.inner, self.robot, self._space, self._blame = plant, plant.robot, space, blame
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self.inner.q
+
     def measure(self, part: str) -> Array:
         """See Plant."""
         return self.inner.measure(part)

@@ -114,6 +114,11 @@ class PeerPlant:
         """Of the robot, s."""
         return self._hand.tick * self._dt
 
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._hand.q
+
     def measure(self, part: str) -> Array:
         """See Plant."""
         return self._hand.measure(part)
