@@ -1,8 +1,8 @@
 """Two checkouts in one run: how much processor time the same work costs in each.
 
-A round of a case is a fresh process of each checkout; both prepare the case and do its work once, which does not count, and then by turns
-(old, new, new, old, ...) as often as asked.  Processor time is counted, so that what else the machine does matters little.  The ratio of
-a round is that of the sums, the verdict rests on the median of the rounds.
+In a round of a case each checkout runs in a fresh process; both prepare the case and do its work once, which does not count, and then by
+turns (old, new, new, old, ...).  Processor time is counted, so other programs on the machine matter little.  The ratio of a round is
+that of the sums; the verdict rests on the median of the rounds.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts as requirement
-from experiments.bench.verdicts import all_passed, judged
+from experiments.bench import verdicts
+from experiments.bench.verdicts import judged
 from experiments.kit.command_line import Progress
 from mobee.errors import MobeeError
 
-HERE = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[2]
 _CASES = Path(__file__).with_name("against_cases.py")
 TURNS = 6  # of each checkout in a round
-FEWER_TURNS = {"lockstep": 1, "trm evolution": 2}  # whose work takes long
+TURNS_OF_LONG_CASES = {"lockstep": 1, "trm evolution": 2}
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "NUMBA", "MKL")}
 
-# Of the old time over the new at least.
-LEAST = {
+# The old time over the new must be at least this.
+MIN_RATIO = {
     "one arm": 2.0,
-    "64 plants": 1.5,  # of one plant's
+    "64 plants": 1.5,  # times one plant
     "reaching": 2.0,
     "three agents": 2.5,
     "chapter 8": 1.6,
@@ -48,12 +48,24 @@ LEAST = {
     "trm evolution": 1.0,
     "edges": 1.0,
 }
-Pair = dict[str, dict[str, Any]]  # of "old" and "new": seconds of the work, and what was done
-EQUAL = 0.97  # what counts as no slower: two runs of one checkout differ by a little
+NO_SLOWER = 0.97  # counts as a ratio of 1: two runs of one checkout differ by a little
+
+Pair = dict[str, dict[str, Any]]  # of "old" and "new": seconds of the work, and counts of the work done
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The checkouts, each a folder or a commit of this repository, the Python of the old one, the cases, and the rounds of each."""
+
+    old: str
+    new: str = str(REPOSITORY)
+    old_python: str = sys.executable
+    cases: Sequence[str] = tuple(MIN_RATIO)
+    rounds: int = 5
 
 
 class AgainstFailed(MobeeError):
-    """A checkout that is not there, or a case that does not run in it; the message is its last word."""
+    """A checkout that does not exist, or a case that does not run in it; the message has the last line of its output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,20 +76,20 @@ class Checkout:
     python: str = sys.executable
 
     def start(self, case: str) -> Worker:
-        """A process that prepares the case."""
+        """Start a process that prepares the case."""
         return Worker(self, case)
 
 
 class Worker:
-    """A process of one checkout that does the work of a case.  A context: it ends with it."""
+    """A process of one checkout that does the work of a case.  A context manager: the process ends with it."""
 
     def __init__(self, checkout: Checkout, case: str) -> None:
         self._checkout, self._case = checkout, case
         environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": str(checkout.folder)}
         argv = [checkout.python, "-P", str(_CASES), case]
-        self._news = tempfile.TemporaryFile("w+")
+        self._log = tempfile.TemporaryFile("w+")
         self._process = subprocess.Popen(
-            argv, cwd=checkout.folder, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._news, text=True
+            argv, cwd=checkout.folder, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True
         )
 
     def __enter__(self) -> Worker:
@@ -87,46 +99,46 @@ class Worker:
         assert self._process.stdin is not None and self._process.stdout is not None
         if error is not None:
             self._process.terminate()
-        with contextlib.suppress(BrokenPipeError):  # it has ended before
+        with contextlib.suppress(BrokenPipeError):  # the process has ended before
             self._process.stdin.close()
         self._process.wait()
         self._process.stdout.close()
-        self._news.close()
+        self._log.close()
 
-    def prepared(self) -> None:
-        """Wait until it is ready to work; raises AgainstFailed."""
-        library = Path(self._heard()["library"])
+    def await_ready(self) -> None:
+        """Wait until the case is prepared; raises AgainstFailed."""
+        library = Path(self._answer()["library"])
         if not library.is_relative_to(self._checkout.folder):
             raise AgainstFailed(f"{self._case}: the library was taken from {library}, not from {self._checkout.folder}")
 
     def work(self) -> dict[str, Any]:
-        """Do the work once: what the process says of it; raises AgainstFailed."""
+        """Do the work once; returns the seconds and counts that the process reports.  Raises AgainstFailed."""
         assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # `_heard` says why
+        with contextlib.suppress(BrokenPipeError):  # `_answer` raises with the reason
             print("again", file=self._process.stdin, flush=True)
-        return self._heard()
+        return self._answer()
 
-    def _heard(self) -> dict[str, Any]:
+    def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
-        said = self._process.stdout.readline()
-        if not said:
+        line = self._process.stdout.readline()
+        if not line:
             self._process.wait()
-            self._news.seek(0)
-            last = (self._news.read().strip().splitlines() or ["it said nothing"])[-1]
+            self._log.seek(0)
+            last = (self._log.read().strip().splitlines() or ["no output"])[-1]
             raise AgainstFailed(f"{self._case} in {self._checkout.folder}: {last}")
-        heard: dict[str, Any] = json.loads(said)
-        return heard
+        answer: dict[str, Any] = json.loads(line)
+        return answer
 
 
 @contextlib.contextmanager
-def checkout(what: str, python: str = sys.executable) -> Iterator[Checkout]:
-    """A folder, or a commit of this repository as a folder that is there meanwhile; raises AgainstFailed."""
-    if what and Path(what).is_dir():
-        yield Checkout(Path(what).resolve(), python)
+def checkout(folder_or_commit: str, python: str = sys.executable) -> Iterator[Checkout]:
+    """Yield a folder as a checkout, or a commit of this repository in a temporary folder; raises AgainstFailed."""
+    if folder_or_commit and Path(folder_or_commit).is_dir():
+        yield Checkout(Path(folder_or_commit).resolve(), python)
         return
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch).resolve() / "old"
-        _git("worktree", "add", "--detach", str(folder), what)
+        _git("worktree", "add", "--detach", str(folder), folder_or_commit)
         try:
             yield Checkout(folder, python)
         finally:
@@ -135,22 +147,28 @@ def checkout(what: str, python: str = sys.executable) -> Iterator[Checkout]:
 
 def _git(*words: str) -> None:
     try:
-        subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=True)
+        subprocess.run(["git", "-C", str(REPOSITORY), *words], capture_output=True, text=True, check=True)
     except FileNotFoundError:
         raise AgainstFailed("git is not installed: give a folder instead of a commit") from None
     except subprocess.CalledProcessError as error:
         raise AgainstFailed(f"git {words[0]}: {error.stderr.strip().splitlines()[-1]}") from None
 
 
-def measure(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
-    """Everything that `mobee bench against --json` prints; raises AgainstFailed."""
+def measure(settings: Settings) -> dict[str, Any]:
+    """Measure, and return all numbers and the verdict; raises AgainstFailed."""
+    with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
+        return measure_checkouts(old, new, settings.cases, settings.rounds)
+
+
+def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
+    """Measure the cases in two checkouts; raises AgainstFailed."""
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:
         for done in range(len(cases) * rounds):
             number, index = divmod(done, len(cases))
             case = cases[index]
             progress.show(done / (len(cases) * rounds), f"{case}, round {number + 1} of {rounds}")
-            pairs[case].append(_round(old, new, case, turns=FEWER_TURNS.get(case, TURNS)))
+            pairs[case].append(_round(old, new, case, turns=TURNS_OF_LONG_CASES.get(case, TURNS)))
     found = {case: compared(of_case) for case, of_case in pairs.items()}
     return {"rounds": rounds, "cases": found, **verdict(found)}
 
@@ -160,18 +178,18 @@ def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
     with old.start(case) as one, new.start(case) as other:
         workers = {"old": one, "new": other}
         for worker in workers.values():
-            worker.prepared()
+            worker.await_ready()
         work = {}
         for turn in range(turns):
             for name in ("old", "new") if turn % 2 == 0 else ("new", "old"):
-                said = workers[name].work()
-                seconds[name] += said["seconds"]
-                work[name] = said["work"]
+                answer = workers[name].work()
+                seconds[name] += answer["seconds"]
+                work[name] = answer["work"]
     return {name: {"seconds": seconds[name] / turns, "work": work[name]} for name in workers}
 
 
 def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
-    """The rounds of one case: medians of times and ratios, and the spread of these."""
+    """Return medians of the times and ratios of one case over its rounds, and the spread of the ratios."""
     old, new = (np.array([one[which]["seconds"] for one in rounds]) for which in ("old", "new"))
     ratios = old / new
     lower, middle, upper = np.percentile(ratios, [25, 50, 75])
@@ -188,22 +206,22 @@ def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
 
 
 def verdict(found: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Whether every case is as much faster as required; a little less than 1 counts as no slower."""
-    required = [judged(case, one["ratio"], at_least=LEAST[case] if LEAST[case] > 1.0 else EQUAL) for case, one in found.items()]
-    return {"requirements": required, "passed": all_passed(required)}
+    """Return whether every case is as much faster as required; a little less than 1 counts as no slower."""
+    required = [judged(case, one["ratio"], at_least=MIN_RATIO[case] if MIN_RATIO[case] > 1.0 else NO_SLOWER) for case, one in found.items()]
+    return verdicts.verdict(required)
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The measurements as text."""
+    """Format the measurements."""
     lines = [f"Processor time of the same work, medians of {result['rounds']} rounds; ratio: old over new"]
     lines.append(f"{'':<20}{'old, s':>9}{'new, s':>9}{'ratio':>8}{'quartiles':>15}{'range':>15}")
     for case, one in result["cases"].items():
         quartiles, spread = (f"{low:.2f} - {high:.2f}" for low, high in (one["quartiles"], one["range"]))
         lines.append(f"{case:<20}{one['old_s']:>9.3f}{one['new_s']:>9.3f}{one['ratio']:>8.2f}{quartiles:>15}{spread:>15}")
         if not one["same_work"]:
-            lines += [f"    {which}: {_told(work)}" for which, work in one["work"].items()]
-    return "\n".join([*lines, "required", *requirement.lines(result["requirements"])])
+            lines += [f"    {which}: {_counts_text(work)}" for which, work in one["work"].items()]
+    return verdicts.report_text([*lines, "required"], result)
 
 
-def _told(work: Mapping[str, float]) -> str:
+def _counts_text(work: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {count:g}" for name, count in work.items())

@@ -1,9 +1,10 @@
-"""The cases of `mobee bench against`: each is run in a fresh process, with the library and the workloads of the checkout that is measured.
+"""The cases of `mobee bench against`; each runs in a fresh process, with the library and the workloads of the checkout that is measured.
 
     PYTHONPATH=CHECKOUT python -P against_cases.py CASE
 
-So nothing is imported here that commit 10a73fe does not have.  The process prepares the case, does its work once to warm up, and again
-for every line that it reads; each time it prints as JSON the processor time, and numbers that tell whether two checkouts did the same.
+Checkouts back to commit 10a73fe can be measured: what has moved since then is imported by `_first`.  The process prepares the case, does
+its work once to warm up, and again for every line that it reads; each time it prints as JSON the processor time, and counts that show
+whether two checkouts did the same work.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ from typing import Any
 
 import numpy as np
 
-Done = tuple[float, dict[str, float]]  # processor time [s], and what was done
+Done = tuple[float, dict[str, float]]  # processor time [s], and counts of the work done
 Work = Callable[[], Done]
 
 STRATEGIES = ("random", "greedy", "intrinsic")
 PLANTS = 64
 TRIES = 100  # of 6400 of a run of chapter 8
-LOCKSTEP = (100, 3100)  # ticks of two runs: their difference is without the start
+LOCKSTEP_TICKS = (100, 3100)  # of two runs: their difference is without the start
 
 
 def main() -> None:
-    """Prepare a case, and do its work as often as asked."""
+    """Prepare a case, and do its work once for every line of standard input."""
     import mobee
 
     name = sys.argv[1]
@@ -45,25 +46,41 @@ def main() -> None:
         print(json.dumps({"seconds": seconds, "work": done}), flush=True)
 
 
+def _first(*names: str) -> Any:
+    """Return the first of these modules that the checkout has."""
+    for name in names:
+        try:
+            return importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if not name.startswith(error.name or " "):
+                raise
+    raise ModuleNotFoundError(f"neither {' nor '.join(names)} is in this checkout")
+
+
+def _plant_workload() -> Any:
+    return _first("experiments.bench.plant_workload", "experiments.bench.plant")  # old first: `plant` was once another module
+
+
 def _one_arm() -> Work:
-    from experiments.bench.plant_workload import arm_plant, one_arm
+    workload = _plant_workload()
 
     def work() -> Done:
-        pace = one_arm(arm_plant(), 300)
+        pace = workload.one_arm(workload.arm_plant(), 300)
         return pace.seconds, {"ticks": pace.ticks, "actions": pace.ended}
 
     return work
 
 
 def _many_plants() -> Work:
-    """As many actions of an arm: of one plant where there are no batches, of a batch elsewhere."""
+    """The same number of actions of an arm: by one plant in checkouts without batches, by a batch in others."""
     import mobee
-    from experiments.bench.plant_workload import DT, LEFT, LEVELS, SEED, robot
 
-    body, together = robot(), getattr(mobee, "advance_together", None)
+    workload = _plant_workload()
+    DT, LEFT, SEED = workload.DT, workload.LEFT, workload.SEED
+    body, together = workload.robot(), getattr(mobee, "advance_together", None)
     gains, count = mobee.Gains.published_2014(), PLANTS if together else 1
     plants = [mobee.OfflinePlant(mobee.Model(body), SEED + k, gains, dt=DT, active=LEFT) for k in range(count)]
-    space = mobee.Lattice(body, LEFT, LEVELS)
+    space = mobee.Lattice(body, LEFT, workload.LEVELS)
     states = np.random.default_rng(SEED).integers(len(space), size=10 * PLANTS)
     goals = [space.target(int(state)) for state in states]
 
@@ -86,38 +103,27 @@ def _many_plants() -> Work:
 
 
 def _reaching() -> Work:
-    from experiments.bench.plant_workload import arm_plant, one_arm_reaching
+    workload = _plant_workload()
 
     def work() -> Done:
-        pace = one_arm_reaching(arm_plant(), 100)
+        pace = workload.one_arm_reaching(workload.arm_plant(), 100)
         return pace.seconds, {"ticks": pace.ticks, "reaches": pace.ended}
 
     return work
 
 
 def _three_agents() -> Work:
-    from experiments.bench.plant_workload import three_agents
+    workload = _plant_workload()
 
     def work() -> Done:
-        pace = three_agents(300)
+        pace = workload.three_agents(300)
         return pace.seconds, {"ticks": pace.ticks, "transitions": pace.ended}
 
     return work
 
 
-def _first(*names: str) -> Any:
-    """The first of these modules that the checkout has: where it is today, then where it was at 10a73fe."""
-    for name in names:
-        try:
-            return importlib.import_module(name)
-        except ModuleNotFoundError as error:
-            if not name.startswith(error.name or " "):
-                raise
-    raise ModuleNotFoundError(f"neither {' nor '.join(names)} is in this checkout")
-
-
 def _chapter_8() -> Work:
-    """Of a run of each strategy 1/64: of the time of its 3000 transitions, its 6400 tries and its evaluations."""
+    """1/64 of a run of each strategy: of its 3000 transitions, its 6400 tries and its evaluations."""
     arm = _first("experiments.kit.reaching.arm", "experiments.reaching.scene")
     learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
     targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")
@@ -131,7 +137,7 @@ def _chapter_8() -> Work:
         plant = arm.reach_plant(0)
         agent = ReachAgent(arm.reach_space(), plant, beliefs, marker=arm.MARKER, strategy=strategy, scale=SCALE, seed=0)
         learning.learn(agent, problems, (TRIES,), 1, {"few": problems[::2]})
-        return plant.time
+        return float(plant.time)
 
     def work() -> Done:
         count = len(STRATEGIES) * 3000 * TRIES // 6400
@@ -144,29 +150,29 @@ def _chapter_8() -> Work:
 
 
 def _lockstep() -> Work:
-    """All services, without their start."""
-    summary_of = _first("experiments.kit.live.launch", "experiments.launched").summary_of
+    """Run all services; the time of their start is subtracted."""
+    summary_of = _first("experiments.kit.live.launch", "experiments.kit.live", "experiments.launched").summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        summary = summary_of("lockstep", ("services.robot_sim.kinematic=kinematic", "services.robot_sim.rate=50"), ticks=ticks)
+        summary = summary_of("lockstep", ("services.robot_sim.backend=kinematic", "services.robot_sim.rate=50"), ticks=ticks)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, summary["lockstep"]
 
-    run(LOCKSTEP[0])  # what is compiled at first use is compiled now
+    run(LOCKSTEP_TICKS[0])  # compiles what old checkouts compile at first use
 
     def work() -> Done:
-        short, long = (run(ticks) for ticks in LOCKSTEP)
+        short, long = (run(ticks) for ticks in LOCKSTEP_TICKS)
         return long[0] - short[0], {"ticks": long[1]["ticks"] - short[1]["ticks"]}
 
     return work
 
 
 def _value_iteration(warm: bool) -> Work:
-    from experiments.bench.vi_workload import at_work
     from mobee.learning.value_iteration import value_iteration
 
-    known = at_work(1000, 100)
+    problems = _first("experiments.bench.vi_workload", "experiments.bench.vi")
+    known = (getattr(problems, "after_transitions", None) or problems.at_work)(1000, 100)
     tables = known.tables
 
     def solve(start: Any) -> Any:
@@ -188,17 +194,17 @@ def _value_iteration(warm: bool) -> Work:
 
 def _inverse_kinematics(method: Any, count: int) -> Work:
     import mobee
-    from experiments.bench.ik_workload import MOTORS, scene, targets
 
-    model = scene()
-    aims = targets(model, count)
+    workload = _first("experiments.bench.ik_workload", "experiments.bench.ik")
+    model = workload.scene()
+    aims = workload.targets(model, count)
 
     def work() -> Done:
         found: list[Any] = []
 
         def solve() -> None:
             for seed, aim in enumerate(aims):
-                found.append(mobee.solve_ik(model, aim.costs(), seed=seed, motors=MOTORS, method=method, evaluations=20_000))
+                found.append(mobee.solve_ik(model, aim.costs(), seed=seed, motors=workload.MOTORS, method=method, evaluations=20_000))
 
         return _seconds(solve), {"reached": sum(one.reached for one in found), "evaluations": sum(one.evaluations for one in found)}
 
@@ -221,14 +227,14 @@ def _roadmap(method: Any, spacing: float) -> Work:
 
 
 def _edges() -> Work:
-    from experiments.bench.edges_workload import MARKER, palm_map
     from mobee.roadmap.edges import checked
 
-    roadmap = palm_map(0.015)
+    workload = _first("experiments.bench.edges_workload", "experiments.bench.edges")
+    roadmap = workload.palm_map(0.015)
 
     def work() -> Done:
         found: list[Any] = []
-        seconds = _seconds(lambda: found.append(checked(roadmap.model, roadmap.q, roadmap.edges, marker=MARKER)))
+        seconds = _seconds(lambda: found.append(checked(roadmap.model, roadmap.q, roadmap.edges, marker=workload.MARKER)))
         return seconds, {"edges": len(roadmap.edges), "poses": found[0].poses, "free": int(np.sum(found[0].free))}
 
     return work

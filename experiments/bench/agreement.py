@@ -1,8 +1,9 @@
-"""Whether the model and its peers find the same contacts, whether depths are right and minimal, and how far the peers' differ.
+"""Contacts of the model beside those of its peers: whether they are the same, and whether depths are right and minimal.
 
-Two programs may differ on whether a pair touches that overlaps by less than GRAZE.  A depth is right if it is the way out along its
-normal, and minimal if no peer knows a direction in which the way is shorter; `way_out` is the judge of both, so that a peer whose own
-depths are not minimal (MuJoCo's points of contact, the iterative searches of coal and fcl where cylinders meet) judges all the same.
+Two programs may differ on whether a pair touches that overlaps by less than MIN_OVERLAP.  A depth is *right* if it is how far the first
+volume must move along the normal until a plane separates the two; it is *minimal* if no peer knows a direction in which that is less.
+`separation` computes both, so a peer whose own depths are not minimal (MuJoCo's contact points, the iterative searches of coal and fcl
+where cylinders meet) can be used all the same.
 """
 
 from __future__ import annotations
@@ -13,23 +14,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.bench.collision_peers import CoalPeer, Volume, way_out
+from experiments.bench.collision_peers import CoalPeer
 from experiments.bench.mujoco_peer import MujocoPeer
+from experiments.bench.scenes import Scene
 from mobee.arrays import Array, Ints
 from mobee.model.model import Model
 from mobee.model.pose import Pose
-from mobee.model.world import World
-from mobee.robot.robot import Robot
+from mobee.model.world_object import WorldObject
+from mobee.robot.robot import Shape
 
-GRAZE = 1e-6  # m
-MINIMAL = 1e-9  # m; how far a depth may be from the way along its normal, and beyond the way along a peer's
-_EXACT = {"coal": 1e-6, "python-fcl": 2e-6}  # m; how far the depths may differ without cylinders and hulls; fcl's own tolerance is 1e-6
-UNKNOWN = 1e3  # m; a depth that is no depth
-_SEARCHED = {"cylinder", "convex"}
+MIN_OVERLAP = 1e-6  # m
+DEPTH_TOLERANCE = 1e-9  # m; of a depth from the separation along its normal, and beyond that along a peer's
+_PEER_TOLERANCE = {"coal": 1e-6, "python-fcl": 2e-6}  # m; difference of depths without cylinders and hulls; fcl's own tolerance is 1e-6
+UNKNOWN_DEPTH = 1e3  # m; a peer reports more where it computes no depth
+_SEARCHED = {"cylinder", "convex"}  # kinds for which peers search iteratively
 
 Pair = tuple[int, int]
-# Detection in one pose: pairs (c, 2) of volumes, depths (c,) m and where the first must move (c, 3).
+# Detection in one pose: pairs (c, 2) of volumes, depths (c,) m and directions (c, 3) that move the first out.
 Detect = Callable[[int], tuple[Ints, Array, Array]]
+
+Volume = Shape | WorldObject
+Place = tuple[Array, Array]
+"""Pose of a volume: position (3,) m and rotation (3, 3), root frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,30 +50,20 @@ class Agreement:
     other_pairs: int  # found by one of the two only
     deepest_other: float  # m, depth of the deepest such pair
     depth_difference: dict[str, float]  # m, greatest by kinds, "box-capsule"
-    same_depths: float  # share of the contacts in which they differ by no more than MINIMAL
-    beaten: float  # m, by how much the way out along a normal of the peer's is shorter at most
+    same_depths: float  # share of the contacts in which they differ by no more than DEPTH_TOLERANCE
+    beaten: float  # m, by how much the separation along a normal of the peer's is less, at most
     passed: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """A robot in a world, and poses (B, n)."""
-
-    name: str
-    robot: Robot
-    world: World
-    q: Array
-
-
-class Found:
-    """The model's contacts in a scene, pose by pose, and where all volumes are."""
+class ModelContacts:
+    """The model's contacts in a scene, pose by pose, and the poses of all volumes."""
 
     def __init__(self, scene: Scene) -> None:
         pose: Pose = Model(scene.robot, scene.world).evaluate(scene.q)
         table, self._transforms = pose.table, pose.transforms
         self.contacts: list[dict[Pair, tuple[float, Array]]] = [{} for _ in scene.q]
         for at, first, second, depth, normal in zip(
-            *(getattr(table, what).tolist() for what in ("pose", "first", "second", "depth")), table.normal, strict=True
+            *(getattr(table, name).tolist() for name in ("pose", "first", "second", "depth")), table.normal, strict=True
         ):
             self.contacts[at][first, second] = depth, normal
         self.volumes: tuple[Volume, ...] = (*scene.robot.shapes, *scene.world.objects.values())
@@ -76,23 +72,23 @@ class Found:
     def __len__(self) -> int:
         return sum(map(len, self.contacts))
 
-    def way(self, pose: int, pair: Pair, direction: Array) -> float:
-        """The way [m] out of the second volume for the first, along the unit vector (3,)."""
+    def separation(self, pose: int, pair: Pair, direction: Array) -> float:
+        """Return how far [m] the first volume must move along the unit vector (3,) to leave the second."""
         (first, at), (second, there) = (self._placed(pose, index) for index in pair)
-        return way_out(first, at, second, there, direction)
+        return separation(first, at, second, there, direction)
 
-    def off(self) -> float:
-        """By how much a depth differs from the way along its normal at most [m]."""
+    def depth_error(self) -> float:
+        """Return by how much a depth differs from the separation along its normal, at most [m]."""
         return max(
             (
-                abs(self.way(at, pair, normal) - depth)
+                abs(self.separation(at, pair, normal) - depth)
                 for at, contacts in enumerate(self.contacts)
                 for pair, (depth, normal) in contacts.items()
             ),
             default=0.0,
         )
 
-    def _placed(self, pose: int, index: int) -> tuple[Volume, tuple[Array, Array]]:
+    def _placed(self, pose: int, index: int) -> tuple[Volume, Place]:
         volume = self.volumes[index]
         if index >= len(self._links):
             return volume, (volume.position, volume.rotation)
@@ -101,16 +97,16 @@ class Found:
 
 
 def agreements(scene: Scene, with_coal: bool) -> tuple[list[Agreement], float]:
-    """The model beside MuJoCo, python-fcl and, if it is there, coal; and how far a depth is from the way along its normal at most [m]."""
-    ours = Found(scene)
+    """Compare the model with MuJoCo, python-fcl and, on request, coal; returns that and the model's largest depth error [m]."""
+    ours = ModelContacts(scene)
     peers: dict[str, Detect] = {"MuJoCo": _mujoco(scene), "python-fcl": _fcl(scene)}
     if with_coal:
         peers["coal"] = _coal(scene)
-    return [compared(name, scene, ours, detect) for name, detect in peers.items()], ours.off()
+    return [compared(name, scene, ours, detect) for name, detect in peers.items()], ours.depth_error()
 
 
-def compared(peer: str, scene: Scene, ours: Found, detect: Detect) -> Agreement:
-    """The model beside one peer."""
+def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Agreement:
+    """Compare the model with one peer."""
     other: list[float] = []
     differences: dict[str, list[float]] = defaultdict(list)
     beaten = 0.0
@@ -119,10 +115,10 @@ def compared(peer: str, scene: Scene, ours: Found, detect: Detect) -> Agreement:
         other += [(mine.get(pair) or theirs[pair])[0] for pair in mine.keys() ^ theirs.keys()]
         for pair in mine.keys() & theirs.keys():
             depth, normal = theirs[pair]
-            if not (abs(depth) < UNKNOWN and np.isfinite(normal).all()):
-                continue  # coal knows no depth of some cylinders
+            if not (abs(depth) < UNKNOWN_DEPTH and np.isfinite(normal).all()):
+                continue  # coal computes no depth of some cylinders
             differences["-".join(sorted(ours.volumes[index].kind for index in pair))].append(abs(mine[pair][0] - depth))
-            beaten = max(beaten, mine[pair][0] - ours.way(at, pair, normal))
+            beaten = max(beaten, mine[pair][0] - ours.separation(at, pair, normal))
     difference = {kinds: max(found) for kinds, found in sorted(differences.items())}
     every = [value for found in differences.values() for value in found]
     return Agreement(
@@ -134,16 +130,16 @@ def compared(peer: str, scene: Scene, ours: Found, detect: Detect) -> Agreement:
         other_pairs=len(other),
         deepest_other=max(other, default=0.0),
         depth_difference=difference,
-        same_depths=float(np.mean(np.array(every) <= MINIMAL)) if every else 1.0,
+        same_depths=float(np.mean(np.array(every) <= DEPTH_TOLERANCE)) if every else 1.0,
         beaten=beaten,
-        passed=max(other, default=0.0) < GRAZE and beaten <= MINIMAL and _exact(peer, difference),
+        passed=max(other, default=0.0) < MIN_OVERLAP and beaten <= DEPTH_TOLERANCE and _depths_agree(peer, difference),
     )
 
 
-def _exact(peer: str, difference: Mapping[str, float]) -> bool:
-    """Whether the depths are the same where this peer knows closed forms for them, or finds them to its tolerance."""
+def _depths_agree(peer: str, difference: Mapping[str, float]) -> bool:
+    """Whether the depths are the same where this peer has closed forms for them, or finds them to its tolerance."""
     judged = [value for kinds, value in difference.items() if not _SEARCHED & set(kinds.split("-"))]
-    return peer not in _EXACT or max(judged, default=0.0) <= _EXACT[peer]
+    return peer not in _PEER_TOLERANCE or max(judged, default=0.0) <= _PEER_TOLERANCE[peer]
 
 
 def _by_pair(pairs: Ints, depths: Array, normals: Array) -> dict[Pair, tuple[float, Array]]:
@@ -176,3 +172,28 @@ def _fcl(scene: Scene) -> Detect:
 def _coal(scene: Scene) -> Detect:
     peer = CoalPeer(scene.robot, scene.world.snapshot)
     return lambda pose: peer.touching(scene.q[pose])
+
+
+def separation(first: Volume, at: Place, second: Volume, there: Place, direction: Array) -> float:
+    """Return how far [m] the first must move along the unit vector (3,) until a plane separates it from the second."""
+    return extent(second, there, direction) + extent(first, at, -direction)
+
+
+def extent(volume: Volume, place: Place, direction: Array) -> float:
+    """Return the support function [m]: how far the volume extends along the unit vector (3,), from the root's origin."""
+    position, rotation = place
+    along = rotation.T @ direction
+    return float(direction @ position) + _own_extent(volume, along)
+
+
+def _own_extent(volume: Volume, along: Array) -> float:
+    size = volume.size
+    if volume.kind == "box":
+        return 0.5 * float(np.abs(along) @ size)
+    if volume.kind == "convex":
+        assert isinstance(volume, Shape) and volume.vertices is not None
+        return float((volume.vertices @ along).max())
+    if volume.kind == "sphere":
+        return size[0]
+    side = float(np.hypot(along[0], along[1])) if volume.kind == "cylinder" else 1.0
+    return size[0] * side + 0.5 * size[1] * abs(float(along[2]))

@@ -1,11 +1,11 @@
-"""The calibration loop: fixed work, none of it MoBeE's, beside which figures are judged that have no peer.
+"""The calibration loop: fixed work, none of it MoBeE's, with which times are compared that have no peer.
 
 A third of its time each goes to Python (calls, a dictionary, floating point numbers), to NumPy on arrays of a few numbers and to NumPy on
-arrays of thousands: what programs of numbers are made of.  The *standard machine* does the loop in STANDARD seconds.  A time that
-was measured here, times the speed of this machine beside it, is the time in seconds of the standard machine, and verdicts rest on that:
-they stay what they are on a machine three times slower, and while others use this one.  Absolute figures are printed without a verdict.
+arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is measured
+here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time: they
+are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.
 
-For several processes at work together there is a `Crew`: helpers that do the same work, each a process.
+For work of several processes at once there is a `Crew`: helper processes that do the same loop.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from numpy.typing import NDArray
 
 T = TypeVar("T")
 
-STANDARD = 0.010
-"""Seconds of the loop on the standard machine: one quiet core of the machine on which the requirements were set."""
-STANDARD_EXCHANGE = 0.016
-"""Seconds of the loop there for two processes that exchange a message for every portion."""
-FRESH = 0.5  # s for which a measured speed counts as that of now
-PORTIONS = 50  # that make up a loop: each about what a service does in a tick
-_CALLS, _SMALL, _LARGE = 380, 12, 3  # of one portion
+STANDARD_SECONDS = 0.010
+"""Time of the loop on the standard machine: one quiet core of the machine on which the requirements were set."""
+STANDARD_EXCHANGE_SECONDS = 0.016
+"""Time of the loop there for two processes that exchange a message for every portion."""
+SPEED_LIFETIME = 0.5  # s for which a measured speed counts as the present one
+PORTIONS = 50  # of a loop; each is about the work of a service in a tick
+_CALLS, _SMALL, _LARGE = 380, 12, 3  # repetitions in one portion
 _MATRIX = np.random.default_rng(0).normal(size=(4, 4))
 _ANGLES = np.linspace(0.0, 3.0, 2048)
 
 
 def portion() -> float:
-    """A fiftieth of the loop."""
+    """Do a fiftieth of the loop; returns a number that depends on all of it."""
     return _interpreted(_CALLS) + _on_small_arrays(_SMALL) + _on_large_arrays(_LARGE)
 
 
 def loop() -> None:
-    """The work itself."""
+    """Do the whole work."""
     for _ in range(PORTIONS):
         portion()
 
@@ -75,61 +75,56 @@ def _on_large_arrays(count: int) -> float:
 
 
 def speed(loops: int = 3) -> float:
-    """How fast this machine is now, in multiples of the standard machine: the median of some loops."""
+    """Return the present speed of this machine as a multiple of the standard machine's: the median of some loops."""
     seconds = []
     for _ in range(loops):
         start = time.process_time()
         loop()
         seconds.append(time.process_time() - start)
-    return STANDARD / float(np.median(seconds))
+    return STANDARD_SECONDS / float(np.median(seconds))
 
 
 class Calibration:
-    """Says how fast this machine was while something was measured, by looks before and after, at most two a second."""
+    """Measures the speed of this machine before and after other measurements, at most twice a second."""
 
-    def __init__(self, look: Callable[[], float] = speed) -> None:
-        """`look`: measures the speed; by default that of this process."""
-        self._look_now = look
-        self._last, self._at = 0.0, -math.inf
+    def __init__(self, measure_speed: Callable[[], float] = speed) -> None:
+        """`measure_speed`: by default of this process."""
+        self._measure_speed = measure_speed
+        self._last, self._last_time = 0.0, -math.inf
         self.speeds: list[float] = []
-        """All that were seen."""
+        """All measured speeds."""
 
     def around(self, run: Callable[[], T]) -> tuple[T, float]:
-        """What `run` gives, and the machine's speed about it: seconds, times that, are seconds of the standard machine."""
-        before = self._look()
+        """Return the result of `run`, and the speed of the machine around it: seconds times that are seconds on the standard machine."""
+        before = self._present_speed()
         result = run()
-        return result, 0.5 * (before + self._look())
+        return result, 0.5 * (before + self._present_speed())
 
     @property
     def median(self) -> float:
-        """The speed of this machine, over all."""
+        """The median of all measured speeds."""
         return float(np.median(self.speeds))
 
-    def _look(self) -> float:
-        if time.monotonic() - self._at > FRESH:
-            self._last = self._look_now()
-            self._at = time.monotonic()
+    def _present_speed(self) -> float:
+        if time.monotonic() - self._last_time > SPEED_LIFETIME:
+            self._last = self._measure_speed()
+            self._last_time = time.monotonic()
             self.speeds.append(self._last)
         return self._last
 
 
-def told(speed: float) -> str:
-    """A line about this machine, for reports."""
-    return f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"
-
-
 class Crew:
-    """Helper processes that do the calibration's work when they are told to.  A context: they end with it."""
+    """Helper processes that do the calibration's work on request.  A context manager: they end with it."""
 
     def __init__(self, count: int) -> None:
         self._ends: list[socket.socket] = []
         self._processes: list[subprocess.Popen[bytes]] = []
         for _ in range(count):
             here, there = socket.socketpair()
-            self._processes.append(_helper(there, there))
+            self._processes.append(_start_helper(there, there))
             there.close()
             self._ends.append(here)
-        self.loops(1)  # all are up
+        self.loops(1)  # returns when all are up
 
     def __enter__(self) -> Crew:
         return self
@@ -138,20 +133,21 @@ class Crew:
         _end(self._ends, self._processes)
 
     def loops(self, count: int = 3) -> float:
-        """The machine's speed, in wall time, while everyone does the loop at once."""
-        return STANDARD / self._told(_LOOP, 1, count)
+        """Return the machine's speed, in wall time, while all helpers do the loop at once."""
+        return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
     def exchanges(self, count: int = 5) -> float:
-        """The same when each portion is asked for and answered by a message, and nobody goes on before everybody has answered."""
-        return STANDARD_EXCHANGE / self._told(_PORTION, PORTIONS, count)
+        """Return the speed where each portion is requested and answered by a message, and the next one waits for all answers."""
+        return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 
-    def _told(self, what: bytes, times: int, count: int) -> float:
+    def _request(self, message: bytes, times: int, count: int) -> float:
+        """Return the median wall time [s] of `count` times sending the message `times` times to all helpers and awaiting answers."""
         seconds = []
         for _ in range(count):
             start = time.perf_counter()
             for _ in range(times):
                 for end in self._ends:
-                    end.sendall(what)
+                    end.sendall(message)
                 for end in self._ends:
                     end.recv(1)
             seconds.append(time.perf_counter() - start)
@@ -159,24 +155,24 @@ class Crew:
 
 
 def bare_ages(rate: float, seconds: float, helpers: int = 2) -> NDArray[np.int64]:
-    """Ages in ticks of the answers of a bare chain: what the machine's scheduling costs the live system.
+    """Return the ages [ticks] of the answers of a bare chain of processes: the delay that the machine's scheduling costs the live system.
 
-    Once a tick this process looks for what the chain has answered, notes how many ticks ago that was asked, does a portion and sends
-    the tick to the first of the helpers, each of which does a portion and hands it on.
+    Once a tick this process reads the chain's newest answer, notes how many ticks ago its request was sent, does a portion and sends
+    the tick to the first helper; each helper does a portion and passes the tick on.
     """
     pairs = [socket.socketpair() for _ in range(helpers + 1)]
-    processes = [_helper(pairs[number][1], pairs[number + 1][0]) for number in range(helpers)]
+    processes = [_start_helper(pairs[number][1], pairs[number + 1][0]) for number in range(helpers)]
     ages, answered = [], 0
     first, last = pairs[0][0], pairs[-1][1]
     try:
         first.sendall(_message(0))
-        last.recv(_BYTES)  # all are up
+        last.recv(_MESSAGE_BYTES)  # returns when all are up
         last.setblocking(False)
         start = time.monotonic()
         for tick in range(1, round(rate * seconds) + 1):
             time.sleep(max(0.0, start + tick / rate - time.monotonic()))
             with contextlib.suppress(BlockingIOError):
-                answered = _newest(last.recv(65536), answered)
+                answered = _newest_tick(last.recv(65536), answered)
             ages.append(tick - answered)
             portion()
             first.sendall(_message(tick))
@@ -186,21 +182,21 @@ def bare_ages(rate: float, seconds: float, helpers: int = 2) -> NDArray[np.int64
 
 
 _LOOP, _PORTION = b"l", b"p"
-_BYTES = 16  # of a tick's message
+_MESSAGE_BYTES = 16  # of a tick
 
 
 def _message(tick: int) -> bytes:
-    return f"t{tick:0{_BYTES - 1}}".encode()
+    return f"t{tick:0{_MESSAGE_BYTES - 1}}".encode()
 
 
-def _newest(received: bytes, before: int) -> int:
-    whole = received[: len(received) // _BYTES * _BYTES]
-    return int(whole[1 - _BYTES :]) if whole else before
+def _newest_tick(received: bytes, before: int) -> int:
+    whole = received[: len(received) // _MESSAGE_BYTES * _MESSAGE_BYTES]
+    return int(whole[1 - _MESSAGE_BYTES :]) if whole else before
 
 
-def _helper(gets: socket.socket, puts: socket.socket) -> subprocess.Popen[bytes]:
-    argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.calibration", str(gets.fileno()), str(puts.fileno())]
-    return subprocess.Popen(argv, pass_fds=(gets.fileno(), puts.fileno()))
+def _start_helper(receives: socket.socket, sends: socket.socket) -> subprocess.Popen[bytes]:
+    argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.calibration", str(receives.fileno()), str(sends.fileno())]
+    return subprocess.Popen(argv, pass_fds=(receives.fileno(), sends.fileno()))
 
 
 def _end(ends: Sequence[socket.socket], processes: Sequence[subprocess.Popen[bytes]]) -> None:
@@ -210,18 +206,18 @@ def _end(ends: Sequence[socket.socket], processes: Sequence[subprocess.Popen[byt
         process.wait()
 
 
-def _help(gets: int, puts: int) -> None:
-    """Do what each message says and hand on its answer, until nobody sends any more."""
-    while received := os.read(gets, 65536):
+def _serve(receives: int, sends: int) -> None:
+    """Do the work that each message asks for and send the answer on, until the other end is closed.  Arguments: file descriptors."""
+    while received := os.read(receives, 65536):
         if received[:1] == _LOOP:
             loop()
             answer = _LOOP
         else:
             portion()
-            answer = received[-_BYTES:] if received[:1] == b"t" else _PORTION
-        os.write(puts, answer)
+            answer = received[-_MESSAGE_BYTES:] if received[:1] == b"t" else _PORTION
+        os.write(sends, answer)
 
 
 if __name__ == "__main__":
     with contextlib.suppress(BrokenPipeError):
-        _help(int(sys.argv[1]), int(sys.argv[2]))
+        _serve(int(sys.argv[1]), int(sys.argv[2]))

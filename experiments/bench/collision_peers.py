@@ -1,6 +1,6 @@
-"""python-fcl and coal on the workload, and the exact separation depth along a direction.
+"""python-fcl and coal on the benchmark's scenes.
 
-Only whether each pair touches is asked for, which is the least that fcl can do.
+python-fcl is asked only whether each pair touches, which is the cheapest of its queries.
 """
 
 from __future__ import annotations
@@ -10,43 +10,41 @@ from typing import Any
 
 import numpy as np
 
+from experiments.bench.peers import import_peer
 from mobee.arrays import Array, Ints
-from mobee.errors import MobeeError
-from mobee.model.fcl_engine import (
-    fcl,  # raises NotInstalled
-    tested_pairs,
-)
+from mobee.model.fcl_engine import tested_pairs  # raises NotInstalled without python-fcl
 from mobee.model.snapshot import NO_HANDS, Snapshot
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape
 
+fcl = import_peer("fcl", "python-fcl")
 _MAKERS = {"sphere": fcl.Sphere, "capsule": fcl.Capsule, "box": fcl.Box}
 
 
-class _Placer:
+class _FclScene:
     """fcl's objects of a robot and a world; only the robot's are moved."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
-        self.shapes = [_object(shape) for shape in robot.shapes]
-        self.things = [_object(thing) for thing in snapshot.objects.values()]
+        self.shapes = [_fcl_object(shape) for shape in robot.shapes]
+        self.objects = [_fcl_object(one) for one in snapshot.objects.values()]
         self._links = np.array([shape.link for shape in robot.shapes])
         self._zero = np.tile(np.eye(4), (len(robot.shapes), 1, 1))
         for pose, shape in zip(self._zero, robot.shapes, strict=True):
             pose[:3, :3], pose[:3, 3] = shape.rotation, shape.position
 
     def place(self, transforms: Array) -> None:
-        """Move the shapes to where their links are, (L, 4, 4)."""
+        """Move the shapes with their links, whose poses are (L, 4, 4)."""
         now = transforms[self._links] @ self._zero
         for body, turn, at in zip(self.shapes, now[:, :3, :3], now[:, :3, 3], strict=True):
             body.setTransform(fcl.Transform(turn, at))
 
 
-class FclPairs(_Placer):
-    """Every tested pair, one after the other."""
+class FclPairs(_FclScene):
+    """Detection that tests every pair, one after the other."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
-        volumes = self.shapes + self.things
+        volumes = self.shapes + self.objects
         first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
         self._pairs = [(volumes[a], volumes[b]) for a, b in zip(first, second, strict=True)]
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()
@@ -55,64 +53,57 @@ class FclPairs(_Placer):
         return len(self._pairs)
 
     def detect(self, transforms: Array) -> int:
-        """How many pairs touch in the pose of `transforms` (L, 4, 4)."""
+        """Return how many pairs touch in the pose of `transforms` (L, 4, 4)."""
         self.place(transforms)
         request, result, collide = self._request, self._result, fcl.collide
         return sum(collide(a, b, request, result) > 0 for a, b in self._pairs)
 
 
-class FclTrees(_Placer):
-    """Dynamic trees of axis-aligned boxes, one for the robot and one for the world, and a callback for what they let through."""
+class FclTrees(_FclScene):
+    """Detection by trees of axis-aligned boxes, one for the robot and one for the world; a callback tests pairs whose boxes meet."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
         self._robot, self._world = fcl.DynamicAABBTreeCollisionManager(), fcl.DynamicAABBTreeCollisionManager()
-        for manager, bodies in ((self._robot, self.shapes), (self._world, self.things)):
+        for manager, bodies in ((self._robot, self.shapes), (self._world, self.objects)):
             manager.registerObjects(bodies)
             manager.setup()
         first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
-        volumes = [id(body) for body in self.shapes + self.things]
+        volumes = [id(body) for body in self.shapes + self.objects]
         self._tested = {key for a, b in zip(first, second, strict=True) for key in ((volumes[a], volumes[b]), (volumes[b], volumes[a]))}
         self._request, self._result = fcl.CollisionRequest(), fcl.CollisionResult()
-        self._has_world = bool(self.things)
+        self._has_world = bool(self.objects)
 
     def detect(self, transforms: Array) -> int:
-        """How many pairs touch in the pose of `transforms` (L, 4, 4)."""
+        """Return how many pairs touch in the pose of `transforms` (L, 4, 4)."""
         self.place(transforms)
         self._robot.update()
         touching = [0]
-        self._robot.collide(touching, self._near)
+        self._robot.collide(touching, self._test_pair)
         if self._has_world:
-            self._robot.collide(self._world, touching, self._near)
+            self._robot.collide(self._world, touching, self._test_pair)
         return touching[0]
 
-    def _near(self, one: Any, other: Any, touching: list[int]) -> bool:
+    def _test_pair(self, one: Any, other: Any, touching: list[int]) -> bool:
         if (id(one), id(other)) in self._tested and fcl.collide(one, other, self._request, self._result) > 0:
             touching[0] += 1
-        return False  # go on
+        return False  # continue
 
 
-def _object(volume: Shape | WorldObject) -> Any:
+def _fcl_object(volume: Shape | WorldObject) -> Any:
     return fcl.CollisionObject(_MAKERS[volume.kind](*volume.size), fcl.Transform(volume.rotation, volume.position))
 
 
-# Of coal's iterative searches [m]: with larger tolerances it misses contacts of cylinders, and by its plain search some of micrometres.
+# Of coal's iterative searches [m]: with larger tolerances it misses contacts of cylinders, and with its plain search some of micrometres.
 _TOLERANCE, _ITERATIONS, _SEARCH = 1e-12, 1000, "NesterovAcceleration"
-
-
-class CoalMissing(MobeeError):
-    """Raised when coal is asked for and Pinocchio, which brings it, is not installed."""
 
 
 class CoalPeer:
     """A robot and the objects of a world as Pinocchio's models, with the same tested pairs."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
-        try:
-            import coal
-            import pinocchio
-        except ImportError:
-            raise CoalMissing("coal is not installed: pip install '.[dev]' in MoBeE's folder") from None
+        """Raises NotInstalled; Pinocchio brings coal."""
+        coal, pinocchio = (import_peer(module, "coal", extra="dev") for module in ("coal", "pinocchio"))
         self._pin, self._coupling = pinocchio, robot.coupling
         first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
         self.pairs = np.stack([first, second], axis=1)
@@ -130,10 +121,10 @@ class CoalPeer:
             request.gjk_max_iterations = request.epa_max_iterations = _ITERATIONS
             with warnings.catch_warnings():  # deprecated, but the setting that is to replace it has no effect
                 warnings.simplefilter("ignore", DeprecationWarning)
-                request.enable_cached_gjk_guess = False  # begun where the last pose's search ended, coal misses a contact of 1 mm
+                request.enable_cached_gjk_guess = False  # started where the last pose's search ended, coal misses a contact of 1 mm
 
     def touching(self, q: Array) -> tuple[Ints, Array, Array]:
-        """The pairs (c, 2) of volumes that touch in the pose q (n,), their depths (c,) m and where the first must move (c, 3)."""
+        """Return the pairs (c, 2) of volumes that touch in pose q (n,), depths (c,) m and directions (c, 3) that move the first out."""
         matrix, offset = self._coupling
         pin = self._pin
         pin.computeCollisions(self._model, self._data, self._geometry, self._found, matrix @ q + offset, False)
@@ -154,7 +145,8 @@ def _tree(pin: Any, robot: Robot) -> Any:
 
 def _geometry(pin: Any, coal: Any, robot: Robot, snapshot: Snapshot) -> Any:
     geometry = pin.GeometryModel()
-    for volume in (*robot.shapes, *snapshot.objects.values()):
+    volumes: tuple[Shape | WorldObject, ...] = (*robot.shapes, *snapshot.objects.values())
+    for volume in volumes:
         link = volume.link if isinstance(volume, Shape) else 0
         origin = robot.joints[link - 1].point if link else np.zeros(3)
         place = pin.SE3(np.array(volume.rotation), volume.position - origin)
@@ -169,33 +161,3 @@ def _shape(coal: Any, volume: Shape | WorldObject) -> Any:
         return coal.Convex.convexHull(points, True, None)
     makers = {"sphere": coal.Sphere, "capsule": coal.Capsule, "cylinder": coal.Cylinder, "box": coal.Box}
     return makers[volume.kind](*volume.size)
-
-
-Volume = Shape | WorldObject
-Place = tuple[Array, Array]
-"""Where a volume is: position (3,) m and rotation (3, 3), root frame."""
-
-
-def way_out(first: Volume, at: Place, second: Volume, there: Place, direction: Array) -> float:
-    """How far [m] the first must move along the unit vector (3,) until it is clear of the second."""
-    return reach(second, there, direction) + reach(first, at, -direction)
-
-
-def reach(volume: Volume, place: Place, direction: Array) -> float:
-    """How far the volume reaches along the unit vector (3,), from the root's origin [m]."""
-    position, rotation = place
-    along = rotation.T @ direction
-    return float(direction @ position) + _own_reach(volume, along)
-
-
-def _own_reach(volume: Volume, along: Array) -> float:
-    size = volume.size
-    if volume.kind == "box":
-        return 0.5 * float(np.abs(along) @ size)
-    if volume.kind == "convex":
-        assert isinstance(volume, Shape) and volume.vertices is not None
-        return float((volume.vertices @ along).max())
-    if volume.kind == "sphere":
-        return size[0]
-    side = float(np.hypot(along[0], along[1])) if volume.kind == "cylinder" else 1.0
-    return size[0] * side + 0.5 * size[1] * abs(float(along[2]))

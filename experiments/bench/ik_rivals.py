@@ -1,27 +1,69 @@
-"""Rivals on the same cost: the thesis' (3.1.1) CMA-ES, simulated annealing, particle filter, and xNES.  Each ends at a good pose."""
+"""Solvers of inverse kinematics that the library's are compared with, on the same problems: mink and the thesis' rivals.
+
+The rivals (thesis 3.1.1) are CMA-ES, simulated annealing, a particle filter and xNES; each ends at the first good pose.  mink is
+differential inverse kinematics on MuJoCo by quadratic programs, here with restarts and our contact check.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from experiments.bench.cma_peer import CmaStrategy
+import mobee
+from experiments.bench.mujoco_peer import load_mujoco
+from experiments.bench.peers import CmaStrategy, import_peer
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.roadmap.evolution.search import Restart, Search
+from mobee.roadmap.ik.least_squares import NEAR
 from mobee.roadmap.ik.ngik import STD
 from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.term import Term
+from mobee.robot.robot import Robot
 
-COOLING = 4000  # poses of one annealing
-HOT, COLD = 1.0, 0.003  # its temperatures, in units of the cost
-WIDE, NARROW = 0.2, 0.01  # of the ranges: its steps, and the particles' noise
-PARTICLES, SELECTIVE = 200, 4.0  # the share of a particle falls e-fold with 1/4 of the costs' deviation
-SHRINKING = 0.93  # of the noise, each time
-PATIENCE = 400  # generations of xNES without gain, ten times those of ours: it is slower
+MARKER = "right_palm"
+
+# Simulated annealing and particle filter; steps and noise in shares of the motors' ranges.
+ANNEALING_PERIOD = 4000  # poses of one annealing
+FIRST_TEMPERATURE, LAST_TEMPERATURE = 1.0, 0.003  # in units of the cost
+FIRST_STEP, LAST_STEP = 0.2, 0.01
+PARTICLES, SELECTIVITY = 200, 4.0  # the share of a particle falls e-fold with 1/4 of the costs' deviation
+NOISE_DECAY = 0.93  # per generation
+XNES_PATIENCE = 400  # generations of xNES without gain, ten times those of ours: it is slower
+
+# mink: the best among 0 to 10, 12 to 60 and 0.1 to 0.4.
+MINK_DAMPING = 1.0  # of Levenberg-Marquardt
+MINK_STEPS = 12  # of one start
+ORIENTATION_WEIGHT = 0.4  # m/rad
+STOP_SHARE = 0.9  # of the tolerances, at which mink stops
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """A pose of the palm, position (3,) m and rotation (3, 3), and the tolerances of both."""
+
+    position: Array
+    rotation: Array
+    metres: float = 0.005
+    radians: float = float(np.deg2rad(5.0))
+
+    def costs(self) -> list[Term]:
+        """Return the costs of being there within the tolerances, without a contact, near home."""
+        costs = mobee.costs
+        return [
+            costs.position(MARKER, self.position, self.metres),
+            costs.orientation(MARKER, self.rotation, self.radians),
+            costs.collision(),
+            costs.home(),
+        ]
 
 
 def xnes(problem: Problem, seed: int, most: int) -> Array | None:
-    """NES as published (Glasmachers 2010), with its default population, in our box and with our restarts."""
+    """Search by NES as published (Glasmachers 2010), with its default population, within our limits and with our restarts."""
     low, high = problem.limits.T
-    start, restart = problem.start[problem.free], Restart(patience=PATIENCE)
+    start, restart = problem.start[problem.free], Restart(patience=XNES_PATIENCE)
     search = Search(start, STD * (high - low), problem.limits, restart, method="xnes", seed=seed)
     while problem.evaluations < most:
         q = problem.whole(search.ask())
@@ -34,7 +76,10 @@ def xnes(problem: Problem, seed: int, most: int) -> Array | None:
 
 
 def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
-    """CMA-ES with its default population, anew from a random posture where it has stopped by itself; poses one by one or a generation."""
+    """Search by CMA-ES with its default population; it restarts at a random posture when it has stopped by its own criteria.
+
+    `batched`: the poses of a generation are evaluated at once, not one by one.
+    """
     rng = np.random.default_rng(seed)
     start = _units(problem, problem.start[problem.free])
     strategy = CmaStrategy(start, STD, seed, limits=(0.0, 1.0))
@@ -53,21 +98,24 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
 
 
 def annealing(problem: Problem, seed: int, most: int) -> Array | None:
-    """Simulated annealing: one pose at a time, steps and temperature fall together, then anew from the best."""
+    """Search by simulated annealing: one pose at a time; steps and temperature fall together, then it restarts at the best pose."""
     rng = np.random.default_rng(seed)
     best = here = _units(problem, problem.start[problem.free])
     cost = least = np.inf
     while problem.evaluations < most:
-        done = problem.evaluations % COOLING / COOLING
+        done = problem.evaluations % ANNEALING_PERIOD / ANNEALING_PERIOD
         if done == 0.0:
             here, cost = best, least
-        step = WIDE * (NARROW / WIDE) ** done * rng.standard_normal(len(here))
+        step = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** done * rng.standard_normal(len(here))
         there = np.clip(here + step, 0.0, 1.0)
         q = _poses(problem, there[None])
         costs, good = problem.look(q)
         if good[0]:
-            return q[0]
-        if costs[0] < cost or rng.uniform() < np.exp((cost - costs[0]) / (HOT * (COLD / HOT) ** done)):
+            first: Array = q[0]
+            return first
+        if costs[0] < cost or rng.uniform() < np.exp(
+            (cost - costs[0]) / (FIRST_TEMPERATURE * (LAST_TEMPERATURE / FIRST_TEMPERATURE) ** done)
+        ):
             here, cost = there, float(costs[0])
             if cost < least:
                 best, least = here, cost
@@ -75,7 +123,7 @@ def annealing(problem: Problem, seed: int, most: int) -> Array | None:
 
 
 def particles(problem: Problem, seed: int, most: int) -> Array | None:
-    """A particle filter: draw particles anew by their costs, move each a little, less every time; then anew from everywhere."""
+    """Search by a particle filter: resample by the costs, add noise that shrinks; when it is small, restart with uniform particles."""
     rng = np.random.default_rng(seed)
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
     while problem.evaluations < most:
@@ -84,11 +132,11 @@ def particles(problem: Problem, seed: int, most: int) -> Array | None:
         if good.any():
             found: Array = q[int(good.argmax())]
             return found
-        noise = WIDE if noise == 0.0 else noise * SHRINKING
-        if noise < NARROW / 10.0:
+        noise = FIRST_STEP if noise == 0.0 else noise * NOISE_DECAY
+        if noise < LAST_STEP / 10.0:
             noise, places = 0.0, rng.uniform(size=places.shape)
             continue
-        shares = np.exp(-SELECTIVE * (costs - costs.min()) / max(float(costs.std()), 1e-9))
+        shares = np.exp(-SELECTIVITY * (costs - costs.min()) / max(float(costs.std()), 1e-9))
         drawn = rng.choice(PARTICLES, PARTICLES, p=shares / shares.sum())
         places = np.clip(places[drawn] + noise * rng.standard_normal(places.shape), 0.0, 1.0)
     return None
@@ -103,3 +151,89 @@ def _units(problem: Problem, q: Array) -> Array:
 def _poses(problem: Problem, units: Array) -> Array:
     low, high = problem.limits.T
     return problem.whole(np.clip(low + units * (high - low), low, high))
+
+
+def load_mink() -> Any:
+    """Return the package mink; raises NotInstalled."""
+    return import_peer("mink", "mink")
+
+
+class MinkPeer:
+    """The chain from the base to the palm, without volumes: the problem checks for contacts in the poses that mink finds."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._mink = load_mink()
+        model, self._motors = _chain(load_mujoco(), robot)
+        self._configuration = self._mink.Configuration(model)
+        self._task = self._mink.FrameTask("marker", "site", position_cost=1.0, orientation_cost=ORIENTATION_WEIGHT, lm_damping=MINK_DAMPING)
+        self._limits = [self._mink.ConfigurationLimit(model)]
+
+    def solve(self, problem: Problem, target: Target, seed: int, most: int) -> Array | None:
+        """Return a pose (n,) within all tolerances, or None after `most` evaluations.
+
+        Starts as our least squares do: at home, then by turns near home and anywhere.  Steps and contact checks count as evaluations.
+        """
+        rotation = self._mink.SO3.from_matrix(target.rotation)
+        self._task.set_target(self._mink.SE3.from_rotation_and_translation(rotation, target.position))
+        rng = np.random.default_rng(seed)
+        low, high = problem.model.robot.limits[self._motors].T
+        home = problem.start[self._motors]
+        begin, starts = home, 0
+        while problem.evaluations < most:
+            starts += 1
+            end = self._descend(problem, begin, target)
+            if end is not None:
+                q = problem.start.copy()
+                q[self._motors] = np.clip(end, low, high)
+                if problem.look(q[None])[1][0]:
+                    return q
+            about = np.clip(home + NEAR * (high - low) * rng.standard_normal(len(home)), low, high)
+            begin = about if starts % 2 else rng.uniform(low, high)
+        return None
+
+    def _descend(self, problem: Problem, begin: Array, target: Target) -> Array | None:
+        """Return where the steps from `begin` end, or None if that is not within the tolerances."""
+        configuration, task = self._configuration, self._task
+        configuration.update(begin)
+        for _ in range(MINK_STEPS):
+            error = task.compute_error(configuration)
+            if np.linalg.norm(error[:3]) <= STOP_SHARE * target.metres and np.linalg.norm(error[3:]) <= STOP_SHARE * target.radians:
+                found: Array = configuration.q
+                return found
+            problem.evaluations += 1
+            try:
+                velocity = self._mink.solve_ik(configuration, [task], 1.0, "daqp", limits=self._limits)
+            except self._mink.NoSolutionFound:
+                return None
+            configuration.integrate_inplace(velocity, 1.0)
+        return None
+
+
+def _chain(mujoco: Any, robot: Robot) -> tuple[Any, list[int]]:
+    """Return the MuJoCo model of the chain to the palm, and the motors of its joints, base first."""
+    marker = robot.marker(MARKER)
+    links: list[int] = []
+    link = marker.link
+    while link:
+        links.insert(0, link)
+        link = robot.joints[link - 1].parent
+    matrix, offset = robot.coupling
+    spec = mujoco.MjSpec()
+    body, origin, motors = spec.worldbody, np.zeros(3), []
+    for link in links:
+        joint = robot.joints[link - 1]
+        (drivers,) = np.nonzero(matrix[link - 1])
+        if len(drivers) != 1 or matrix[link - 1, drivers[0]] != 1.0 or offset[link - 1] != 0.0:
+            raise InvalidValue(f"joint {joint.name!r} is not moved by one motor alone, 1:1; the chain to {MARKER!r} must be.")
+        motor = int(drivers[0])
+        body = body.add_body(pos=joint.point - origin, mass=1.0, inertia=np.ones(3), explicitinertial=True)
+        body.add_joint(
+            type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis, limited=mujoco.mjtLimited.mjLIMITED_TRUE, range=robot.limits[motor]
+        )
+        origin = joint.point
+        motors.append(motor)
+    spec.compiler.degree = False
+    turn = np.empty(4)
+    mujoco.mju_mat2Quat(turn, np.ascontiguousarray(marker.rotation).reshape(9))
+    body.add_site(name="marker", pos=marker.position - origin, quat=turn)
+    return spec.compile(), motors

@@ -1,14 +1,15 @@
-"""How late the commands of the live system are, at several rates: jitter of the controller's period and age of the command in force.
+"""The live system in real time: jitter of the controller's period and age of the command in force, at several rates.
 
 Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are the
-services' own numbers, a tick in hold counts as held and not as an age.  Beside every run a bare chain of processes that do a little
-each (calibration.py) tells what the machine's scheduling costs: where that is more than on the standard machine, the ages may
-be as many times longer.  Run time: `seconds` and a start for every rate; on a machine that does nothing else.
+services' own numbers; a tick in hold counts as held and not as an age.  Before and after every run a bare chain of processes that do a
+little each (calibration.py) measures what the machine's scheduling costs: where that is more than on the standard machine, the ages may
+be as many times longer.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,29 +18,39 @@ from experiments.bench.calibration import bare_ages
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of
 
-MOST = {200: 2.0, 500: 3.0, 1000: 5.0}  # ticks that the age may have at most (p99), up to that rate
-BARE = {200: 1.0, 500: 2.0, 1000: 2.0}  # ticks that the bare chain's has on the standard machine
+MAX_AGE = {200: 2.0, 500: 3.0, 1000: 5.0}  # ticks (p99), up to that rate [Hz]
+BARE_AGE = {200: 1.0, 500: 2.0, 1000: 2.0}  # ticks (p99) of the bare chain on the standard machine
 BARE_SECONDS = 3.0  # of the bare chain, before and after every run
+_COLUMNS = ("rate", "age p50", "p99", "bare", "allowed", "most", "jitter p50", "p99", "missed", "held", "late")
 
 
-def measure(rates: tuple[int, ...], seconds: float, backend: str) -> dict[str, Any]:
-    """Everything that `mobee bench live --json` prints; raises LaunchFailed."""
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Rates [Hz], how long each run lasts [s], and the robot: kinematic or pybullet."""
+
+    rates: Sequence[int] = (100, 200, 500, 1000)
+    seconds: float = 30.0
+    backend: str = "kinematic"
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """Run the system at each rate, and return all numbers and the verdict; raises LaunchFailed."""
     runs = []
     with Progress() as progress:
-        for done, rate in enumerate(rates):
-            progress.show(done / len(rates), f"{backend} at {rate} Hz")
-            settings = (f"services.robot_sim.kinematic={backend}", f"services.robot_sim.rate={rate}")
+        for done, rate in enumerate(settings.rates):
+            progress.show(done / len(settings.rates), f"{settings.backend} at {rate} Hz")
+            options = (f"services.robot_sim.backend={settings.backend}", f"services.robot_sim.rate={rate}")
             bare = [bare_ages(rate, BARE_SECONDS)]
-            summary = summary_of("kinematic", settings, duration=seconds)
+            summary = summary_of("kinematic", options, duration=settings.seconds)
             bare.append(bare_ages(rate, BARE_SECONDS))
             runs.append(judged_run(rate, summary, float(np.percentile(np.concatenate(bare), 99))))
-    return {"backend": backend, "seconds": seconds, "runs": runs, "passed": all(run["passed"] for run in runs)}
+    return {"backend": settings.backend, "seconds": settings.seconds, "runs": runs, "passed": all(run["passed"] for run in runs)}
 
 
 def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[str, Any]:
-    """What one run came to where the bare chain has that age."""
+    """Return the numbers and the verdict of a run whose bare chain had that age [ticks]."""
     age, controller = summary["command_age_ticks"], summary["services"]["controller"]
-    most = next((ticks * max(1.0, bare_p99 / BARE[limit]) for limit, ticks in MOST.items() if rate <= limit), None)
+    most = next((ticks * max(1.0, bare_p99 / BARE_AGE[limit]) for limit, ticks in MAX_AGE.items() if rate <= limit), None)
     return {
         "rate": rate,
         "age_p50": age["p50"],
@@ -58,10 +69,9 @@ def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[s
 
 
 def report(result: dict[str, Any]) -> str:
-    """The same for people."""
+    """Format the measurements."""
     lines = [f"Live on the {result['backend']} robot, three agents, {result['seconds']:g} s each; age in ticks, jitter in ms"]
-    names = ("rate", "age p50", "p99", "bare", "allowed", "most", "jitter p50", "p99", "missed", "held", "late")
-    lines.append("{:>7}{:>8}{:>4}{:>5}{:>8}{:>5}{:>11}{:>7}{:>7}{:>6}{:>6}".format(*names))
+    lines.append("{:>7}{:>8}{:>4}{:>5}{:>8}{:>5}{:>11}{:>7}{:>7}{:>6}{:>6}".format(*_COLUMNS))
     for run in result["runs"]:
         allowed = "-" if run["at_most"] is None else f"{run['at_most']:.3g}"
         lines.append(

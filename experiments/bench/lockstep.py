@@ -1,13 +1,13 @@
-"""How much faster than real time the live processes run in lockstep, on the motor model alone and on PyBullet.
+"""The live system in lockstep: how much faster than real time it runs, on the motor model alone and on PyBullet.
 
 Claim: robot_sim, model, controller and three agents, each a process, make at least 15 s of robot time a second on the motor model
-and 10 on PyBullet, at ticks of 20 ms, on the standard machine.  How fast this machine is, in messages between processes that work a
-little at each, is measured before and after every run.  Run time: four runs of `seconds` each and their start.
+and 10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured in
+messages between processes that work a little at each.  Run time: four runs of `seconds` each and their start.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -31,25 +31,33 @@ HELPERS = 2  # as model and controller: the agents have little to do
 CASES = (Case("kinematic", 50, 15.0, 26.0), Case("pybullet", 50, 10.0, 20.0), Case("kinematic", 100), Case("pybullet", 100))
 
 
-def measure(seconds: float, cases: tuple[Case, ...] = CASES) -> dict[str, Any]:
-    """Everything that `mobee bench lockstep --json` prints; raises LaunchFailed."""
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How long each run lasts [s], and the runs."""
+
+    seconds: float = 20.0
+    cases: Sequence[Case] = CASES
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """Run the system in each case, and return all numbers and the verdict; raises LaunchFailed."""
     runs = []
     with Progress() as progress, Crew(HELPERS) as crew:
         speeds = Calibration(crew.exchanges)
-        for done, case in enumerate(cases):
-            progress.show(done / len(cases), f"{case.backend} at {case.rate} Hz")
-            summary, speed = speeds.around(partial(_summary, case, seconds))
+        for done, case in enumerate(settings.cases):
+            progress.show(done / len(settings.cases), f"{case.backend} at {case.rate} Hz")
+            summary, speed = speeds.around(partial(_run, case, settings.seconds))
             runs.append(judged_run(case, summary, speed))
-    return {"seconds": seconds, "speed": speeds.median, "runs": runs, "passed": all(run["passed"] for run in runs)}
+    return {"seconds": settings.seconds, "speed": speeds.median, "runs": runs, "passed": all(run["passed"] for run in runs)}
 
 
-def _summary(case: Case, seconds: float) -> dict[str, Any]:
-    settings = (f"services.robot_sim.kinematic={case.backend}", f"services.robot_sim.rate={case.rate}")
-    return summary_of("lockstep", settings, duration=seconds)
+def _run(case: Case, seconds: float) -> dict[str, Any]:
+    options = (f"services.robot_sim.backend={case.backend}", f"services.robot_sim.rate={case.rate}")
+    return summary_of("lockstep", options, duration=seconds)
 
 
 def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str, Any]:
-    """What one run came to on a machine of that speed."""
+    """Return the numbers and the verdict of one run on a machine of that speed."""
     lockstep, agents = summary["lockstep"], summary["agents"]
     standard = lockstep["speed"] / speed
     return {
@@ -65,12 +73,12 @@ def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str
 
 
 def report(result: dict[str, Any]) -> str:
-    """The same for people."""
+    """Format the measurements."""
     lines = ["Lockstep of robot_sim, model, controller and three agents, a process each"]
     lines.append(f"{'robot':<10}{'rate':>7}{'x real time':>13}{'ticks/s':>9}{'calibrated':>12}{'at least':>10}{'aim':>5}")
     for run in result["runs"]:
         least, aim = (f"{run[name]:g}" if run[name] else "-" for name in ("least", "aim"))
-        verdict = "" if run["passed"] else "  SHORT" if run["repeatable"] else "  SPOILT"
+        verdict = "" if run["passed"] else "  SHORT" if run["repeatable"] else "  VARIES"
         lines.append(
             f"{run['backend']:<10}{run['rate']:>4} Hz{run['speed']:>13.1f}{run['ticks_per_second']:>9.0f}"
             f"{run['standard_speed']:>12.1f}{least:>10}{aim:>5}{verdict}"

@@ -1,7 +1,7 @@
 """The egocentric model beside MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
 
 Claim: one compiled kernel makes the model of thesis chapter 2 the fastest of its kind, on the iCub and on robots of other makers
-(random_robots.py).  Ours gives every contact with depth, normal and point, and the projected forces; of MuJoCo forward kinematics and
+(scenes.py).  Ours gives every contact with depth, normal and point, and the projected forces; of MuJoCo forward kinematics and
 collision detection are timed, of python-fcl whether each pair touches.  Run time: about four minutes, a quarter with `--quick`.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import itertools
+import textwrap
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -18,25 +19,33 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import random_robots, workload
-from experiments.bench.agreement import MINIMAL, Agreement, Scene, agreements
+from experiments.bench import verdicts
+from experiments.bench.agreement import DEPTH_TOLERANCE, MIN_OVERLAP, Agreement, agreements
 from experiments.bench.calibration import Crew
 from experiments.bench.collision_peers import FclPairs, FclTrees
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
-from experiments.bench.random_robots import MAKERS, MIXED, PLAIN
-from experiments.bench.verdicts import Contestant, all_passed, judged, one_core, rates
+from experiments.bench.scenes import ICUB, MAKERS, MIXED, OBJECTS, PLAIN, Scene, boxes_world, upper_body, upper_body_poses, upper_body_scene
+from experiments.bench.timing import Contestant, cores_text, one_core, rates
+from experiments.bench.verdicts import judged
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
 
-BATCH, CALL, OBJECTS, KINEMATICS = "batch", "one call", "one call, Contact objects", "one call, kinematics only"
+BATCH, CALL, CALL_OBJECTS, KINEMATICS = "batch", "one call", "one call, Contact objects", "one call, kinematics only"
 MUJOCO, PAIRS, TREES = "MuJoCo", "python-fcl, pair by pair", "python-fcl, trees of boxes"
-ICUB = "iCub"
 _VERSIONS = {"numpy": "numpy", "mujoco": "mujoco", "python-fcl": "fcl", "coal": "coal"}  # package and its module
-_FCL_TESTS = 60_000  # of pairs in one round; a pose has up to 130 000
-_AROUND = (0, random_robots.OBJECTS)
-_THREADED = 20_000  # poses of a batch on two threads: a tenth of a second, so that the start of threads costs nothing
+_FCL_PAIRS = 60_000  # tested in one round; a pose has up to 130 000
+_OBJECT_COUNTS = (0, OBJECTS)  # around robots of other makers
+_POSES_OF_THREADS = 20_000  # of a batch on two threads: a tenth of a second, so that the start of threads costs nothing
+
+_PEERS = (MUJOCO, PAIRS, TREES)
+_WIDTH = 80
+_NOTE = (
+    f"differ: pairs that touch for one of the two only, and how deep the deepest is (less than {MIN_OVERLAP:g} m is no difference); "
+    f"same depths: within {DEPTH_TOLERANCE:g} m of the peer's, which need not be minimal; "
+    "longer: our depth than the separation along the peer's normal, at most [m]"
+)
 
 Rates = dict[str, Array]
 """Poses per second of each contestant in each round."""
@@ -44,7 +53,7 @@ Rates = dict[str, Array]
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much is measured."""
+    """How much is measured; `boxes` are around the iCub."""
 
     boxes: tuple[int, ...] = (0, 10, 100, 1000)
     rounds: int = 15
@@ -58,11 +67,11 @@ QUICK = Settings(rounds=5, poses=500, other_poses=200, compared_poses=50)
 
 
 @dataclass(frozen=True, slots=True)
-class Requirement:
-    """A rate of ours as a multiple of a peer's, both of the same round."""
+class RatioRequirement:
+    """A bound on a rate of ours as a multiple of a peer's, both of the same round."""
 
     robot: str
-    what: str
+    ours: str
     peer: str
     objects: int
     least: float
@@ -70,63 +79,64 @@ class Requirement:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """The name in reports."""
         peer = "python-fcl" if self.peer == PAIRS else self.peer
-        return f"{self.robot}, {self.what}, {self.objects}: x {peer}"
+        return f"{self.robot}, {self.ours}, {self.objects}: x {peer}"
 
 
 REQUIREMENTS = (
-    *(Requirement(ICUB, BATCH, MUJOCO, count, 8.0, 12.0) for count in (0, 100, 1000)),
-    *(Requirement(ICUB, CALL, MUJOCO, count, 5.0) for count in (0, 100)),
-    *(Requirement(ICUB, BATCH, PAIRS, count, 100.0) for count in (0, 100)),
+    *(RatioRequirement(ICUB, BATCH, MUJOCO, count, 8.0, 12.0) for count in (0, 100, 1000)),
+    *(RatioRequirement(ICUB, CALL, MUJOCO, count, 5.0) for count in (0, 100)),
+    *(RatioRequirement(ICUB, BATCH, PAIRS, count, 100.0) for count in (0, 100)),
     *(
-        Requirement(maker.name, what, MUJOCO, count, least)
+        RatioRequirement(maker.name, ours, MUJOCO, count, least)
         for maker in (MIXED, PLAIN)
-        for what, least in ((BATCH, 4.0), (CALL, 2.0))
-        for count in _AROUND
+        for ours, least in ((BATCH, 4.0), (CALL, 2.0))
+        for count in _OBJECT_COUNTS
     ),
 )
-TWO_THREADS = 0.9  # of the gain that two processes have over one
+MIN_THREADS_GAIN = 0.9  # of the gain that two processes have over one
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Everything that `mobee bench model --json` prints; raises MujocoMissing."""
+    """Measure, and return all numbers and the verdict; raises NotInstalled without MuJoCo."""
     load_mujoco()
-    robot, with_coal = workload.robot(), importlib.util.find_spec("pinocchio") is not None
+    robot, with_coal = upper_body(), importlib.util.find_spec("pinocchio") is not None
+    counts = sorted(set(settings.boxes))
     measured: dict[str, dict[int, Rates]] = {name: {} for name in (ICUB, *(maker.name for maker in MAKERS))}
-    scenes = [_scene(ICUB, count, settings.compared_poses) for count in settings.compared_boxes]
-    scenes += [_scene(maker.name, count, settings.compared_poses) for maker in MAKERS for count in _AROUND]
+    scenes = [upper_body_scene(count, settings.compared_poses) for count in settings.compared_boxes if count in counts]
+    scenes += [maker.scene(count, settings.compared_poses) for maker in MAKERS for count in _OBJECT_COUNTS]
     with Progress() as progress:
         with one_core() as core:
-            for done, boxes in enumerate(settings.boxes):
-                progress.show(0.5 * done / len(settings.boxes), f"timing among {boxes} boxes")
+            for done, boxes in enumerate(counts):
+                progress.show(0.5 * done / len(counts), f"timing among {boxes} boxes")
                 measured[ICUB][boxes] = rates(contestants(robot, boxes, settings.poses), settings.rounds)
-            for done, (maker, count) in enumerate(itertools.product(MAKERS, _AROUND)):
+            for done, (maker, count) in enumerate(itertools.product(MAKERS, _OBJECT_COUNTS)):
                 progress.show(0.5 + 0.2 * done / 6.0, f"timing {maker.name}")
-                measured[maker.name][count] = rates(beside_mujoco(_scene(maker.name, count, settings.other_poses)), settings.rounds)
-        threads = _on_two_threads(_scene(ICUB, 0, settings.poses), settings.rounds)
+                measured[maker.name][count] = rates(beside_mujoco(maker.scene(count, settings.other_poses)), settings.rounds)
+        threads = _on_two_threads(upper_body_scene(0, settings.poses), settings.rounds)
         compared: list[Agreement] = []
-        off = 0.0
+        depth_error = 0.0
         for done, scene in enumerate(scenes):
             progress.show(0.7 + 0.3 * done / len(scenes), f"comparing contacts of {scene.name}")
-            found, farthest = agreements(scene, with_coal)
+            found, error = agreements(scene, with_coal)
             compared += found
-            off = max(off, farthest)
+            depth_error = max(depth_error, error)
     return {
-        "workload": _about(robot, settings),
+        "workload": _workload(robot, settings),
         "core": core,
         "versions": {name: metadata.version(name) for name in _VERSIONS if importlib.util.find_spec(_VERSIONS[name])},
         "coal": with_coal,
-        **summed_up(measured, threads, off, compared),
+        **summarized(measured, threads, depth_error, compared),
     }
 
 
-def summed_up(
-    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, compared: Sequence[Agreement]
+def summarized(
+    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, depth_error: float, compared: Sequence[Agreement]
 ) -> dict[str, Any]:
-    """Medians of the rates and of the ratios to the peers, the iCub's, and under "others" those of other makers; and the verdict.
+    """Return medians of the rates and of the ratios to the peers, the iCub's, and under "others" those of other makers; and the verdict.
 
-    `threads`: what two threads gain, and what two processes do; `off`: see `agreements`.
+    `threads`: the gains of two threads and of two processes; `depth_error`: see `agreements`.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:
@@ -140,25 +150,28 @@ def summed_up(
 
     others = {name: tables(found) for name, found in measured.items() if name != ICUB}
     about = {"others": others, "threads": threads, "agreement": [asdict(one) for one in compared]}
-    return {**tables(measured[ICUB]), **about, **_verdict(measured, threads, off, all(one.passed for one in compared))}
+    return {**tables(measured[ICUB]), **about, **_verdict(measured, threads, depth_error, all(one.passed for one in compared))}
 
 
-def _verdict(measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, off: float, agree: bool) -> dict[str, Any]:
-    """Whether we are as fast beside the peers as required, and find the same contacts with right depths."""
+def _verdict(
+    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, depth_error: float, agree: bool
+) -> dict[str, Any]:
+    """Return whether the model is as fast beside the peers as required, and finds the same contacts with right depths."""
     required = [
-        judged(one.name, _ratio(measured[one.robot][one.objects], one.what, one.peer), at_least=one.least, aim=one.aim)
+        judged(one.name, _ratio(measured[one.robot][one.objects], one.ours, one.peer), at_least=one.least, aim=one.aim)
         for one in REQUIREMENTS
         if one.objects in measured[one.robot]
     ]
     if threads is not None:
-        required.append(judged("2 threads' gain over 2 processes'", threads["gain"] / threads["processes"], at_least=TWO_THREADS))
-    required.append(judged("depths off the way out, m", off, at_most=MINIMAL))
-    return {"requirements": required, "passed": all_passed(required) and agree}
+        required.append(judged("2 threads' gain over 2 processes'", threads["gain"] / threads["processes"], at_least=MIN_THREADS_GAIN))
+    required.append(judged("depth errors along the normal, m", depth_error, at_most=DEPTH_TOLERANCE))
+    result = verdicts.verdict(required)
+    return result | {"passed": result["passed"] and agree}
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
-    """All that is timed on the iCub, in the same world and the same poses."""
-    scene = Scene(ICUB, robot, workload.world(boxes), workload.poses(poses))
+    """Return all that is timed on the iCub, in the same world and the same poses."""
+    scene = Scene(ICUB, robot, boxes_world(boxes), upper_body_poses(poses))
     model, rows = Model(robot, scene.world), list(scene.q)
     pairs, trees = FclPairs(robot, scene.world.snapshot), FclTrees(robot, scene.world.snapshot)
 
@@ -171,12 +184,12 @@ def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
         for row in rows:
             _ = model.evaluate(row).transforms
 
-    few, some = max(1, _FCL_TESTS // len(pairs)), max(20, poses // 50)
+    few, some = max(1, _FCL_PAIRS // len(pairs)), max(20, poses // 50)
     first = beside_mujoco(scene)
     return {
         BATCH: first[BATCH],
         CALL: first[CALL],
-        OBJECTS: Contestant(call_objects, poses),
+        CALL_OBJECTS: Contestant(call_objects, poses),
         KINEMATICS: Contestant(kinematics, poses),
         MUJOCO: first[MUJOCO],
         PAIRS: Contestant(_in_turn(model, scene.q, pairs.detect, few), few),
@@ -185,7 +198,7 @@ def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
 
 
 def beside_mujoco(scene: Scene) -> dict[str, Contestant]:
-    """Ours, in a batch and one by one, and MuJoCo."""
+    """Return ours, in a batch and one by one, and MuJoCo."""
     model, rows, poses = Model(scene.robot, scene.world), list(scene.q), len(scene.q)
     mujoco = MujocoPeer(scene.robot, scene.world.objects)
     angles = list(mujoco.joint_angles(scene.q))
@@ -206,21 +219,14 @@ def beside_mujoco(scene: Scene) -> dict[str, Contestant]:
     return {BATCH: Contestant(batch, poses), CALL: Contestant(call, poses), MUJOCO: Contestant(detect, poses)}
 
 
-def _scene(robot: str, objects: int, poses: int) -> Scene:
-    if robot == ICUB:
-        return Scene(ICUB, workload.robot(), workload.world(objects), workload.poses(poses))
-    maker = {one.name: one for one in MAKERS}[robot]
-    return Scene(robot, random_robots.robot(maker), random_robots.world(maker, objects), random_robots.poses(maker, poses))
-
-
 def _on_two_threads(scene: Scene, rounds: int) -> dict[str, float] | None:
-    """Wall time of a batch on one thread over that on two, and what two processes gain here; None: there are no threads.
+    """Return the wall time of a batch on one thread over that on two, and the gain of two processes here; None without threads.
 
-    The best of the rounds counts: where others use the cores, most of them tell how these are shared and not what threads gain.
+    The best of the rounds counts: while other programs use the cores, most rounds show how these are shared and not the gain of threads.
     """
     if "threads" not in inspect.signature(Model.evaluate).parameters:
         return None
-    model, q = Model(scene.robot, scene.world), np.resize(scene.q, (_THREADED, scene.q.shape[1]))
+    model, q = Model(scene.robot, scene.world), np.resize(scene.q, (_POSES_OF_THREADS, scene.q.shape[1]))
 
     def seconds(threads: int) -> float:
         start = time.perf_counter()
@@ -234,7 +240,7 @@ def _on_two_threads(scene: Scene, rounds: int) -> dict[str, float] | None:
 
 
 def _in_turn(model: Model, q: Array, detect: Callable[[Array], object], count: int) -> Callable[[], None]:
-    """Detect in `count` poses, the next time in the next ones; forward kinematics are ours, the fastest there are."""
+    """Return a function that detects in the next `count` poses at each call; forward kinematics are ours, the fastest there are."""
     poses = itertools.cycle(q)
 
     def run() -> None:
@@ -248,7 +254,7 @@ def _ratio(found: Rates, name: str, peer: str) -> float:
     return float(np.median(found[name] / found[peer]))
 
 
-def _about(robot: Robot, settings: Settings) -> dict[str, int]:
+def _workload(robot: Robot, settings: Settings) -> dict[str, int]:
     return {
         "motors": len(robot.motors),
         "joints": len(robot.joints),
@@ -257,3 +263,70 @@ def _about(robot: Robot, settings: Settings) -> dict[str, int]:
         "poses": settings.poses,
         "rounds": settings.rounds,
     }
+
+
+def report(result: dict[str, Any]) -> str:
+    """Format the measurements."""
+    about = result["workload"]
+    head = _wrapped(
+        f"{about['motors']} motors, {about['joints']} joints, {about['primitives']} primitives, {about['pairs']} tested pairs; N boxes. "
+        f"Processor time {cores_text(result['core'])}, medians of {about['rounds']} rounds: "
+        "ratios can be compared, rates only within one run."
+    )
+    required = "\n".join(["required", *verdicts.requirement_lines(result["requirements"])])
+    return "\n\n".join([head, *_tables(result), _others(result), required, *([_agreement(result)] if result["agreement"] else [])])
+
+
+def _tables(result: dict[str, Any]) -> list[str]:
+    rates = result["poses_per_second"]
+    rows = {name: [_thousands(found[name]) for found in rates.values()] for name in next(iter(rates.values()))}
+    tables = [_table("poses per second", rates, rows)]
+    for key, title in (("times_mujoco", "times MuJoCo"), ("times_python_fcl", "times python-fcl, pair by pair")):
+        ours = [name for name in rows if name not in _PEERS and name != KINEMATICS]
+        tables.append(_table(title, rates, {name: [f"{found[name]:.1f}" for found in result[key].values()] for name in ours}))
+    return tables
+
+
+def _table(title: str, boxes: dict[int, Any], rows: dict[str, list[str]]) -> str:
+    lines = [f"{title:<34}" + "".join(f"{f'N = {count}':>11}" for count in boxes)]
+    for name, cells in rows.items():
+        lines.append(f"  {name if name in _PEERS else f'ours, {name}':<32}" + "".join(f"{cell:>11}" for cell in cells))
+    return "\n".join(lines)
+
+
+def _others(result: dict[str, Any]) -> str:
+    """Format the rates of robots of other makers, and of threads."""
+    lines = ["robots of other makers                poses per second          times MuJoCo"]
+    lines.append(f"  {'N':>20}{'batch':>12}{'one call':>10}{'MuJoCo':>10}{'batch':>12}{'one call':>10}")
+    for name, found in result["others"].items():
+        for count, speeds in found["poses_per_second"].items():
+            ratios = found["times_mujoco"][count]
+            lines.append(
+                f"  {name:<16}{count:>4}{_thousands(speeds[BATCH]):>12}{_thousands(speeds[CALL]):>10}{_thousands(speeds[MUJOCO]):>10}"
+                f"{ratios[BATCH]:>12.2f}{ratios[CALL]:>10.2f}"
+            )
+    threads = result["threads"]
+    if threads is not None:
+        lines.append(f"  a batch on 2 threads: {threads['gain']:.2f} x one; 2 processes at once: {threads['processes']:.2f} x one")
+    return "\n".join(lines)
+
+
+def _agreement(result: dict[str, Any]) -> str:
+    lines = [f"{'agreement':<18}{'N':>4}{'':<12}{'contacts':>8}{'differ':>10}{'same depths':>12}{'longer':>8}"]
+    for one in result["agreement"]:
+        differing = f"{one['other_pairs']}" + (f", {one['deepest_other']:.0e}" if one["other_pairs"] else "")
+        lines.append(
+            f"  {one['scene']:<16}{one['objects']:>4}  {one['peer']:<10}{one['contacts']:>8}{differing:>10}"
+            f"{100.0 * one['same_depths']:>10.1f} %{one['beaten']:>8.0e}{'' if one['passed'] else ' DIFFERS'}"
+        )
+    if not result["coal"]:
+        lines.append("  coal: not installed: pip install '.[dev]' in MoBeE's folder")
+    return "\n".join([*lines, _wrapped(_NOTE, "  ")])
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent)
+
+
+def _thousands(rate: float) -> str:
+    return f"{rate:,.0f}".replace(",", " ")

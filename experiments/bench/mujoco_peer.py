@@ -1,4 +1,4 @@
-"""MuJoCo on the workload, kinematics and collision detection only, and its stepper on the plant's model."""
+"""MuJoCo on the benchmark's scenes, kinematics and collision detection only, and its stepper on the plant's model."""
 
 from __future__ import annotations
 
@@ -9,42 +9,37 @@ from typing import Any
 
 import numpy as np
 
+from experiments.bench.peers import import_peer
 from mobee.arrays import Array, Ints
-from mobee.errors import MobeeError
 from mobee.model.world import WorldObject
 from mobee.robot.robot import LinkPair, Robot, Shape
 from mobee.simulation import MotorParameters, OfflinePlant
 from mobee.simulation.rigid import stiffened
 
 _ARENA = 64 * 2**20  # bytes; holds some 100 000 contacts, so that none is left out
-
-
-class MujocoMissing(MobeeError):
-    """Raised when the benchmark is asked for and MuJoCo is not installed."""
+SERVO_GAIN = 20.0  # N m s/rad, on bodies of 1 kg and 1 kg m^2
+COMMAND_PERIOD = 50  # ticks between two commands
 
 
 def load_mujoco() -> Any:
-    """The package mujoco; raises MujocoMissing."""
-    try:
-        import mujoco
-    except ImportError:
-        raise MujocoMissing("MuJoCo is not installed: pip install '.[bench]' in MoBeE's folder") from None
-    return mujoco
+    """Return the package mujoco; raises NotInstalled."""
+    return import_peer("mujoco", "MuJoCo")
 
 
 class MujocoPeer:
-    """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo never tests them together."""
+    """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo does not test their pairs."""
 
     def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None, precise: bool = False) -> None:
-        """`servo`: the gain of velocity servos on all joints, for who lets it step; no gravity then.
+        """Build the MuJoCo model.
 
-        `precise`: its iterative searches go on to the last digits, which takes longer than as it is used.
+        `servo`: gain of velocity servos on all joints, for `step`; there is no gravity then.  `precise`: iterative searches go on to
+        the last digits, which takes longer than MuJoCo's defaults.
         """
         self._mujoco = load_mujoco()
         self._coupling = robot.coupling
         spec = _spec(self._mujoco, robot, objects)
         if servo is not None:
-            _drive(self._mujoco, spec, len(robot.joints), servo)
+            _add_servos(self._mujoco, spec, len(robot.joints), servo)
         if precise:
             spec.option.ccd_tolerance, spec.option.ccd_iterations = 1e-12, 1000
         self.model = spec.compile()
@@ -55,13 +50,13 @@ class MujocoPeer:
             self._volume[self.model.geom(name).id] = volume
 
     def joint_angles(self, q: Array) -> Array:
-        """MuJoCo's qpos (..., joints) of motor positions (..., n): the coupling is not part of what is timed."""
+        """Return MuJoCo's qpos (..., joints) of motor positions (..., n), so that the coupling is not timed."""
         matrix, offset = self._coupling
         order = np.argsort([self.model.joint(f"joint{index}").qposadr[0] for index in range(len(offset))])
         return np.ascontiguousarray((q @ matrix.T + offset)[..., order])
 
     def detect(self, angles: Array) -> int:
-        """Forward kinematics and every contact of one pose; returns how many points of contact there are."""
+        """Compute forward kinematics and every contact of one pose; returns the number of contact points."""
         data = self.data
         data.qpos[:] = angles
         self._mujoco.mj_kinematics(self.model, data)
@@ -73,14 +68,14 @@ class MujocoPeer:
         self._mujoco.mj_step(self.model, self.data, nstep=count)
 
     def touching(self) -> tuple[Ints, Array, Array]:
-        """The pairs (c, 2) of volumes in contact at the last detection, their depths (c,) m and where the first must move (c, 3).
+        """Return the pairs (c, 2) of volumes in contact at the last detection, depths (c,) m and directions (c, 3) that part them.
 
-        The smaller index is first; of several points of contact of a pair the deepest one counts.
+        The smaller index of a pair is first, and the direction moves it out of the other; the deepest contact point of a pair counts.
         """
         contact = self.data.contact
         volumes = self._volume[np.array(contact.geom).reshape(-1, 2)]
         depths, normals = -np.array(contact.dist), np.array(contact.frame).reshape(-1, 9)[:, :3]
-        normals = np.where(volumes[:, :1] < volumes[:, 1:], -normals, normals)  # it leads from the first geom to the second
+        normals = np.where(volumes[:, :1] < volumes[:, 1:], -normals, normals)  # MuJoCo's leads from the first geom to the second
         order = np.argsort(-depths, kind="stable")
         pairs, which = np.unique(np.sort(volumes, axis=1)[order], axis=0, return_index=True)
         return pairs, depths[order][which], normals[order][which]
@@ -101,22 +96,22 @@ def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
         bodies.append(body)
         origins.append(joint.point)
     for shape in robot.shapes:
-        _add(mujoco, spec, bodies[shape.link], shape, shape.position - origins[shape.link])
-    for thing in objects.values():
-        _add(mujoco, spec, spec.worldbody, thing, thing.position)
+        _add_volume(mujoco, spec, bodies[shape.link], shape, shape.position - origins[shape.link])
+    for item in objects.values():
+        _add_volume(mujoco, spec, spec.worldbody, item, item.position)
     for one, other in map(sorted, robot.untested):
         spec.add_exclude(bodyname1=f"link{one}", bodyname2=f"link{other}")
     return spec
 
 
-def _drive(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
+def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
     spec.option.gravity = np.zeros(3)
     for index in range(joints):
         servo = spec.add_actuator(name=f"servo{index}", target=f"joint{index}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_velocity(gain)
 
 
-def _add(mujoco: Any, spec: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
+def _add_volume(mujoco: Any, spec: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
     kinds = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in ("sphere", "capsule", "cylinder", "box", "mesh")}
     size = np.zeros(3)
     size[: len(volume.size)] = volume.size
@@ -130,28 +125,24 @@ def _add(mujoco: Any, spec: Any, body: Any, volume: Shape | WorldObject, positio
     body.add_geom(name=volume.name, type=kinds[volume.kind], size=size, pos=position, quat=turn, margin=0.0)
 
 
-GAIN = 20.0  # N m s/rad of the servos, on bodies of 1 kg and 1 kg m^2
-PERIOD = 50  # ticks between two commands
-
-
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
-    """Processor time [us] of a control tick's worth of steps, while random velocities are asked for."""
+    """Return the processor time [us] of MuJoCo's steps for one control tick, while random velocities are commanded."""
     alive = np.isin(np.arange(len(plant.robot.motors)), plant.motors.living)
     robot = stiffened(plant.robot, alive, solids=False)
-    peer = MujocoPeer(replace(robot, untested=_untested(robot)), plant.model.world.objects, servo=GAIN)
+    peer = MujocoPeer(replace(robot, untested=_untested(robot)), plant.model.world.objects, servo=SERVO_GAIN)
     substeps = MotorParameters().substeps(plant.dt)
     peer.model.opt.timestep = plant.dt / substeps
     rng, spent = np.random.default_rng(seed), 0.0
-    for _ in range(ticks // PERIOD):
+    for _ in range(ticks // COMMAND_PERIOD):
         peer.data.ctrl[:] = rng.uniform(-0.5, 0.5, peer.model.nu)
         start = time.process_time()
-        peer.step(PERIOD * substeps)
+        peer.step(COMMAND_PERIOD * substeps)
         spent += time.process_time() - start
-    return 1e6 * spent / (ticks // PERIOD * PERIOD)
+    return 1e6 * spent / (ticks // COMMAND_PERIOD * COMMAND_PERIOD)
 
 
 def _untested(robot: Robot) -> dict[LinkPair, str]:
-    """Links of which no two shapes are tested."""
+    """Return the pairs of links no two shapes of which are tested, with the reason."""
     link = [shape.link for shape in robot.shapes]
     tested = {frozenset((link[i], link[j])) for i, j in robot.field_pairs.tolist()}
     links = range(len(robot.links))

@@ -1,9 +1,9 @@
-"""How soon the library and the whole system are there, and how much memory they take.
+"""Start-up: import, first pose and start of the whole system, in time and memory.
 
-Claim: `import mobee` takes at most 0.2 s, from there to the first pose with its contacts at most 0.3 s altogether, the first time as
-every time; the default system without its page is ready within 3 s and takes at most 500 MB (PSS: what processes share counts once).
-The times of the library are judged by their processor time as multiples of NumPy's import, each a fresh process in turn with the others;
-the system's by the calibration loop in two processes at once.  Memory is no speed and is judged as it is.  Run time: half a minute.
+Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the default
+system without its page is ready within 3 s and takes at most 500 MB (PSS: memory that processes share counts once).
+Processor times of the library are judged as multiples of NumPy's import, each in a fresh process, by turns; the system's time by the
+calibration loop in two processes at once.  Memory is judged in MB.  Run time: half a minute.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import calibration
-from experiments.bench import verdicts as requirement
+from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.verdicts import judged
+from experiments.bench.verdicts import Requirement
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of
 
 NUMPY, IMPORT, POSE = "import numpy", "import mobee", "first pose"
 _NUMPY_SECONDS = 0.08  # of processor time, on the standard machine
-MOST = {IMPORT: 0.2 / _NUMPY_SECONDS, POSE: 0.3 / _NUMPY_SECONDS}  # times NumPy's import
-MOST_READY = 3.0  # s
-MOST_MEGABYTES = 500.0
+REQUIREMENTS = (
+    Requirement(f"{IMPORT}, times NumPy's import", ("times_numpy", IMPORT), at_most=0.2 / _NUMPY_SECONDS),
+    Requirement(f"{POSE}, times NumPy's import", ("times_numpy", POSE), at_most=0.3 / _NUMPY_SECONDS),
+    Requirement("system ready, s", ("system", "standard_ready_s"), at_most=3.0),
+    Requirement("system, MB", ("system", "total_megabytes"), at_most=500.0),
+)
 _PROGRAMS = {
     NUMPY: "import numpy",
     IMPORT: "import mobee",
@@ -55,75 +57,74 @@ QUICK = Settings(rounds=5, systems=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Everything that `mobee bench start --json` prints; raises LaunchFailed."""
+    """Measure, and return all numbers and the verdict; raises LaunchFailed."""
     rounds: list[dict[str, tuple[float, float]]] = []
     systems: list[dict[str, Any]] = []
     with Progress() as progress:
         for number in range(settings.rounds):
             progress.show(0.5 * number / settings.rounds, "the library")
-            rounds.append({name: _fresh(program) for name, program in _PROGRAMS.items()})
+            rounds.append({name: _times_in_new_process(program) for name, program in _PROGRAMS.items()})
         with Crew(2) as crew:
             speeds = Calibration(crew.loops)
             for number in range(settings.systems):
                 progress.show(0.5 + 0.5 * number / settings.systems, "the system")
                 systems.append(_system(settings.seconds, speeds))
-    return summed_up(rounds, systems)
+    return summarized(rounds, systems)
 
 
-def summed_up(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of rounds, each program's wall and processor time [s], and of some starts of the system: medians and the verdict."""
+def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return medians and the verdict.
+
+    `rounds`: wall and processor time [s] of each program in each round; `systems`: the starts of the system.
+    """
     wall, own = ({name: np.array([one[name][which] for one in rounds]) for name in _PROGRAMS} for which in (0, 1))
-    ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in MOST}
+    ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in (IMPORT, POSE)}
     system: dict[str, Any] = {name: float(np.median([one[name] for one in systems])) for name in ("ready_s", "standard_ready_s", "speed")}
     processes: dict[str, list[float]] = {}
     for one in systems:
-        for who, megabytes in one["megabytes"].items():
-            processes.setdefault(who, []).append(megabytes)
-    system["megabytes"] = {who: float(np.median(values)) for who, values in processes.items()}
+        for service, size in one["megabytes"].items():
+            processes.setdefault(service, []).append(size)
+    system["megabytes"] = {service: float(np.median(sizes)) for service, sizes in processes.items()}
     system["total_megabytes"] = sum(system["megabytes"].values())
-    required = [judged(f"{name}, times NumPy's import", ratio, at_most=MOST[name]) for name, ratio in ratios.items()]
-    required.append(judged("system ready, s", system["standard_ready_s"], at_most=MOST_READY))
-    required.append(judged("system, MB", system["total_megabytes"], at_most=MOST_MEGABYTES))
-    return {
+    result = {
         "wall_s": {name: float(np.median(values)) for name, values in wall.items()},
         "processor_s": {name: float(np.median(values)) for name, values in own.items()},
         "times_numpy": ratios,
         "system": system,
-        "requirements": required,
-        "passed": requirement.all_passed(required),
     }
+    return result | verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
 
 
-def _fresh(program: str) -> tuple[float, float]:
-    """Wall and processor time [s] of a program in a process of its own."""
+def _times_in_new_process(program: str) -> tuple[float, float]:
+    """Return wall and processor time [s] of a program in a process of its own."""
     done = subprocess.run([sys.executable, "-c", _TIMED.format(program)], capture_output=True, text=True, check=True)
     wall, own = map(float, done.stdout.split())
     return wall, own
 
 
 def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
-    """The default system without its page: s until it was ready, and PSS [MB] of each process at the end."""
+    """Start the default system without its page; returns the time until it was ready [s], and PSS [MB] of each process at the end."""
     newest: dict[str, float] = {}
 
-    def look(launcher: int) -> None:
-        seen = megabytes(launcher)
-        if len(seen) >= len(newest):  # fewer: it is ending
-            newest.update(seen)
+    def update(launcher: int) -> None:
+        found = megabytes(launcher)
+        if len(found) >= len(newest):  # fewer: it is ending
+            newest.update(found)
 
-    summary, speed = speeds.around(lambda: summary_of("default", duration=seconds, watch=look))
+    summary, speed = speeds.around(lambda: summary_of("default", duration=seconds, watch=update))
     ready = float(summary["seconds_to_ready"])
     return {"ready_s": ready, "standard_ready_s": ready * speed, "speed": speed, "megabytes": newest}
 
 
 def megabytes(launcher: int) -> dict[str, float]:
-    """PSS [MB] of the launcher and of every service that it has started."""
+    """Return PSS [MB] of the launcher and of every service that it has started."""
     found = {}
     for pid in (launcher, *_children(launcher)):
-        with contextlib.suppress(OSError, StopIteration):  # it has ended meanwhile
+        with contextlib.suppress(OSError, StopIteration):  # the process has ended meanwhile
             words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
             lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
             kilobytes = next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
-            found["launcher" if pid == launcher else _name(words)] = kilobytes / 1024.0
+            found["launcher" if pid == launcher else _service_name(words)] = kilobytes / 1024.0
     return found
 
 
@@ -134,8 +135,8 @@ def _children(pid: int) -> list[int]:
     return found
 
 
-def _name(words: list[str]) -> str:
-    """Of a service by its command: its module, or its settings' name where several share one."""
+def _service_name(words: list[str]) -> str:
+    """Return the module in a service's command, or the name of its settings where several services share a module."""
     if "--config" in words:
         return Path(words[words.index("--config") + 1]).stem
     modules = [word for word in words[words.index("-m") + 1 :] if word != "mobee_system.run"] if "-m" in words else words
@@ -143,12 +144,12 @@ def _name(words: list[str]) -> str:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The measurements as text."""
+    """Format the measurements."""
     lines = [f"{'fresh processes, medians':<30}{'wall, s':>9}{'processor, s':>14}{'x numpy':>9}"]
     for name, wall in result["wall_s"].items():
         times = f"{result['times_numpy'][name]:.2f}" if name in result["times_numpy"] else ""
         lines.append(f"  {name:<28}{wall:>9.3f}{result['processor_s'][name]:>14.3f}{times:>9}")
     system = result["system"]
     lines.append(f"default system without its page: ready after {system['ready_s']:.1f} s, {system['total_megabytes']:.0f} MB:")
-    lines.append("  " + ", ".join(f"{who} {size:.0f}" for who, size in system["megabytes"].items()))
-    return "\n".join([*lines, calibration.told(system["speed"]), *requirement.lines(result["requirements"])])
+    lines.append("  " + ", ".join(f"{service} {size:.0f}" for service, size in system["megabytes"].items()))
+    return verdicts.report_text([*lines, verdicts.calibration_line(system["speed"])], result)

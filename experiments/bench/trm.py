@@ -1,4 +1,4 @@
-"""The pre-grasp map of thesis figure 4.8 by least squares and by the evolution strategy: how soon, how complete, how valid."""
+"""The pre-grasp map of thesis figure 4.8 by least squares and by the evolution strategy: how fast, how complete, how valid."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench import calibration
-from experiments.bench import verdicts as requirement
+from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.verdicts import judged, some_cores
+from experiments.bench.timing import some_cores
+from experiments.bench.verdicts import Requirement, judged
 from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.command_line import Progress
@@ -26,20 +26,20 @@ from mobee.roadmap.roadmap import Roadmap
 LEAST_SQUARES, NES, HYBRID = "least_squares", "nes", "hybrid"
 CORES = 2
 NEIGHBOURS = 8  # thesis 4.3.3
-WARM = 0.1  # m, spacing of a map that nobody times
+WARM_UP_SPACING = 0.1  # m, of a map that is not timed
+MIN_VERTICES = 4000
+LARGER_IS_WORSE = ("wall_s", "processor_s", "standard_wall_s", "evaluations", "largest_hole")
 
-# Name, method, key, at least or at most, bound.
 REQUIREMENTS = tuple(
-    (f"{method}, {name}", method, key, sense, bound)
+    Requirement(f"{method}, {name}", (method, key), at_least, at_most)
     for method, seconds in ((LEAST_SQUARES, 2.0), (NES, 25.0))
-    for name, key, sense, bound in (
-        ("s on 2 cores", "standard_wall_s", "most", seconds),
-        ("coverage", "coverage", "least", 0.99),
-        ("largest hole, spacings", "largest_hole", "most", 1.5),
-        ("valid by python-fcl", "valid", "least", 1.0),
+    for name, key, at_least, at_most in (
+        ("s on 2 cores", "standard_wall_s", None, seconds),
+        ("coverage", "coverage", 0.99, None),
+        ("largest hole, spacings", "largest_hole", None, 1.5),
+        ("valid by python-fcl", "valid", 1.0, None),
     )
 )
-VERTICES = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Settings:
 
     spacing: float = PREGRASP_SPACING
     seeds: int = 1
-    vertices: int = VERTICES
+    vertices: int = MIN_VERTICES
     methods: Sequence[str] = (LEAST_SQUARES, NES, HYBRID)
 
 
@@ -56,36 +56,36 @@ QUICK = Settings(spacing=0.03, vertices=300)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """All numbers, for people and scripts; of several seeds the worst."""
+    """Measure, and return all numbers and the verdict; of several seeds the worst."""
     example = replace(pregrasp(), margin=0.0)  # all that can be reached
     spacing = np.full(len(example.task.names), settings.spacing)
     rows: dict[str, dict[str, float]] = {}
     with Progress() as progress:
         with some_cores(CORES) as cores, Crew(CORES) as crew:
             speeds = Calibration(crew.loops)
-            _built(example, WARM, LEAST_SQUARES, 0)
+            _build(example, WARM_UP_SPACING, LEAST_SQUARES, 0)
             maps: dict[str, list[tuple[Roadmap, dict[str, float]]]] = {}
             for number, method in enumerate(settings.methods):
                 progress.show(number / (len(settings.methods) + 1), method)
                 maps[method] = [_timed(example, settings.spacing, method, seed, speeds) for seed in range(settings.seeds)]
-        progress.show(len(maps) / (len(maps) + 1), "what can be reached")
+        progress.show(len(maps) / (len(maps) + 1), "reachable places")
         points = reachable(example.model, example.costs, example.task, spacing, example.motors, example.start, example.margin)
         points = np.concatenate([points, *(trm.y for runs in maps.values() for trm, _ in runs)])
         for method, runs in maps.items():
-            each = [figures | _judged(example, trm, points, spacing) for trm, figures in runs]
-            rows[method] = {key: _worst(key, [one[key] for one in each]) for key in each[0]}
+            each = [figures | _quality(example, trm, points, spacing) for trm, figures in runs]
+            rows[method] = {key: (max if key in LARGER_IS_WORSE else min)(one[key] for one in each) for key in each[0]}
     about = {"cores": cores, "speed": speeds.median, "spacing": settings.spacing, "reachable": len(points), "rows": rows}
     return about | verdict(rows, settings.vertices)
 
 
 def verdict(rows: Mapping[str, Mapping[str, float]], vertices: int) -> dict[str, Any]:
-    """Whether the maps are made as soon, as complete and as valid as required."""
-    required = [judged(name, rows[row][key], **{f"at_{sense}": bound}) for name, row, key, sense, bound in REQUIREMENTS if row in rows]
+    """Return whether the maps are built as fast, as complete and as valid as required."""
+    required = [one.judge(rows) for one in REQUIREMENTS if one.keys[0] in rows]
     required += [judged(f"{method}, vertices", row["vertices"], at_least=vertices) for method, row in rows.items()]
-    return {"requirements": required, "passed": requirement.all_passed(required)}
+    return verdicts.verdict(required)
 
 
-def _built(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
+def _build(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
     return mobee.build_roadmap(
         example.model,
         example.costs,
@@ -103,7 +103,7 @@ def _built(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
 def _timed(example: Example, spacing: float, method: str, seed: int, speeds: Calibration) -> tuple[Roadmap, dict[str, float]]:
     def run() -> tuple[Roadmap, float, float]:
         wall, processor = time.perf_counter(), time.process_time()
-        trm = _built(example, spacing, method, seed)
+        trm = _build(example, spacing, method, seed)
         return trm, time.perf_counter() - wall, time.process_time() - processor
 
     (trm, wall, processor), speed = speeds.around(run)
@@ -111,7 +111,7 @@ def _timed(example: Example, spacing: float, method: str, seed: int, speeds: Cal
     return trm, figures | {"vertices": len(trm.q), "evaluations": trm.settings["evaluations"] / len(trm.q)}
 
 
-def _judged(example: Example, trm: Roadmap, points: Array, spacing: Array) -> dict[str, float]:
+def _quality(example: Example, trm: Roadmap, points: Array, spacing: Array) -> dict[str, float]:
     found = coverage(points, trm.y, spacing)
     joined = nearest(trm.y, spacing, NEIGHBOURS)
     good = valid(example.model, example.costs, example.task, trm.q, trm.y, example.motors, example.start)
@@ -123,12 +123,8 @@ def _judged(example: Example, trm: Roadmap, points: Array, spacing: Array) -> di
     }
 
 
-def _worst(key: str, values: Sequence[float]) -> float:
-    return max(values) if key in ("wall_s", "processor_s", "standard_wall_s", "evaluations", "largest_hole") else min(values)
-
-
 def report(result: dict[str, Any]) -> str:
-    """The measurements as text."""
+    """Format the measurements."""
     lines = [
         f"Right palm down over the table (thesis figure 4.8), {1e3 * result['spacing']:g} mm apart,",
         f"on {len(result['cores']) or 'all'} cores; {result['reachable']} reachable places to compare with:",
@@ -139,5 +135,5 @@ def report(result: dict[str, Any]) -> str:
         counts = f"{row['vertices']:>9.0f}{row['evaluations']:>11.0f}{row['wall_s']:>8.1f}{row['processor_s']:>7.1f}"
         shares = f"{100.0 * row['coverage']:>7.2f} %{row['largest_hole']:>6.2f}{valid_share:>6.1f} %{edges:>5.1f} %"
         lines.append(f"  {name:<13}{counts}{shares}")
-    lines.append(f"  hole: in spacings; edges: share of no more than {LONGEST:g} rad, {NEIGHBOURS} neighbours")
-    return "\n".join([*lines, calibration.told(result["speed"]), *requirement.lines(result["requirements"])])
+    lines.append(f"  hole: in spacings; edges: share no longer than {LONGEST:g} rad, {NEIGHBOURS} neighbours")
+    return verdicts.report_text(lines, result)

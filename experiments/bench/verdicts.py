@@ -1,28 +1,37 @@
-"""Requirements and verdicts of benchmarks, and the interleaved measurement of rates.
+"""Requirements of benchmarks, the verdict on a result, and the lines that a report prints of both.
 
-Figures that are judged are ratios, sizes or counts, or times on the standard machine (calibration.py): never bare times.
+A number that is judged is a ratio, a size or a count, or a time on the standard machine (calibration.py): never a bare time.
 """
 
 from __future__ import annotations
 
-import contextlib
-import gc
-import os
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 
-from mobee.arrays import Array
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A bound on one number of a benchmark's result; `aim` is printed and decides nothing."""
+
+    name: str
+    keys: tuple[str, ...]  # of the result, from the outermost
+    at_least: float | None = None
+    at_most: float | None = None
+    aim: float | None = None
+
+    def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
+        """Return name, number, bounds and verdict, as they are in the JSON of the benchmark."""
+        found: Any = result
+        for key in self.keys:
+            found = found[key]
+        return judged(self.name, found, at_least=self.at_least, at_most=self.at_most, aim=self.aim)
 
 
 def judged(
     name: str, found: float, *, at_least: float | None = None, at_most: float | None = None, aim: float | None = None
 ) -> dict[str, Any]:
-    """One requirement as JSON has it; `aim`: what is hoped for, which decides nothing."""
+    """Return the verdict on one number as JSON has it; `aim`: a better value, which decides nothing.  NaN never passes."""
     passed = (at_least is None or found >= at_least) and (at_most is None or found <= at_most)
     bounds = {"at_least": at_least, "at_most": at_most, "aim": aim}
     return {
@@ -33,17 +42,29 @@ def judged(
     }
 
 
-def all_passed(requirements: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether everything required is met."""
-    return all(one["passed"] for one in requirements)
+def verdict(requirements: Sequence[Mapping[str, Any]], **conditions: bool) -> dict[str, Any]:
+    """Return the part of a result that says whether it passes: every requirement is met and every named condition holds."""
+    passed = all(one["passed"] for one in requirements) and all(conditions.values())
+    return {"requirements": list(requirements), **conditions, "passed": passed}
 
 
-def lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
-    """A line each of at most 80 columns, that ends with its verdict."""
+def calibration_line(speed: float) -> str:
+    """Return the line of a report that says how fast this machine is, as a multiple of the standard machine."""
+    return f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"
+
+
+def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return a line of at most 80 columns for each requirement; it ends with the verdict."""
     return [
         f"  {one['name']:<44}{_number(one['found']):>9} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}"
         for one in requirements
     ]
+
+
+def report_text(lines: Iterable[str], result: Mapping[str, Any]) -> str:
+    """Return the lines of a benchmark, then the speed of this machine if it was measured, then the requirements."""
+    speed = [calibration_line(result["speed"])] if "speed" in result else []
+    return "\n".join([*lines, *speed, *requirement_lines(result["requirements"])])
 
 
 def _number(value: float) -> str:
@@ -56,73 +77,3 @@ def _bound(one: Mapping[str, Any]) -> str:
 
 def _aim(one: Mapping[str, Any]) -> str:
     return f"aim {one['aim']:g}" if "aim" in one else ""
-
-
-@dataclass(frozen=True, slots=True)
-class Contestant:
-    """What is timed: `run` evaluates `poses` poses."""
-
-    run: Callable[[], object]
-    poses: int
-
-
-@contextlib.contextmanager
-def one_core() -> Iterator[int | None]:
-    """Keep every thread of this process on one core, whose number it gives; None where the system has no such call."""
-    with some_cores(1) as cores:
-        yield cores[0] if cores else None
-
-
-@contextlib.contextmanager
-def some_cores(count: int) -> Iterator[tuple[int, ...]]:
-    """Keep every thread of this process on so many cores, whose numbers it gives; on all, (), where the system has no such call."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield ()
-        return
-    allowed = os.sched_getaffinity(0)
-    cores = tuple(sorted(allowed, reverse=True)[:count])
-    _pin(set(cores))
-    try:
-        yield cores
-    finally:
-        _pin(allowed)
-
-
-def _pin(cores: set[int]) -> None:
-    for thread in Path("/proc/self/task").iterdir():
-        with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
-            os.sched_setaffinity(int(thread.name), cores)
-
-
-def rates(contestants: Mapping[str, Contestant], rounds: int) -> dict[str, Array]:
-    """Poses per second of each contestant in each round, (rounds,); each round begins with another one."""
-    names = list(contestants)
-    measured: dict[str, list[float]] = {name: [] for name in names}
-    for one in contestants.values():
-        one.run()  # caches and lazy set-up
-    with _old_kept():
-        for number in range(rounds):
-            turn = number % len(names)
-            for name in names[turn:] + names[:turn]:
-                measured[name].append(_rate(contestants[name]))
-    return {name: np.array(values) for name, values in measured.items()}
-
-
-@contextlib.contextmanager
-def _old_kept() -> Iterator[None]:
-    """Meanwhile the garbage collector passes over what is there already."""
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-
-
-def _rate(one: Contestant) -> float:
-    gc.collect()
-    gc.disable()
-    start = time.process_time()
-    one.run()
-    seconds = time.process_time() - start
-    gc.enable()
-    return one.poses / seconds

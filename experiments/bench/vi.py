@@ -1,48 +1,53 @@
-"""How right and how fast plans are: beside exact policy iteration, SciPy's sparse matrices and quantecon."""
+"""Planning: how exact and how fast plans are, beside exact policy iteration, SciPy's sparse matrices and quantecon."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from experiments.bench import verdicts as requirement
-from experiments.bench.verdicts import Contestant, judged, one_core, rates
-from experiments.bench.vi_peers import QUANTECON, Problem, load_quantecon
-from experiments.bench.vi_workload import Tables, Work, at_random, at_work, of_size
+from experiments.bench import verdicts
+from experiments.bench.peers import QUANTECON, DecisionProblem, load_quantecon
+from experiments.bench.timing import Contestant, cores_text, one_core, rates
+from experiments.bench.verdicts import Requirement
 from experiments.kit.command_line import Progress
-from mobee.arrays import Array
-from mobee.learning.value_iteration import METHODS, policy_iteration, value_iteration
+from experiments.kit.learning.arm import arm_space
+from mobee import CuriousAgent
+from mobee.arrays import Array, Ints
+from mobee.learning.tabular import TabularPlant, half_space
+from mobee.learning.value_iteration import policy_iteration, value_iteration
 
 DISCOUNT, TOLERANCE = 0.9, 1e-3  # published
-OBSERVING = "changes of the model alone"  # taken off the time of the warm plans between them
+MODEL_CHANGES = "changes of the model alone"  # subtracted from the time of the warm plans between them
 COLD, WARM, ALGORITHM_7, SCIPY = "ours, cold", "ours, warm", "ours, Algorithm 7, cold", "SciPy sparse, cold"
-PEERS = (SCIPY, QUANTECON["value_iteration"])
-LARGE = 100_000  # states
+PEERS = {"scipy": SCIPY, "quantecon": QUANTECON["value_iteration"]}
+LARGE_STATES = 100_000
+METHODS: tuple[Literal["jacobi", "modified"], ...] = ("jacobi", "modified")
+ACTIONS = 16
+MAX_STATE_STEP = 64  # how far in number an action of a problem of any size leads
 
-# Name, key of the result, at least or at most, bound.
 REQUIREMENTS = (
-    ("largest difference from policy iteration", "difference", "most", 1e-9),
-    ("largest residual, in units of the tolerance", "residual", "most", 1.0),
-    ("cold, times faster than SciPy", "cold_times_scipy", "least", 6.0),
-    ("cold, times faster than quantecon", "cold_times_quantecon", "least", 8.0),
-    ("warm, times faster than SciPy", "warm_times_scipy", "least", 15.0),
-    ("warm, times faster than quantecon", "warm_times_quantecon", "least", 20.0),
-    (f"cold with {LARGE} states, times SciPy", "large_times_scipy", "least", 1.0),
+    Requirement("largest difference from policy iteration", ("difference",), at_most=1e-9),
+    Requirement("largest residual, in units of the tolerance", ("residual",), at_most=1.0),
+    Requirement("cold, times faster than SciPy", ("cold_times_scipy",), at_least=6.0),
+    Requirement("cold, times faster than quantecon", ("cold_times_quantecon",), at_least=8.0),
+    Requirement("warm, times faster than SciPy", ("warm_times_scipy",), at_least=15.0),
+    Requirement("warm, times faster than quantecon", ("warm_times_quantecon",), at_least=20.0),
+    Requirement(f"cold with {LARGE_STATES} states, times SciPy", ("large_times_scipy",), at_least=1.0),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much is solved."""
+    """How many problems are solved, and how often."""
 
     problems: int = 1000
     rounds: int = 15
     observations: int = 100  # of the agent, a warm plan after each
-    large: int = LARGE
+    large: int = LARGE_STATES
     large_rounds: int = 5
 
 
@@ -50,24 +55,24 @@ QUICK = Settings(problems=50, rounds=3, observations=50, large_rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """All numbers, for people and scripts; raises QuanteconMissing."""
+    """Measure, and return all numbers and the verdict; raises NotInstalled without quantecon."""
     load_quantecon()
     with one_core() as core, Progress() as progress:
-        differences, residuals = [], []
+        errors = []
         for number in range(settings.problems):
             if number % 10 == 0:
                 progress.show(0.4 * number / settings.problems, "random problems")
-            difference, residual = _checked(number)
-            differences.append(difference)
-            residuals.append(residual)
+            errors.append(_errors(number))
         progress.show(0.4, "81 states, 16 actions")
-        found = {name: 1e6 / values for name, values in rates(contestants(at_work(1000, settings.observations)), settings.rounds).items()}
-        found[WARM] -= found.pop(OBSERVING)
+        known = after_transitions(1000, settings.observations)
+        found = {name: 1e6 / values for name, values in rates(contestants(known), settings.rounds).items()}
+        found[WARM] -= found.pop(MODEL_CHANGES)
         progress.show(0.8, f"{settings.large} states")
         large = {name: 1.0 / values for name, values in rates(large_contestants(settings.large), settings.large_rounds).items()}
+    differences, residuals = zip(*errors, strict=True)
     result: dict[str, Any] = {"problems": settings.problems, "difference": max(differences), "residual": max(residuals)}
     result |= {"core": core, "rounds": settings.rounds, "us": {name: float(np.median(values)) for name, values in found.items()}}
-    for key, peer in zip(("scipy", "quantecon"), PEERS, strict=True):
+    for key, peer in PEERS.items():
         result |= {f"{ours}_times_{key}": float(np.median(found[peer] / found[name])) for ours, name in (("cold", COLD), ("warm", WARM))}
     result |= {"large_seconds": {name: float(np.median(values)) for name, values in large.items()}}
     result["large_times_scipy"] = float(np.median(large[SCIPY] / large[COLD]))
@@ -75,40 +80,151 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def verdict(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Whether plans are as right, and as fast beside the peers, as required."""
-    required = [judged(name, result[key], **{f"at_{sense}": bound}) for name, key, sense, bound in REQUIREMENTS]
-    return {"requirements": required, "passed": requirement.all_passed(required)}
+    """Return whether plans are as exact, and as fast beside the peers, as required."""
+    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
 
 
-def contestants(work: Work, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
-    """Every solver of a problem; ours warm after each change of it, from the values before."""
-    first = work.tables
-    peer = Problem(first, first.reward, discount, TOLERANCE)
+def report(result: dict[str, Any]) -> str:
+    """Format the measurements."""
+    lines = [
+        f"81 states, 16 actions, discount {DISCOUNT}, tolerance {TOLERANCE}; processor time",
+        f"{cores_text(result['core'])}, medians of {result['rounds']} rounds, in us a plan:",
+    ]
+    lines += [f"  {name:<40}{us:10.1f}" for name, us in result["us"].items()]
+    large = ", ".join(f"{name} {seconds:.2f}" for name, seconds in result["large_seconds"].items())
+    lines += [f"{LARGE_STATES} states, in s: {large}", f"{result['problems']} random problems, both methods, and requirements:"]
+    return verdicts.report_text(lines, result)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Outcomes and probabilities (B,) of one state-action, and its reward."""
+
+    state: int
+    action: int
+    outcomes: Ints
+    probabilities: Array
+    reward: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """Outcomes and probabilities, shape (S, A, B), and a reward (S, A)."""
+
+    outcomes: Ints
+    probabilities: Array
+    reward: Array
+
+    def row(self, state: int, action: int) -> Row:
+        """Return a copy of a row, so that it can be put back."""
+        at = state, action
+        return Row(state, action, self.outcomes[at].copy(), self.probabilities[at].copy(), float(self.reward[at]))
+
+    def put(self, row: Row) -> None:
+        """Change one row in place, as an observation does."""
+        at = row.state, row.action
+        self.outcomes[at], self.probabilities[at], self.reward[at] = row.outcomes, row.probabilities, row.reward
+
+
+@dataclass(frozen=True, slots=True)
+class ChangingProblem:
+    """A problem, and changes of one row each: those of some observations and then, backwards, the same undone."""
+
+    tables: Tables
+    changes: tuple[Row, ...]
+
+    def apply_changes(self) -> None:
+        """Make all changes, one by one."""
+        for change in self.changes:
+            self.tables.put(change)
+
+
+def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem:
+    """Return the problem before the observations, and their changes there and back."""
+    forward, back = [], []
+    for row in observations:
+        forward.append(row)
+        back.append(tables.row(row.state, row.action))
+        tables.put(row)
+    for row in reversed(back):
+        tables.put(row)
+    return ChangingProblem(tables, (*forward, *reversed(back)))
+
+
+def random_problem(seed: int) -> tuple[Tables, float]:
+    """Return a problem and a discount; it has empty bins, rewards of either sign, and states and actions that do not exist."""
+    rng = np.random.default_rng(seed)
+    shape = tuple(int(rng.integers(2, high)) for high in (40, 9, 7))
+    weights = rng.exponential(size=shape) * (rng.random(shape) < 0.7)
+    weights[rng.random(shape[0]) < 0.1] = 0.0
+    reward = rng.choice([0.01, 1.0, 100.0]) * rng.normal(loc=rng.choice([-2.0, 0.0, 2.0]), size=shape[:2])
+    reward[rng.random(shape[:2]) < 0.1] = -np.inf
+    totals = weights.sum(axis=-1, keepdims=True)
+    tables = Tables(rng.integers(shape[0], size=shape), weights / np.where(totals > 0.0, totals, 1.0), reward)
+    return tables, float(rng.choice([0.0, 0.5, 0.9, 0.99]))
+
+
+def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> ChangingProblem:
+    """Return a problem with 16 actions per state to states of similar number, which succeed, stay or end elsewhere."""
+    rng = np.random.default_rng(seed)
+    goals = (np.arange(states)[:, None] + rng.integers(-MAX_STATE_STEP, MAX_STATE_STEP + 1, (states, ACTIONS))) % states
+    stay = np.broadcast_to(np.arange(states)[:, None], goals.shape)
+    outcomes = np.stack([stay, goals, (goals + 1) % states], axis=-1)
+    tables = Tables(outcomes, rng.dirichlet([1.0, 8.0, 0.5], goals.shape), 0.02 * rng.exponential(size=goals.shape))
+    certain, some = np.array([0.1, 0.8, 0.1]), rng.integers(states, size=observations).tolist()
+    return with_changes(tables, [Row(s, 0, outcomes[s, 0], certain, 0.5 * float(tables.reward[s, 0])) for s in some])
+
+
+def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
+    """Return what a curious agent of 81 states and 16 actions knows after so many transitions, and its next observations."""
+    space = arm_space(neighbours=ACTIONS)
+    agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
+    agent.run(transitions)
+    before, rows = _tables_of(agent), []
+    for _ in range(observations):
+        agent.step()
+        rows.append(agent.last)
+    bins = agent.model.outcomes.shape[2]
+    known = _tables_of(agent)
+    wider = ((0, 0), (0, 0), (0, bins - before.outcomes.shape[2]))
+    before = Tables(np.pad(before.outcomes, wider), np.pad(before.probabilities, wider), before.reward)
+    return with_changes(before, [known.row(one.s, one.a) for one in rows if one is not None])
+
+
+def _tables_of(agent: CuriousAgent) -> Tables:
+    return Tables(agent.model.outcomes.copy(), agent.model.probabilities.copy(), agent.model.reward.copy())
+
+
+def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
+    """Return every solver of a problem; ours warm plans after each change of it, from the values before.
+
+    Raises ArithmeticError if a peer's values are farther from the exact ones than the tolerance allows.
+    """
+    first = problem.tables
+    peer = DecisionProblem(first, first.reward, discount, TOLERANCE)
     theirs = peer.quantecon()
     exact, _ = value_iteration(first, first.reward, discount, 1e-9, method="modified")
     peers = {SCIPY: peer.scipy_values} | {name: partial(peer.quantecon_values, theirs, method) for method, name in QUANTECON.items()}
-    limit = 2.0 * TOLERANCE * discount / (1.0 - discount)  # each is within half of it of the truth
+    limit = 2.0 * TOLERANCE * discount / (1.0 - discount)  # each is within half of it of the exact values
     for name, solve in peers.items():
-        off = np.abs(solve() - exact).max()
-        if off > limit:
-            raise ArithmeticError(f"{name} is wrong by {off:.3g}, which is more than {limit:.3g}.")
-    ours = {
-        COLD: partial(_cold, first, discount),
-        WARM: partial(_warm, work, exact, discount),
-        OBSERVING: partial(_observe, work),
-        ALGORITHM_7: partial(value_iteration, first, first.reward, discount, TOLERANCE),
+        error = np.abs(solve() - exact).max()
+        if error > limit:
+            raise ArithmeticError(f"{name} is wrong by {error:.3g}, which is more than {limit:.3g}.")
+    solvers: dict[str, tuple[Callable[[], object], int]] = {
+        COLD: (partial(_plan_cold, first, discount), 1),
+        WARM: (partial(_plan_warm, problem, exact, discount), len(problem.changes)),
+        MODEL_CHANGES: (problem.apply_changes, len(problem.changes)),
+        ALGORITHM_7: (partial(value_iteration, first, first.reward, discount, TOLERANCE), 1),
+        **{name: (solve, 1) for name, solve in peers.items()},
     }
-    return {
-        name: Contestant(partial(_repeat, solve, repeats), repeats * (len(work.changes) if name in (WARM, OBSERVING) else 1))
-        for name, solve in (ours | peers).items()
-    }
+    return {name: Contestant(partial(_repeat, solve, repeats), repeats * plans) for name, (solve, plans) in solvers.items()}
 
 
 def large_contestants(states: int) -> dict[str, Contestant]:
-    """One cold plan of a large problem: ours, and SciPy's."""
-    tables = of_size(states).tables
-    peer = Problem(tables, tables.reward, DISCOUNT, TOLERANCE)
-    return {COLD: Contestant(lambda: _cold(tables), 1), SCIPY: Contestant(peer.scipy_values, 1)}
+    """Return one cold plan of a large problem: ours, and SciPy's."""
+    tables = problem_of_size(states).tables
+    peer = DecisionProblem(tables, tables.reward, DISCOUNT, TOLERANCE)
+    return {COLD: Contestant(lambda: _plan_cold(tables), 1), SCIPY: Contestant(peer.scipy_values, 1)}
 
 
 def _repeat(solve: Callable[[], object], times: int) -> None:
@@ -116,32 +232,27 @@ def _repeat(solve: Callable[[], object], times: int) -> None:
         solve()
 
 
-def _cold(tables: Tables, discount: float = DISCOUNT) -> tuple[Array, Array]:
+def _plan_cold(tables: Tables, discount: float = DISCOUNT) -> tuple[Array, Array]:
     return value_iteration(tables, tables.reward, discount, TOLERANCE, method="modified")
 
 
-def _warm(work: Work, start: Array, discount: float) -> None:
-    tables = work.tables
-    for change in work.changes:
+def _plan_warm(problem: ChangingProblem, values: Array, discount: float) -> None:
+    tables = problem.tables
+    for change in problem.changes:
         tables.put(change)
-        start, _ = value_iteration(tables, tables.reward, discount, TOLERANCE, start, method="modified")
+        values, _ = value_iteration(tables, tables.reward, discount, TOLERANCE, values, method="modified")
 
 
-def _observe(work: Work) -> None:
-    for change in work.changes:
-        work.tables.put(change)
-
-
-def _checked(seed: int) -> tuple[float, float]:
+def _errors(seed: int) -> tuple[float, float]:
     """Of a random problem: the difference from policy iteration over the largest value, and the residual over the tolerance."""
-    tables, discount = at_random(seed)
+    tables, discount = random_problem(seed)
     exact, exact_actions = policy_iteration(tables, tables.reward, discount)
     exists, size = np.isfinite(exact_actions), float(np.abs(exact).max(initial=1.0))
     difference = residual = 0.0
     for method in METHODS:
         values, found = value_iteration(tables, tables.reward, discount, 1e-12, relative=True, method=method)
-        off = max(np.abs(values - exact).max(), np.abs(found[exists] - exact_actions[exists]).max(initial=0.0))
-        difference = max(difference, float(off) / size)
+        error = max(np.abs(values - exact).max(), np.abs(found[exists] - exact_actions[exists]).max(initial=0.0))
+        difference = max(difference, float(error) / size)
         values, _ = value_iteration(tables, tables.reward, discount, TOLERANCE, method=method)
         residual = max(residual, _residual(tables, exists, discount, values) / TOLERANCE)
     return difference, residual
@@ -153,15 +264,3 @@ def _residual(tables: Tables, exists: Array, discount: float, values: Array) -> 
     acting = exists.any(axis=1)
     best = np.where(exists, tables.reward + discount * onwards, -np.inf)[acting].max(axis=1)
     return float(np.abs(best - values[acting]).max(initial=0.0))
-
-
-def report(result: dict[str, Any]) -> str:
-    """The measurements as text."""
-    lines = [
-        f"81 states, 16 actions, discount {DISCOUNT}, tolerance {TOLERANCE}; processor time",
-        f"{'of one core' if result['core'] is not None else '(not pinned to a core)'}, medians of {result['rounds']} rounds, in us a plan:",
-    ]
-    lines += [f"  {name:<40}{us:10.1f}" for name, us in result["us"].items()]
-    large = ", ".join(f"{name} {seconds:.2f}" for name, seconds in result["large_seconds"].items())
-    lines += [f"{LARGE} states, in s: {large}", f"{result['problems']} random problems, both methods, and requirements:"]
-    return "\n".join([*lines, *requirement.lines(result["requirements"])])

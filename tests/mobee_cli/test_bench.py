@@ -1,9 +1,10 @@
-"""The benches' verbs, on given numbers: nothing is measured here."""
+"""`mobee bench` on given numbers: nothing is measured here."""
 
 from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +16,22 @@ from mobee_cli.bench import BENCHES
 
 
 def model_result(ours: float = 100.0, passed: bool = True) -> dict[str, Any]:
-    """What the model's bench would say if a batch of ours were that many times as fast as MuJoCo, and one call half of it."""
+    """Return the result of the model's benchmark if a batch of ours were that many times as fast as MuJoCo, and one call half of it."""
     from experiments.bench.agreement import Agreement
-    from experiments.bench.model import BATCH, CALL, ICUB, KINEMATICS, MUJOCO, OBJECTS, PAIRS, TREES, summed_up
-    from experiments.bench.random_robots import MAKERS
+    from experiments.bench.model import BATCH, CALL, CALL_OBJECTS, KINEMATICS, MUJOCO, PAIRS, TREES, summarized
+    from experiments.bench.scenes import ICUB, MAKERS
 
-    names = {BATCH: ours, CALL: ours / 2, OBJECTS: 3.0, KINEMATICS: 9.0, MUJOCO: 1.0, PAIRS: 0.01, TREES: 0.02}
+    names = {BATCH: ours, CALL: ours / 2, CALL_OBJECTS: 3.0, KINEMATICS: 9.0, MUJOCO: 1.0, PAIRS: 0.01, TREES: 0.02}
     rates = {name: 1000.0 * times * np.array([0.9, 1.0, 1.2]) for name, times in names.items()}
     others = {name: rates[name] for name in (BATCH, CALL, MUJOCO)}
     measured = {ICUB: {0: rates, 100: rates}} | {maker.name: {0: others, 100: others} for maker in MAKERS}
     one = Agreement("coal", ICUB, 100, 500, 14_076, 3, 1e-7, {"box-capsule": 1e-12}, 0.98, 1e-12, passed)
     about = {"motors": 41, "joints": 61, "primitives": 129, "pairs": 7451, "poses": 2000, "rounds": 3}
     threads = {"gain": 1.9, "processes": 1.95}
-    return summed_up(measured, threads, 1e-12, [one]) | {"workload": about, "core": 1, "versions": {}, "coal": True}
+    return summarized(measured, threads, 1e-12, [one]) | {"workload": about, "core": 1, "versions": {}, "coal": True}
 
 
-def test_every_bench_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_benchmark_has_help(capsys: pytest.CaptureFixture[str]) -> None:
     for name in BENCHES:
         with pytest.raises(SystemExit, match="0"):
             main(["bench", name, "--help"])
@@ -38,11 +39,10 @@ def test_every_bench_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.parametrize(("ours", "agree", "code"), [(100.0, True, 0), (5.0, True, 1), (100.0, False, 1)])
-def test_the_exit_code_says_whether_all_is_met(
+def test_the_exit_code_says_whether_all_requirements_are_met(
     ours: float, agree: bool, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("experiments.bench.model.measure", lambda settings: model_result(ours, agree))
-    monkeypatch.setattr("experiments.bench.model.load_mujoco", lambda: None)
     assert main(["bench", "model", "--json"]) == code
     result = json.loads(capsys.readouterr().out)
     assert result["passed"] == (code == 0)
@@ -60,7 +60,7 @@ def test_the_model_is_judged_by_ratios_of_the_same_round() -> None:
 
 
 def test_the_report_fits_80_columns_and_marks_what_falls_short() -> None:
-    from experiments.bench.model_report import report
+    from experiments.bench.model import report
 
     lines = report(model_result(ours=5.0, passed=False)).splitlines()
     assert max(map(len, lines)) <= 80
@@ -71,13 +71,13 @@ def test_the_report_fits_80_columns_and_marks_what_falls_short() -> None:
 def test_without_mujoco_it_names_the_extra(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert main(["bench", "model", "--quick"]) == 3
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err == "mobee bench: MuJoCo is not installed: pip install '.[bench]' in MoBeE's folder\n"
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err == "mobee bench: MuJoCo is not installed: pip install '.[bench]' in MoBeE's folder\n"
 
 
 @pytest.mark.parametrize("given", ["1001", "-1", "many"])
-def test_a_number_of_objects_that_there_are_not_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_number_of_objects_out_of_range_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["bench", "model", "--objects", given])
     assert "1000" in capsys.readouterr().err
@@ -89,7 +89,9 @@ def test_a_figure_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
 
     costs = {name: 10.0 for name in (BATCH, CALL, MUJOCO, TREES)}
     curves = {"boxes": {0: costs, 10: costs}, "primitives": {8: costs, 16: costs}}
-    monkeypatch.setattr("experiments.bench.model_cost.measure", lambda rounds: curves)
+    cost_figures = pytest.importorskip("experiments.bench.cost_figures")
+    made = replace(cost_figures.FIGURES["model"], measure=lambda quick, rounds: curves)
+    monkeypatch.setitem(cost_figures.FIGURES, "model", made)
     path = tmp_path / "cost.png"
     assert main(["bench", "model", "--figure", str(path)]) == 0
     assert path.read_bytes().startswith(b"\x89PNG")
@@ -104,12 +106,12 @@ def test_a_figure_that_cannot_be_written_is_refused_before_anything_is_measured(
 
 
 @pytest.mark.parametrize(("old", "said"), [("no-such-commit", "git worktree: "), ("", "git worktree: ")])
-def test_a_checkout_that_is_not_there_is_told(old: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_checkout_that_does_not_exist_is_reported(old: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "against", old, "--cases", "edges"]) == 3
     assert capsys.readouterr().err.startswith(f"mobee bench: {said}")
 
 
-def test_a_case_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_case_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["bench", "against", "HEAD", "--cases", "everything"])
     assert "'three agents'" in capsys.readouterr().err

@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench.cma_peer import load_cma
-from experiments.bench.nes_workload import FUNCTIONS, MOST, STRATEGIES
-from experiments.bench.nes_workload import trial as search
+from experiments.bench.nes import FUNCTIONS, MAX_EVALUATIONS, STRATEGIES, search
+from experiments.bench.peers import load_cma
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.statistics import decides, estimate, interval, ratio, ratio_interval
@@ -52,7 +51,7 @@ Runs = Mapping[tuple[str, Task], Array]  # evaluations (seeds,) of every strateg
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Every strategy on every task; --quick: 10 dimensions and 20 000 evaluations."""
-    dimensions, most = (DIMENSIONS[:1], QUICK_MOST) if arguments.quick else (DIMENSIONS, MOST)
+    dimensions, most = (DIMENSIONS[:1], QUICK_MOST) if arguments.quick else (DIMENSIONS, MAX_EVALUATIONS)
     return [
         Condition(
             f"{strategy}-{function.replace(' ', '-')}-{d}",

@@ -20,10 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import ik_solvers
-from experiments.bench.cma_peer import load_cma
-from experiments.bench.ik_solvers import MOST, Solve, library, rival, timed
-from experiments.bench.ik_workload import MOTORS, scene, targets
+from experiments.bench import ik
+from experiments.bench.ik import MAX_EVALUATIONS, MOTORS, Solve, library, rival, scene, targets, timed
+from experiments.bench.peers import load_cma
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import decides, estimate, ratio, ratio_interval
@@ -35,10 +34,10 @@ TARGETS, QUICK_TARGETS = 20, 2  # a seed
 FEW, WHOLE = 10, 41  # motors
 NES, XNES = "nes", "xnes"
 RIVALS = {
-    XNES: ik_solvers.XNES,
-    "cma": ik_solvers.CMA_BATCHED,
-    "annealing": ik_solvers.ANNEALING,
-    "particles": ik_solvers.PARTICLES,
+    XNES: ik.XNES,
+    "cma": ik.CMA_BATCHED,
+    "annealing": ik.ANNEALING,
+    "particles": ik.PARTICLES,
 }
 THEIRS = {"cma": "CMA-ES", "annealing": "simulated annealing", "particles": "a particle filter"}  # of thesis 3.1.1
 OURS = {NES: "NES (the library's)", XNES: "NES (xNES as published)"}
@@ -51,7 +50,7 @@ OUTPERFORMS = {
 }
 CLAIMS = tuple(OUTPERFORMS.values())
 
-LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MOST)  # evaluations, of the figure
+LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MAX_EVALUATIONS)  # evaluations, of the figure
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -134,8 +133,8 @@ def plot(found: Cells) -> Any:
                 reached = np.concatenate([values["reached"] for values in mine])
                 needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
                 shares = np.arange(len(needed) + 1) / len(reached)
-                axes.stairs(shares, [LEAST, *needed, MOST], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
-        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(LEAST, MOST), ylim=(0.0, 1.02))
+                axes.stairs(shares, [LEAST, *needed, MAX_EVALUATIONS], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(LEAST, MAX_EVALUATIONS), ylim=(0.0, 1.02))
         axes.set_xticks(TICKS, [f"{tick}" for tick in TICKS])
         axes.minorticks_off()
         axes.grid(alpha=0.2)

@@ -1,4 +1,4 @@
-"""Two checkouts: what is made of their times, and how their processes are driven, with a toy for a checkout."""
+"""Two checkouts: the arithmetic on their times, and the control of their processes, with toy checkouts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.bench import against
-from experiments.bench.against import HERE, LEAST, AgainstFailed, Checkout, checkout, compared, measure, report, verdict
+from experiments.bench.against import MIN_RATIO, REPOSITORY, AgainstFailed, Checkout, checkout, compared, measure_checkouts, report, verdict
 from experiments.bench.against_cases import CASES
 
 
@@ -18,7 +18,7 @@ def one_round(old: float, new: float, poses: int = 10) -> against.Pair:
 
 
 def test_every_case_has_its_requirement() -> None:
-    assert CASES.keys() == LEAST.keys()
+    assert CASES.keys() == MIN_RATIO.keys()
 
 
 def test_the_median_of_the_rounds_ratios_counts() -> None:
@@ -28,14 +28,14 @@ def test_the_median_of_the_rounds_ratios_counts() -> None:
     assert found["same_work"]
 
 
-def test_other_work_is_told() -> None:
+def test_counts_are_printed_where_the_work_differs() -> None:
     found = {"edges": compared([one_round(2.0, 1.0, poses=11)])}
     assert not found["edges"]["same_work"]
     lines = report({"rounds": 1, "cases": found, **verdict(found)}).splitlines()
     assert [line.strip() for line in lines if "poses" in line] == ["old: poses 10", "new: poses 11"]
 
 
-def test_as_much_faster_as_required_or_no_slower() -> None:
+def test_each_case_must_be_as_much_faster_as_required_or_no_slower() -> None:
     ratios = {"one arm": 1.9, "lockstep": 1.3, "edges": 0.98, "vi warm": 0.9}
     found = {case: compared([one_round(ratio, 1.0)]) for case, ratio in ratios.items()}
     passed = {one["name"]: one["passed"] for one in verdict(found)["requirements"]}
@@ -43,14 +43,14 @@ def test_as_much_faster_as_required_or_no_slower() -> None:
 
 
 def test_the_report_fits_80_columns() -> None:
-    found = {case: compared([one_round(123.456, 100.0)]) for case in LEAST}
+    found = {case: compared([one_round(123.456, 100.0)]) for case in MIN_RATIO}
     result = {"rounds": 5, "cases": found, **verdict(found)}
     assert max(map(len, report(result).splitlines())) <= 80
 
 
 @pytest.fixture
 def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Checkout, Checkout]:
-    """Two checkouts whose library says how long its work takes, and cases that ask it."""
+    """Two checkouts whose library holds the seconds of its work, and cases that report them."""
     for name, seconds in (("old", 3.0), ("new", 1.0)):
         folder = tmp_path / name / "mobee"
         folder.mkdir(parents=True)
@@ -67,27 +67,27 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Checkout, Che
 
 
 def test_each_checkout_works_with_its_own_library(toys: tuple[Checkout, Checkout]) -> None:
-    result = measure(*toys, ["edges", "one arm"], rounds=2)
+    result = measure_checkouts(*toys, ["edges", "one arm"], rounds=2)
     assert [result["cases"][case]["ratio"] for case in ("edges", "one arm")] == [3.0, 3.0]
     assert result["passed"] and result["rounds"] == 2
 
 
-def test_a_case_that_fails_says_its_last_word(toys: tuple[Checkout, Checkout]) -> None:
+def test_a_failing_case_is_reported_with_its_last_line(toys: tuple[Checkout, Checkout]) -> None:
     with pytest.raises(AgainstFailed, match="lockstep in .*: this checkout has none"):
-        measure(*toys, ["lockstep"], rounds=1)
+        measure_checkouts(*toys, ["lockstep"], rounds=1)
 
 
-def test_a_library_from_elsewhere_is_found_out(toys: tuple[Checkout, Checkout]) -> None:
+def test_a_library_from_another_folder_is_refused(toys: tuple[Checkout, Checkout]) -> None:
     (toys[0].folder / "mobee" / "__init__.py").unlink()
     (toys[0].folder / "mobee").rmdir()
     with pytest.raises(AgainstFailed, match="library was taken from|No module named"):
-        measure(*toys, ["edges"], rounds=1)
+        measure_checkouts(*toys, ["edges"], rounds=1)
 
 
-def test_a_commit_is_checked_out_meanwhile_and_a_folder_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_a_commit_is_checked_out_temporarily_and_a_folder_is_used_as_it_is(tmp_path: Path) -> None:
     with checkout(str(tmp_path)) as found:
         assert found == Checkout(tmp_path.resolve(), sys.executable)
-    if subprocess.run(["git", "-C", str(HERE), "rev-parse", "HEAD"], capture_output=True, check=False).returncode:
+    if subprocess.run(["git", "-C", str(REPOSITORY), "rev-parse", "HEAD"], capture_output=True, check=False).returncode:
         pytest.skip("not a clone")
     with checkout("HEAD") as found:
         assert (found.folder / "mobee" / "__init__.py").exists()

@@ -1,4 +1,4 @@
-"""The calibration's arithmetic, on a clock that the tests set; how fast anything is, is not looked at."""
+"""The calibration's arithmetic, on a clock that the tests set; no speed is measured."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from experiments.bench import calibration
-from experiments.bench.calibration import FRESH, STANDARD, Calibration, Crew, bare_ages, told
+from experiments.bench.calibration import SPEED_LIFETIME, STANDARD_SECONDS, Calibration, Crew, bare_ages
 
 
 class Clock:
-    """Stands still but for what it is told to spend."""
+    """A clock that advances only when a test says so."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -28,7 +28,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_the_speed_is_that_of_the_median_loop(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
-    seconds = iter([2.0 * STANDARD, 50.0 * STANDARD, 3.0 * STANDARD])
+    seconds = iter([2.0 * STANDARD_SECONDS, 50.0 * STANDARD_SECONDS, 3.0 * STANDARD_SECONDS])
 
     def loop() -> None:
         clock.now += next(seconds)
@@ -37,7 +37,7 @@ def test_the_speed_is_that_of_the_median_loop(clock: Clock, monkeypatch: pytest.
     assert calibration.speed(loops=3) == pytest.approx(1.0 / 3.0)
 
 
-def test_the_machine_is_looked_at_before_and_after_but_not_too_often(clock: Clock) -> None:
+def test_the_speed_is_measured_before_and_after_but_not_too_often(clock: Clock) -> None:
     speeds = iter([1.0, 0.5, 0.25])
     calibrated = Calibration(lambda: next(speeds))
 
@@ -45,9 +45,9 @@ def test_the_machine_is_looked_at_before_and_after_but_not_too_often(clock: Cloc
         clock.now += seconds
         return "done"
 
-    assert calibrated.around(lambda: spend(2.0 * FRESH)) == ("done", 0.75)
-    assert calibrated.around(lambda: spend(0.1 * FRESH)) == ("done", 0.5)  # known
-    assert calibrated.around(lambda: spend(2.0 * FRESH)) == ("done", 0.375)
+    assert calibrated.around(lambda: spend(2.0 * SPEED_LIFETIME)) == ("done", 0.75)
+    assert calibrated.around(lambda: spend(0.1 * SPEED_LIFETIME)) == ("done", 0.5)  # known
+    assert calibrated.around(lambda: spend(2.0 * SPEED_LIFETIME)) == ("done", 0.375)
     assert calibrated.speeds == [1.0, 0.5, 0.25]
     assert calibrated.median == 0.5
 
@@ -72,10 +72,6 @@ def test_ages_of_a_bare_chain_count_ticks_since_what_was_answered_last() -> None
 
 def test_the_newest_of_several_messages_counts() -> None:
     three = b"".join(calibration._message(tick) for tick in (6, 7, 8))
-    assert calibration._newest(three, 5) == 8
-    assert calibration._newest(three[:-1], 5) == 7  # the last one is not whole yet
-    assert calibration._newest(b"t", 5) == 5
-
-
-def test_a_report_says_how_fast_the_machine_is() -> None:
-    assert "0.33 x the standard machine" in told(1.0 / 3.0)
+    assert calibration._newest_tick(three, 5) == 8
+    assert calibration._newest_tick(three[:-1], 5) == 7  # the last one is not whole yet
+    assert calibration._newest_tick(b"t", 5) == 5

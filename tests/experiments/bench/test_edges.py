@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.bench.edges import Settings, measure, report, verdict
-from experiments.bench.edges_workload import palm_map
+from experiments.bench.edges import Settings, measure, palm_map, verdict
 
 
 @pytest.fixture(scope="module")
@@ -11,16 +10,10 @@ def result() -> dict:
     return measure(Settings(spacing=0.1, rounds=1))
 
 
-def test_all_ways_of_checking_agree_and_look_at_fewer_poses(result: dict) -> None:
+def test_all_methods_of_checking_agree_and_the_fast_ones_evaluate_fewer_poses(result: dict) -> None:
     assert result["agree"]
     assert 0 < result["change_edges"] < result["edges"] and 0 < result["blocked"] <= result["change_edges"]
     assert result["once_poses"] < result["plain_poses"] and result["once_poses"] < result["both_poses"]
-
-
-def test_the_report_fits_80_columns(result: dict) -> None:
-    lines = report(result).splitlines()
-    assert max(map(len, lines)) <= 80
-    assert [line.split()[-1] for line in lines[-2:]] == ["pass" if one["passed"] else "SHORT" for one in result["requirements"]]
 
 
 def test_times_are_judged_as_on_the_standard_machine() -> None:

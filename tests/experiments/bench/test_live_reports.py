@@ -1,4 +1,4 @@
-"""What the benchmarks of the live processes make of their measurements; the systems themselves run in tests/system."""
+"""Verdicts and reports of the benchmarks of the live system on given summaries; the systems themselves run in tests/system."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from experiments.bench import live, lockstep
-from experiments.bench.agree import EXACT, TICK, compare
+from experiments.bench.agree import MAX_DIFFERENCE, TICK, compare
 from mobee.store import Transition
 
 ONE = Transition(n=1, s=0, a=3, s_next=4, reward=0.1, settled=True, duration=2.4, q=(0.1, 0.2), touched=("table",))
@@ -21,12 +21,12 @@ def test_the_same_transitions_agree_as_far_as_both_have_them() -> None:
 
 
 def test_a_posture_a_little_off_is_found() -> None:
-    agreement = compare({"torso": [ONE]}, {"torso": [replace(ONE, q=(0.1, 0.2 + 2 * EXACT))]})
+    agreement = compare({"torso": [ONE]}, {"torso": [replace(ONE, q=(0.1, 0.2 + 2 * MAX_DIFFERENCE))]})
     assert agreement.same
     assert not agreement.passed
 
 
-def test_an_end_one_tick_later_and_another_touch_are_named() -> None:
+def test_an_end_one_tick_later_and_another_contact_are_reported() -> None:
     later = compare({"torso": [ONE]}, {"torso": [replace(ONE, duration=ONE.duration + TICK)]})
     assert "torso, action 1" in later.first_difference
     assert not compare({"torso": [ONE]}, {"torso": [replace(ONE, touched=())]}).passed
@@ -57,7 +57,7 @@ def test_the_table_of_lockstep_fits_80_columns_and_marks_what_falls_short() -> N
     runs = [lockstep.judged_run(lockstep.CASES[1], lockstep_summary(*of_one), speed=0.5) for of_one in ((12.0,), (1.0,), (12.0, False))]
     lines = lockstep.report({"seconds": 20.0, "speed": 0.5, "runs": runs, "passed": False}).splitlines()
     assert max(map(len, lines)) <= 80
-    assert [line.split()[-1] for line in lines[-4:-1]] == [f"{lockstep.CASES[1].aim:g}", "SHORT", "SPOILT"]
+    assert [line.split()[-1] for line in lines[-4:-1]] == [f"{lockstep.CASES[1].aim:g}", "SHORT", "VARIES"]
 
 
 def live_summary(p99: float) -> dict[str, Any]:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, report, verdict
+from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, verdict
 from experiments.claims.ch3_roadmaps import trm_coverage as coverage
 from mobee.roadmap.building.flood import Patience
 
@@ -15,7 +15,7 @@ def result() -> dict:
         return measure(Settings(spacing=0.08, seeds=2, vertices=20, methods=(LEAST_SQUARES,)))
 
 
-def test_it_tells_how_complete_and_how_valid_a_map_is(result: dict) -> None:
+def test_completeness_and_validity_of_a_map_are_measured(result: dict) -> None:
     row = result["rows"][LEAST_SQUARES]
     assert row["vertices"] >= 20 and row["valid"] == 1.0
     assert 0.9 < row["coverage"] <= 1.0 and 0.0 < row["largest_hole"] < 3.0
@@ -25,13 +25,6 @@ def test_it_tells_how_complete_and_how_valid_a_map_is(result: dict) -> None:
 def test_every_requirement_of_the_methods_asked_for_is_judged(result: dict) -> None:
     assert len(result["requirements"]) == 5
     assert result["passed"] == all(one["passed"] for one in result["requirements"])
-
-
-def test_the_report_fits_80_columns_and_marks_what_falls_short(result: dict) -> None:
-    result["requirements"][1] |= {"passed": False}
-    lines = report(result).splitlines()
-    assert max(map(len, lines)) <= 80
-    assert [line.split()[-1] for line in lines if line.endswith(("pass", "SHORT"))][1] == "SHORT"
 
 
 def test_times_are_judged_as_on_the_standard_machine() -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.bench import workload
 from experiments.bench.collision_peers import CoalPeer
+from experiments.bench.scenes import boxes_world, upper_body, upper_body_poses
 from mobee import Model
 from mobee.arrays import Array
 from mobee.model.contact import ContactTable
@@ -25,8 +25,8 @@ class Compared:
     """The contacts of both, and the volumes placed for further questions to coal."""
 
     def __init__(self, boxes: int) -> None:
-        robot, world = workload.robot(), workload.world(boxes)
-        self.q = workload.poses(POSES)
+        robot, world = upper_body(), boxes_world(boxes)
+        self.q = upper_body_poses(POSES)
         pose = Model(robot, world).evaluate(self.q)
         self.ours: ContactTable = pose.table
         self.transforms: Array = pose.transforms

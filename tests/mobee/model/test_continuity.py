@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from experiments.bench import workload
+from experiments.bench.scenes import boxes_world, upper_body
 from mobee import Model
 from mobee.arrays import Array
 from mobee.model.pose import Pose
@@ -40,7 +40,7 @@ class Steps:
 
 @pytest.fixture(scope="module", params=[0, 100], ids=["no boxes", "100 boxes"])
 def steps(request: pytest.FixtureRequest) -> tuple[int, Steps]:
-    robot, world = workload.robot(), workload.world(request.param)
+    robot, world = upper_body(), boxes_world(request.param)
     rng = np.random.default_rng(2014)
     low, high = robot.limits.T
     ends = rng.uniform(low, high, (2, PATHS, len(low)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.bench import workload
+from experiments.bench.scenes import boxes_world, upper_body, upper_body_poses
 from mobee import Model
 from mobee.model.contact import ContactTable
 from mobee.robot.robot import Robot
@@ -42,8 +42,8 @@ def test_volumes_of_all_kinds_and_roles_touch_as_in_the_compiled_engine() -> Non
 
 @pytest.mark.parametrize("boxes", [0, 100])
 def test_the_benchmark_has_the_same_contacts_normals_points_and_forces(boxes: int) -> None:
-    q = workload.poses(40)
-    ours, reference = (model.evaluate(q) for model in engines(workload.robot(), workload.world(boxes)))
+    q = upper_body_poses(40)
+    ours, reference = (model.evaluate(q) for model in engines(upper_body(), boxes_world(boxes)))
     assert assert_same(ours.table, reference.table) > 50
     assert ours.table.numbers.tolist() == reference.table.numbers.tolist()
     assert ours.table.normal == pytest.approx(reference.table.normal, abs=0.03)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.bench.nes_workload import FUNCTIONS, STRATEGIES
+from experiments.bench.nes import FUNCTIONS, STRATEGIES
 from experiments.claims.ch3_roadmaps import nes
 from experiments.claims.ch3_roadmaps.nes import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
 from experiments.kit.cells import Cell

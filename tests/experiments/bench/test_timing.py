@@ -5,8 +5,8 @@ import threading
 
 import pytest
 
-from experiments.bench import verdicts as rounds
-from experiments.bench.verdicts import Contestant, one_core, rates
+from experiments.bench import timing
+from experiments.bench.timing import Contestant, medians, one_core, rates
 
 
 class ProcessorTime:
@@ -18,21 +18,21 @@ class ProcessorTime:
     def __call__(self) -> float:
         return self.now
 
-    def spent(self, seconds: float) -> None:
+    def spend(self, seconds: float) -> None:
         self.now += seconds
 
 
-def test_everyone_runs_once_before_and_once_in_each_round_and_takes_turns_to_begin() -> None:
+def test_all_run_once_before_and_once_in_each_round_and_take_turns_to_begin() -> None:
     order: list[str] = []
     contestants = {name: Contestant(lambda name=name: order.append(name), 1) for name in "abc"}
     rates(contestants, rounds=3)
     assert "".join(order) == "abc" + "abc" + "bca" + "cab"
 
 
-def test_a_rate_is_poses_per_second_of_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rate_is_work_per_second_of_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = ProcessorTime()
-    monkeypatch.setattr(rounds.time, "process_time", clock)
-    fast, slow = Contestant(lambda: clock.spent(0.01), 100), Contestant(lambda: clock.spent(0.02), 100)
+    monkeypatch.setattr(timing.time, "process_time", clock)
+    fast, slow = Contestant(lambda: clock.spend(0.01), 100), Contestant(lambda: clock.spend(0.02), 100)
     found = rates({"fast": fast, "slow": slow}, rounds=3)
     assert found["fast"] == pytest.approx([1e4] * 3) and found["slow"] == pytest.approx([5e3] * 3)
 
@@ -41,19 +41,23 @@ def test_a_rate_is_poses_per_second_of_processor_time(monkeypatch: pytest.Monkey
 def test_every_thread_stays_on_one_core_and_is_free_again_after() -> None:
     before = os.sched_getaffinity(0)
     seen: list[set[int]] = []
-    go, looked = threading.Event(), threading.Event()
+    go, done = threading.Event(), threading.Event()
 
-    def look() -> None:
+    def read_affinity() -> None:
         go.wait()
         seen.append(os.sched_getaffinity(0))
-        looked.set()
+        done.set()
 
-    thread = threading.Thread(target=look)
+    thread = threading.Thread(target=read_affinity)
     thread.start()
     with one_core() as core:
         go.set()
-        assert looked.wait(10.0)
+        assert done.wait(10.0)
         assert os.sched_getaffinity(0) == {core}
     thread.join()
     assert seen == [{core}]
     assert os.sched_getaffinity(0) == before
+
+
+def test_medians_are_taken_of_each_number() -> None:
+    assert medians([{"a": 1.0, "b": 5.0}, {"a": 3.0, "b": 4.0}, {"a": 2.0, "b": 9.0}]) == {"a": 2.0, "b": 5.0}

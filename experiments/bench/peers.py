@@ -1,0 +1,103 @@
+"""Programs of other authors, called in the same way as the library's: CMA-ES, and solvers of decision problems."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from mobee.arrays import Array
+from mobee.errors import NotInstalled
+from mobee.learning.value_iteration import OutcomeModel
+
+
+def import_peer(module: str, name: str, extra: str = "bench") -> Any:
+    """Import an optional package and return it; raises NotInstalled, which names the extra of MoBeE's that brings it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise NotInstalled(f"{name} is not installed: pip install '.[{extra}]' in MoBeE's folder") from None
+
+
+def load_cma() -> Any:
+    """Return the package cma, CMA-ES by its authors; raises NotInstalled."""
+    return import_peer("cma", "cma")
+
+
+class CmaStrategy:
+    """CMA-ES with its default rates, called as the library's strategies: `ask` for a generation, `tell` its costs."""
+
+    def __init__(
+        self, start: Array, std: float, seed: int, population: int | None = None, limits: tuple[float, float] | None = None
+    ) -> None:
+        """`limits`: of every coordinate, None for none."""
+        options: dict[str, Any] = {"seed": seed + 1, "verbose": -9, "bounds": limits or [None, None]}  # its seed 0 means the time of day
+        if population is not None:
+            options["popsize"] = population
+        self._strategy = load_cma().CMAEvolutionStrategy(start, std, options)
+        self._asked: list[Array] = []
+
+    def ask(self) -> Array:
+        """Return the next generation, (population, d)."""
+        self._asked = self._strategy.ask()
+        return np.array(self._asked)
+
+    def tell(self, costs: Array) -> None:
+        """Learn from the costs (population,) of the samples that `ask` returned."""
+        self._strategy.tell(self._asked, costs.tolist())
+
+    @property
+    def stopped(self) -> bool:
+        """Whether its own criteria say that the search has ended."""
+        return bool(self._strategy.stop())
+
+
+QUANTECON = {"value_iteration": "quantecon value iteration", "modified_policy_iteration": "quantecon modified policy iteration"}
+
+
+def load_quantecon() -> Any:
+    """Return quantecon's class DiscreteDP; raises NotInstalled."""
+    return import_peer("quantecon.markov", "quantecon").DiscreteDP
+
+
+class DecisionProblem:
+    """A decision problem as SciPy and quantecon take it: one sparse matrix of all state-actions, made before anything is timed.
+
+    Every state has an action.  Holds the rewards (N,) and next states (N, S) of all N state-actions.  Of quantecon's methods the exact
+    one, policy iteration, is left out: it does not end where two actions are equal but for rounding.
+
+    Args:
+        model, reward, discount, tolerance: as of `mobee.value_iteration`.
+    """
+
+    def __init__(self, model: OutcomeModel, reward: Array, discount: float, tolerance: float) -> None:
+        self.discount, self.tolerance = discount, tolerance
+        self.states, self.actions = np.nonzero(reward != -np.inf)
+        self.rewards = np.ascontiguousarray(reward[self.states, self.actions])
+        self.first = np.searchsorted(self.states, np.arange(len(reward)))
+        weights, following = model.probabilities[self.states, self.actions], model.outcomes[self.states, self.actions]
+        rows = np.repeat(np.arange(len(self.rewards)), weights.shape[1])
+        self.following = csr_matrix((weights.ravel(), (rows, following.ravel())), shape=(len(self.rewards), len(reward)))
+        self.following.eliminate_zeros()
+
+    def scipy_values(self) -> Array:
+        """Compute state values (S,) by Algorithm 7, one sparse product per sweep."""
+        values, before = np.zeros(len(self.first)), np.zeros(len(self.rewards))
+        while True:
+            action_values = self.rewards + self.discount * (self.following @ values)
+            values = np.maximum.reduceat(action_values, self.first)
+            if np.abs(action_values - before).max() < self.tolerance:
+                return values
+            before = action_values
+
+    def quantecon(self) -> Any:
+        """Return the problem as quantecon's object."""
+        return load_quantecon()(self.rewards, self.following, self.discount, self.states, self.actions)
+
+    def quantecon_values(self, problem: Any, method: str) -> Array:
+        """Compute state values (S,) by quantecon from its own start, which is nearer than zero; its value iteration stops by our rule."""
+        epsilon = 2.0 * self.discount / (1.0 - self.discount) * self.tolerance
+        values: Array = problem.solve(method=method, epsilon=epsilon, max_iter=100_000).v
+        return values
