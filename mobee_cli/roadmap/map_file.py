@@ -69,4 +69,5 @@ def start_of(trm: Roadmap, given: list[float] | None) -> Array:
         raise UserError(
             f"--from: {robot.motors[motor]} cannot be at {q[motor]:g} rad: valid is {low[motor]:.3g} to {high[motor]:.3g}", BAD_INPUT
         )
-    return np.clip(q, low, high)
+    within: Array = np.clip(q, low, high)
+    return within
