@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mobee.roadmap.adaptive.walker import Walker
     from mobee.roadmap.building import tasks
     from mobee.roadmap.building.build import build_roadmap
-    from mobee.roadmap.building.front import Front
+    from mobee.roadmap.building.settings import RoadmapSettings, SearchSettings
     from mobee.roadmap.evolution.nes import NES
     from mobee.roadmap.evolution.search import Restart, minimize
     from mobee.roadmap.ik import costs
@@ -67,7 +67,7 @@ _MODULES = {
     "mobee.roadmap.adaptive.walker": "Walker",
     "mobee.roadmap.building": "tasks",
     "mobee.roadmap.building.build": "build_roadmap",
-    "mobee.roadmap.building.front": "Front",
+    "mobee.roadmap.building.settings": "RoadmapSettings SearchSettings",
     "mobee.roadmap.evolution.nes": "NES",
     "mobee.roadmap.evolution.search": "Restart minimize",
     "mobee.roadmap.ik": "costs",
@@ -91,7 +91,6 @@ __all__ = [
     "CuriousAgent",
     "CuriousSettings",
     "Forces",
-    "Front",
     "Gains",
     "Geometry",
     "IK",
@@ -117,8 +116,10 @@ __all__ = [
     "Reacher",
     "Restart",
     "Roadmap",
+    "RoadmapSettings",
     "Robot",
     "RobotFileError",
+    "SearchSettings",
     "Space",
     "Term",
     "TransitionModel",

@@ -20,7 +20,7 @@ from mobee.roadmap.evolution.search import Restart, Search
 from mobee.roadmap.ik.least_squares import NEAR
 from mobee.roadmap.ik.ngik import STD
 from mobee.roadmap.ik.problem import Problem
-from mobee.roadmap.ik.term import Term
+from mobee.roadmap.ik.terms import Term
 from mobee.robot.robot import Robot
 
 MARKER = "right_palm"
@@ -67,7 +67,7 @@ def xnes(problem: Problem, seed: int, most: int) -> Array | None:
     search = Search(start, STD * (high - low), problem.limits, restart, method="xnes", seed=seed)
     while problem.evaluations < most:
         q = problem.whole(search.ask())
-        costs, good = problem.look(q)
+        costs, good = problem.evaluate(q)
         if good.any():
             found: Array = q[int(good.argmax())]
             return found
@@ -86,7 +86,7 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
     while problem.evaluations < most:
         samples = strategy.ask()
         q = _poses(problem, samples)
-        looks = [problem.look(q)] if batched else [problem.look(one[None]) for one in q]
+        looks = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
         costs, good = (np.concatenate(part) for part in zip(*looks, strict=True))
         if good.any():
             found: Array = q[int(good.argmax())]
@@ -109,7 +109,7 @@ def annealing(problem: Problem, seed: int, most: int) -> Array | None:
         step = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** done * rng.standard_normal(len(here))
         there = np.clip(here + step, 0.0, 1.0)
         q = _poses(problem, there[None])
-        costs, good = problem.look(q)
+        costs, good = problem.evaluate(q)
         if good[0]:
             first: Array = q[0]
             return first
@@ -128,7 +128,7 @@ def particles(problem: Problem, seed: int, most: int) -> Array | None:
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
     while problem.evaluations < most:
         q = _poses(problem, places)
-        costs, good = problem.look(q)
+        costs, good = problem.evaluate(q)
         if good.any():
             found: Array = q[int(good.argmax())]
             return found
@@ -185,7 +185,7 @@ class MinkPeer:
             if end is not None:
                 q = problem.start.copy()
                 q[self._motors] = np.clip(end, low, high)
-                if problem.look(q[None])[1][0]:
+                if problem.evaluate(q[None])[1][0]:
                     return q
             about = np.clip(home + NEAR * (high - low) * rng.standard_normal(len(home)), low, high)
             begin = about if starts % 2 else rng.uniform(low, high)

@@ -19,7 +19,7 @@ from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.command_line import Progress
 from experiments.kit.roadmap_task import Example
 from mobee.arrays import Array
-from mobee.roadmap.building.build import LONGEST
+from mobee.roadmap.building.settings import MAX_TURN
 from mobee.roadmap.graph import nearest, short
 from mobee.roadmap.roadmap import Roadmap
 
@@ -93,10 +93,8 @@ def _build(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
         spacing,
         example.start,
         example.motors,
-        method,
         seed,
-        neighbours=NEIGHBOURS,
-        margin=example.margin,
+        mobee.RoadmapSettings(method, NEIGHBOURS, margin=example.margin),
     )
 
 
@@ -119,7 +117,7 @@ def _quality(example: Example, trm: Roadmap, points: Array, spacing: Array) -> d
         "coverage": found.share,
         "largest_hole": found.largest_hole,
         "valid": float(good.mean()),
-        "short_edges": len(short(trm.q, joined, LONGEST)) / len(joined),
+        "short_edges": len(short(trm.q, joined, MAX_TURN)) / len(joined),
     }
 
 
@@ -135,5 +133,5 @@ def report(result: dict[str, Any]) -> str:
         counts = f"{row['vertices']:>9.0f}{row['evaluations']:>11.0f}{row['wall_s']:>8.1f}{row['processor_s']:>7.1f}"
         shares = f"{100.0 * row['coverage']:>7.2f} %{row['largest_hole']:>6.2f}{valid_share:>6.1f} %{edges:>5.1f} %"
         lines.append(f"  {name:<13}{counts}{shares}")
-    lines.append(f"  hole: in spacings; edges: share no longer than {LONGEST:g} rad, {NEIGHBOURS} neighbours")
+    lines.append(f"  hole: in spacings; edges: share no longer than {MAX_TURN:g} rad, {NEIGHBOURS} neighbours")
     return verdicts.report_text(lines, result)

@@ -14,9 +14,9 @@ import mobee
 from mobee import Geometry, Model, Robot, World
 from mobee.arrays import Array
 from mobee.rendering.sheet import View
-from mobee.roadmap.building.build import LONGEST
-from mobee.roadmap.building.task import Task
-from mobee.roadmap.ik.term import Term
+from mobee.roadmap.building.settings import MAX_TURN
+from mobee.roadmap.building.tasks import Task
+from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
 
 Method = Literal["nes", "least_squares", "hybrid"]
@@ -79,7 +79,7 @@ def build(
     file: Path | None = None,
     progress: Callable[[Any], None] | None = None,
     neighbours: int | None = None,
-    longest: float | None = LONGEST,
+    longest: float | None = MAX_TURN,
 ) -> Roadmap:
     """The map of an example."""
     return mobee.build_roadmap(
@@ -89,11 +89,8 @@ def build(
         spacing=example.spacing,
         start=example.start,
         motors=list(example.motors),
-        margin=example.margin,
-        method=method,
         seed=seed,
-        neighbours=neighbours,
-        longest=longest,
+        settings=mobee.RoadmapSettings(method, neighbours, longest, example.margin),
         file=file,
         progress=progress,
     )

@@ -44,9 +44,7 @@ def map_given(arguments: argparse.Namespace) -> Roadmap:
     trm = load_roadmap(arguments.map, robot=robot_given(arguments) if arguments.robot else None)
     if arguments.world is None:
         return trm
-    model = Model(trm.model.robot, world_given(arguments))
-    model.reaching = trm.model.reaching
-    return replace(trm, model=model)
+    return replace(trm, model=Model(trm.model.robot, world_given(arguments)))
 
 
 def start_of(trm: Roadmap, given: list[float] | None) -> Array:

@@ -307,7 +307,8 @@ def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_
     (tmp_path / "own.py").write_text("from experiments.claims.ch3_roadmaps.trm_tasks import palm_down as example\n")
     code, out, _ = say("build", tmp_path / "own.py", "-o", path, "--method", "nes", "--neighbours", 8, "--longest", 0, "--seed", 4)
     assert code == 0 and out.startswith(f"{path}"[:20])
-    assert (given["method"], given["neighbours"], given["longest"], given["seed"], given["file"]) == ("nes", 8, None, 4, path)
+    settings = given["settings"]
+    assert (settings.method, settings.neighbours, settings.longest, given["seed"], given["file"]) == ("nes", 8, None, 4, path)
     assert given["spacing"] == 0.02 and given["task"].names == ("right_palm x", "right_palm y")
 
 

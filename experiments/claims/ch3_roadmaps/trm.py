@@ -4,9 +4,10 @@ Claim: the framework produces maps for all these tasks: poses that meet the task
 Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed
 on 2 cores.
 
-The tasks are in trm_tasks.py.  The part of a task's box that can be reached at all is found by other means: a flood of half the spacing
-with many starts a point, and random starts at random points.  A map covers of it what is within a spacing of a vertex.  Every pose is
-checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws it.
+The tasks are in trm_tasks.py.  The reachable part of a task's box is found independently: by least squares on a lattice of half the
+spacing with many starts per point, and by random starts at random points.  A map covers those of these points that are within a spacing
+of a vertex.  Every pose is checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws
+it.
 """
 
 from __future__ import annotations

@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 
 import mobee
 from mobee.arrays import Array
-from mobee.roadmap.building.flood import Patience, flooded
-from mobee.roadmap.building.goals import Goals
-from mobee.roadmap.building.task import Task
+from mobee.roadmap.building.lattice_builder import Patience, lattice_poses
+from mobee.roadmap.building.task_ik import TaskIK
+from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.problem import Cost, Problem, solid_robot
 
-FINER = 2  # points of the flood along a spacing
+FINER = 2  # points of the dense lattice along a spacing
 GENEROUS = Patience(starts=16, tries=24, hopeless=8, scouts=2048)
 BLIND, STARTS = 2000, 20  # random task points, and random starts of each
 OFF = 0.05  # spacings that a pose may be off such a point
@@ -55,13 +55,13 @@ def reachable(
 ) -> Array:
     """Task points (R, m) that can be reached, densely.
 
-    They are what a flood of half the spacing (m,) reaches, with far more starts a point than a map gets, and what random starts reach
-    at random points, independently of neighbours.
+    They are the points that least squares reaches on a lattice of half the spacing (m,), with far more starts per point than a map gets,
+    and those that random starts reach at random points, independently of neighbours.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
-    _, flood = flooded(problem, task, spacing / FINER, rng, patience=GENEROUS)
-    return np.concatenate([flood, _blind(problem, task, spacing, rng)])
+    _, dense = lattice_poses(problem, task, spacing / FINER, rng, patience=GENEROUS)
+    return np.concatenate([dense, _blind(problem, task, spacing, rng)])
 
 
 def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
@@ -99,8 +99,8 @@ def _blind(problem: Problem, task: Task, spacing: Array, rng: np.random.Generato
     """Those of some random points of the box that random starts reach, (B, m)."""
     low, high = task.box.T
     points = np.repeat(rng.uniform(low, high, (BLIND, len(low))), STARTS, axis=0)
-    goals = Goals(problem, task, OFF * spacing)
-    _, there, wrong, _ = goals.solve(points, goals.anywhere(len(points), rng))
+    ik = TaskIK(problem, task, OFF * spacing)
+    _, there, wrong, _ = ik.solve(points, ik.random_starts(len(points), rng))
     met = np.flatnonzero(wrong == 0.0)
     _, once = np.unique(met // STARTS, return_index=True)
     found: Array = there[met[once]]

@@ -21,7 +21,7 @@ from mobee import MobeeError
 from mobee.arrays import Array
 from mobee.rendering.motion import Motion, motion_through
 from mobee.rendering.sheet import Panel, Strip, cloud_solids, filmstrip, marker_cloud, pictures_of, write_sheet
-from mobee.roadmap.building.task import Coordinate
+from mobee.roadmap.building.tasks import Coordinate
 from mobee.roadmap.roadmap import Roadmap
 
 STEP = 0.05  # rad of the motor that moves most, between two poses of a film

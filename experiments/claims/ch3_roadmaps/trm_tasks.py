@@ -31,7 +31,7 @@ from experiments.kit.roadmap_task import (
     left_aside,
 )
 from mobee import Geometry, Model, costs, tasks
-from mobee.roadmap.ik.term import Term
+from mobee.roadmap.ik.terms import Term
 
 PREGRASP_SPACING = 0.008  # m
 

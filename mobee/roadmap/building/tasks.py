@@ -1,12 +1,13 @@
-"""Task spaces of thesis table 3.2 and of its examples; any function of a pose is a coordinate too.
+"""Task spaces: the coordinates over which a roadmap is spread (thesis eqs. 3.4, 3.5, table 3.2).
 
-Places are in m in the root frame, angles in rad.  `+` puts task spaces together: `place(...) + motors(...)` is the last row of the table.
+Positions are in m in the root frame, angles in rad.  `+` joins task spaces: `place(...) + motors(...)` is the last row of the table.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,18 +15,81 @@ from numpy.typing import ArrayLike
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.model.pose import Pose
-from mobee.roadmap.building.task import Coordinate, Task
-from mobee.roadmap.ik.aims import directed, level, motor_at
 from mobee.roadmap.ik.costs import unit_vector, vector
-from mobee.roadmap.ik.term import Aim, Function
+from mobee.roadmap.ik.terms import Aim, Function, directed, level, motor_at
 from mobee.robot.robot import Robot
 
 AXES = "xyz"
 Range = tuple[float, float]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Coordinate:
+    """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
+
+    `unit`: "m", "rad" or "".  `function`: computes the coordinate (N,) of a batch of poses q (N, n).  `aims`: residuals by which least
+    squares reaches a value; None without a derivative.  Raises InvalidValue unless low < high.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    function: Callable[[Pose], Array]
+    aims: Callable[[Robot, float], tuple[Aim, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise InvalidValue(f"box of {self.name!r} is ({self.low}, {self.high}); it must be finite (low, high), low below high.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """A task space Y: a tuple of coordinates; `first + second` has the coordinates of both."""
+
+    coordinates: tuple[Coordinate, ...]
+
+    def __post_init__(self) -> None:
+        if not self.coordinates:
+            raise InvalidValue("a task space needs at least one coordinate: see mobee.tasks.")
+        twice = sorted({name for name in self.names if self.names.count(name) > 1})
+        if twice:
+            raise InvalidValue(f"the task space has {', '.join(twice)} more than once; names of coordinates must differ.")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return tuple(one.name for one in self.coordinates)
+
+    @property
+    def box(self) -> Array:
+        """Lowest and highest value of every coordinate, (m, 2), in the units of the coordinates."""
+        return np.array([(one.low, one.high) for one in self.coordinates])
+
+    def of(self, pose: Pose) -> Array:
+        """Compute the task coordinates (N, m) of a batch of poses q (N, n); raises InvalidValue if one is not finite."""
+        y = np.stack([np.asarray(one.function(pose), dtype=np.float64) for one in self.coordinates], axis=-1)
+        if not np.isfinite(y).all():
+            where = np.argwhere(~np.isfinite(y))[0]
+            raise InvalidValue(f"task coordinate {self.names[where[-1]]!r} is {y[tuple(where)]} in a pose; it must be finite in all poses.")
+        return y
+
+    def aims(self, robot: Robot, y: Array) -> tuple[Aim, ...] | None:
+        """Return the residuals by which least squares reaches task coordinates y (m,); None if a coordinate has no derivative."""
+        found: list[Aim] = []
+        for one, value in zip(self.coordinates, y, strict=True):
+            if one.aims is None:
+                return None
+            found += one.aims(robot, float(value))
+        return tuple(found)
+
+    def __add__(self, other: Task) -> Task:
+        """Return the task space with the coordinates of both."""
+        return Task((*self.coordinates, *other.coordinates))
+
+
 def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
-    """Where a marker is, along some axes of the root frame (table 3.2, second row); `box`: (low, high) m of each axis."""
+    """Return the position of a marker along some axes of the root frame (table 3.2, second row); `box`: (low, high) m of each axis."""
     if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(AXES):
         raise InvalidValue(f"axes {axes!r}: valid are 'x', 'y', 'z', each at most once, as 'xy'.")
     if len(box) != len(axes):
@@ -38,35 +102,35 @@ def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
 
 
 def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
-    """How far a marker is along a direction (3,): direction . x, in m times its length; (1, 1, 1): table 3.2, first row."""
-    way = vector("direction", direction)
-    if not way.any():
-        raise InvalidValue("direction is 0; it must be (3,) numbers that are not all 0.")
-    return Task((_along(f"{marker} along {' '.join(f'{one:g}' for one in way)}", marker, way, low, high),))
+    """Return direction . x of a marker's position x, in m times the length of the direction (3,); (1, 1, 1): table 3.2, first row."""
+    components = vector("direction", direction)
+    if not components.any():
+        raise InvalidValue("direction is 0; it must be 3 numbers that are not all 0.")
+    return Task((_along(f"{marker} along {' '.join(f'{one:g}' for one in components)}", marker, components, low, high),))
 
 
 def motors(ranges: Mapping[str, Range]) -> Task:
-    """Where motors are, by name, each in (low, high) rad (table 3.2, third row)."""
+    """Return the positions of motors, by name, each in (low, high) rad (table 3.2, third row)."""
     return Task(tuple(_motor(name, low, high) for name, (low, high) in ranges.items()))
 
 
 def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: float, direction: ArrayLike | None = None) -> Task:
-    """How far a direction of a marker is turned about an axis, in (-pi, pi] rad.
+    """Return the angle of a marker's direction about an axis, in (-pi, pi] rad.
+
+    Least squares also makes the direction perpendicular to the axis.
 
     Args:
         marker: its name.
-        about: the axis (3,), root frame; what of the direction lies along it does not count.
-        zero: (3,), root frame: what the angle is measured from; across the axis.
-        low: rad, from -pi on.
-        high: rad, up to pi: a map does not go round.
+        about: the axis (3,), root frame; the component of the direction along it does not count.
+        zero: (3,), root frame: the direction of angle 0, perpendicular to the axis.
+        low: rad, at least -pi.
+        high: rad, at most pi: a roadmap does not wrap around.
         direction: (3,), in the marker's frame; None: its normal.
-
-    Least squares brings the direction across the axis, too.
     """
     axis, start = unit_vector("about", about), unit_vector("zero", zero)
     start = start - (start @ axis) * axis
     if np.linalg.norm(start) < 1e-6:
-        raise InvalidValue(f"zero {zero!r} lies along the axis {about!r}; it must point across it.")
+        raise InvalidValue(f"zero {zero!r} lies along the axis {about!r}; it must be perpendicular to it.")
     start /= np.linalg.norm(start)
     quarter = np.cross(axis, start)
     turned = None if direction is None else unit_vector("direction", direction)
@@ -74,37 +138,37 @@ def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: floa
         raise InvalidValue(f"box of the angle of {marker!r} is ({low}, {high}) rad; it must be (low, high) within -pi and pi.")
 
     def function(pose: Pose) -> Array:
-        way = pose.normal(marker) if turned is None else pose.rotation(marker) @ turned
-        found: Array = np.arctan2(way @ quarter, way @ start)
+        pointing = pose.normal(marker) if turned is None else pose.rotation(marker) @ turned
+        found: Array = np.arctan2(pointing @ quarter, pointing @ start)
         return found
 
     def aims(robot: Robot, value: float) -> tuple[Aim, ...]:
         m = robot.marker(marker)
-        way = m.normal if turned is None else m.rotation @ turned
-        return (directed(m, way, math.cos(value) * start + math.sin(value) * quarter),)
+        pointing = m.normal if turned is None else m.rotation @ turned
+        return (directed(m, pointing, math.cos(value) * start + math.sin(value) * quarter),)
 
     return Task((Coordinate(f"{marker} angle", "rad", float(low), float(high), function, aims),))
 
 
 def function(f: Callable[[Pose], ArrayLike], low: float, high: float, name: str = "", unit: str = "") -> Task:
-    """Any function of the pose, between low and high; it has no derivative, so least squares cannot follow it.
+    """Return a function of the pose, between low and high, as a coordinate; it has no derivative, so least squares cannot follow it.
 
-    `f`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and returns N numbers; or it is written for one
-    pose (`pose.position(marker)` (3,)) and returns one number: then it is called pose by pose, which takes longer.
+    `f`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and returns N numbers; or it takes one pose
+    (`pose.position(marker)` (3,)) and returns one number: then it is called pose by pose, which takes longer.
     """
     if not callable(f):
-        raise InvalidValue(f"{f!r} is no task coordinate: it must be a function of a pose.")
+        raise InvalidValue(f"{f!r} is not a task coordinate: it must be a function of a pose.")
     called = name or getattr(f, "__name__", "function")
     return Task((Coordinate(called, unit, float(low), float(high), Function(f, contacts=False)),))
 
 
-def _along(name: str, marker: str, way: Array, low: float, high: float) -> Coordinate:
+def _along(name: str, marker: str, direction: Array, low: float, high: float) -> Coordinate:
     def function(pose: Pose) -> Array:
-        found: Array = pose.position(marker) @ way
+        found: Array = pose.position(marker) @ direction
         return found
 
     def aims(robot: Robot, value: float) -> tuple[Aim, ...]:
-        return (level(robot.marker(marker), way, value),)
+        return (level(robot.marker(marker), direction, value),)
 
     return Coordinate(name, "m", float(low), float(high), function, aims)
 

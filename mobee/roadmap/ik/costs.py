@@ -12,8 +12,25 @@ from mobee.errors import InvalidValue
 from mobee.model.contact import ContactTable
 from mobee.model.masses import centre_of_mass, centre_of_mass_at_home
 from mobee.model.pose import Pose
-from mobee.roadmap.ik.aims import ALONG, FACING, HOLD, PLACE, TURNED, below, level
-from mobee.roadmap.ik.term import METRES, PER_METRE, PER_RAD, RADIANS, UPRIGHT, Aim, Function, Term, checked_term, direction_frame
+from mobee.roadmap.ik.terms import (
+    ALONG,
+    FACING,
+    HOLD,
+    METRES,
+    PER_METRE,
+    PER_RAD,
+    PLACE,
+    RADIANS,
+    TURNED,
+    UPRIGHT,
+    Aim,
+    Function,
+    Term,
+    below,
+    checked_term,
+    direction_frame,
+    level,
+)
 from mobee.robot.robot import Robot
 
 

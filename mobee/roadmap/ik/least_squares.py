@@ -9,9 +9,8 @@ import numpy as np
 
 from mobee.arrays import Array, Ints, checked_threads
 from mobee.errors import InvalidValue
-from mobee.roadmap.ik.aims import KINDS
 from mobee.roadmap.ik.problem import Flags, Problem, needed
-from mobee.roadmap.ik.term import Aim
+from mobee.roadmap.ik.terms import KINDS, Aim
 from mobee.robot.robot import Robot
 
 RESTARTS, AT_ONCE = 40, 4
@@ -86,7 +85,7 @@ def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
     while True:
         met = descent.run(starts)
         if len(met):
-            costs, good = problem.look(met)
+            costs, good = problem.evaluate(met)
             if good.any():
                 found: Array = met[int(np.where(good, costs, np.inf).argmin())]
                 return found

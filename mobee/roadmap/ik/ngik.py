@@ -84,14 +84,14 @@ def solve_ik(
 def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
     """The first generation's best that is within all tolerances; else the cheapest of all poses looked at."""
     start = problem.start[problem.free]
-    costs, good = problem.look(problem.start[None])
+    costs, good = problem.evaluate(problem.start[None])
     if good[0] and problem.must:
         return problem.start
     low, high = problem.limits.T
     search = Search(start, STD * (high - low), problem.limits, Restart(), POPULATION, seed=rng)
     while problem.evaluations + POPULATION <= most and (problem.must or search.starts == 1):
         q = problem.whole(search.ask())
-        costs, good = problem.look(q)
+        costs, good = problem.evaluate(q)
         if problem.must and good.any():
             found: Array = q[int(np.where(good, costs, np.inf).argmin())]
             return found

@@ -14,9 +14,8 @@ from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.model.pose import Pose
-from mobee.roadmap.ik.aims import MOTOR
 from mobee.roadmap.ik.costs import term
-from mobee.roadmap.ik.term import Aim, Term
+from mobee.roadmap.ik.terms import MOTOR, Aim, Term
 from mobee.robot.robot import Robot, per_robot
 
 _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
@@ -113,7 +112,7 @@ class Problem:
         q[:, self.free] = samples
         return q
 
-    def look(self, q: Array) -> tuple[Array, Array]:
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
         """The cost of poses q (N, n), (N,), and which of them are within all tolerances, (N,) bool."""
         pose = self.model.evaluate(q)
         self.evaluations += len(q)

@@ -11,7 +11,7 @@ import pytest
 
 from experiments.bench import edges, ik, model, nes, plant, trm, vi
 from experiments.claims.ch3_roadmaps import trm_coverage
-from mobee.roadmap.building.flood import Patience
+from mobee.roadmap.building.lattice_builder import Patience
 from mobee_cli.bench import BENCHES
 
 SMALLEST: dict[str, Any] = {

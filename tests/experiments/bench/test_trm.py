@@ -4,7 +4,7 @@ import pytest
 
 from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, verdict
 from experiments.claims.ch3_roadmaps import trm_coverage as coverage
-from mobee.roadmap.building.flood import Patience
+from mobee.roadmap.building.lattice_builder import Patience
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mobee import minimize
-from mobee.roadmap.building.chart import Region
+from mobee.roadmap.building.frontier import SimplexRegion
 
 D = 1.0
 
@@ -42,7 +42,7 @@ def run(
     evaluations: int = 120,
 ) -> Printed:
     """At most so many loops from the middle of a box."""
-    done, weights, region, start, weight = Printed(), [], Region(2), -1, 1.0
+    done, weights, region, start, weight = Printed(), [], SimplexRegion(2), -1, 1.0
     for loop in range(loops):
         if not weight > 0.0:
             done.ended = True

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.roadmap.building.judge import counted
-from mobee.roadmap.ik.term import Term
+from mobee.roadmap.building.frontier_builder import scaled_cost
+from mobee.roadmap.ik.terms import Term
 from tests.mobee.roadmap.printed import D, run, scalar, vector
 
 
@@ -53,7 +53,7 @@ def test_a_term_counts_as_much_as_it_misses_in_tolerances(missing: float) -> Non
         raise NotImplementedError
 
     values = np.array([missing])
-    assert counted(Term("a", residual, 20.0, 0.005), values)[0] == pytest.approx((missing / 0.005) ** 2)  # type: ignore[arg-type]
-    assert counted(Term("b", residual, 0.05, None), values)[0] == pytest.approx(0.05 * missing)  # type: ignore[arg-type]
-    strict = counted(Term("c", residual, 20.0, 0.0), values)[0]  # type: ignore[arg-type]
+    assert scaled_cost(Term("a", residual, 20.0, 0.005), values)[0] == pytest.approx((missing / 0.005) ** 2)  # type: ignore[arg-type]
+    assert scaled_cost(Term("b", residual, 0.05, None), values)[0] == pytest.approx(0.05 * missing)  # type: ignore[arg-type]
+    strict = scaled_cost(Term("c", residual, 20.0, 0.0), values)[0]  # type: ignore[arg-type]
     assert strict == pytest.approx(1.0 + 200.0 * missing if missing else 0.0)

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mobee.roadmap.building.judge import Seen
+from mobee.roadmap.building.frontier_builder import EvaluatedPoses
 
 LIMITS = np.array([[-1.5, 1.5], [0.1, 2.5], [-2.0, 2.0]])
 
 
 @dataclass
 class Arm:
-    """What of a Problem a Growth asks for."""
+    """The part of a Problem that a FrontierBuilder uses."""
 
     limits: np.ndarray = field(default_factory=LIMITS.copy)
     start: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, -1.0]))
@@ -27,22 +27,22 @@ class Arm:
 
 
 class Level:
-    """A judge of it: the last link is level within 0.1 rad; y is where the tip is."""
+    """Evaluates its poses: the last link must be level within 0.1 rad; y is the position of the tip."""
 
     def __init__(self, spacing: float, low: tuple[float, float] = (0.2, -0.4), high: tuple[float, float] = (0.9, 0.4)) -> None:
         self.problem = Arm()
         self.spacing = np.full(2, spacing)
         self.low, self.high = np.array(low) / spacing, np.array(high) / spacing
 
-    def look(self, q: np.ndarray) -> Seen:
+    def evaluate(self, q: np.ndarray) -> EvaluatedPoses:
         self.problem.evaluations += len(q)
         angles = np.cumsum(q, axis=1)
         tip = np.stack([np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1)], axis=1) / 3.0 / self.spacing
         level = np.abs(angles[:, -1]) / 0.1
         outside = np.maximum(0.0, np.maximum(self.low - tip, tip - self.high))
-        return Seen(level**2 + ((outside / 0.25) ** 2).sum(axis=1), (level <= 1.0) & (outside == 0.0).all(axis=1), tip)
+        return EvaluatedPoses(level**2 + ((outside / 0.25) ** 2).sum(axis=1), (level <= 1.0) & (outside == 0.0).all(axis=1), tip)
 
-    def missed(self, q: np.ndarray) -> str:
+    def violations(self, q: np.ndarray) -> str:
         return "level"
 
     def reachable(self, count: int = 40) -> np.ndarray:

@@ -28,10 +28,10 @@ from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell
 from experiments.kit.roadmap_task import build
 from mobee import costs, tasks
-from mobee.roadmap.building.flood import Patience, flooded
-from mobee.roadmap.building.task import Task
+from mobee.roadmap.building.lattice_builder import Patience, lattice_poses
+from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.problem import Problem
-from mobee.roadmap.ik.term import Term
+from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
 from tests.experiments.finished_cells import finished
 from tests.experiments.small_run import options_of
@@ -56,7 +56,7 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def whole(arm: mobee.Model) -> tuple[np.ndarray, np.ndarray]:
-    return flooded(Problem(arm, TERMS, None, None), TASK, SPACING, np.random.default_rng(0))
+    return lattice_poses(Problem(arm, TERMS, None, None), TASK, SPACING, np.random.default_rng(0))
 
 
 def test_a_whole_map_covers_all(brief: None, arm: mobee.Model, whole: tuple[np.ndarray, np.ndarray]) -> None:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.building import build, draft, search_schedule
-from mobee.roadmap.building.draft import Progress
+from mobee.roadmap.building import build, checkpoint, search_scheduler
+from mobee.roadmap.building.checkpoint import Progress
 
 MOTORS = ["torso", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow", "r_wrist_prosup", "r_wrist_pitch", "r_wrist_yaw"]
 COSTS = [mobee.costs.orientation("right_palm", [0.0, 0.0, -1.0], tolerance=0.2), mobee.costs.plane("right_palm", [0, 0, 1], 0.0, 0.02)]
 TASK = mobee.tasks.place("right_palm", "xy", [(-0.4, -0.25), (0.1, 0.3)])
-QUICK = mobee.Front(std=0.02, searches=8)
+QUICK = mobee.SearchSettings(std=0.02, searches=8)
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +25,10 @@ def model(icub: mobee.Robot) -> mobee.Model:
 
 
 def _build(model: mobee.Model, **others: object) -> mobee.Roadmap:
-    settings = {"costs": COSTS, "task": TASK, "spacing": 0.05, "motors": MOTORS, "method": "nes", "front": QUICK} | others
-    return mobee.build_roadmap(model, **settings)  # type: ignore[arg-type]
+    names = [one.name for one in dataclasses.fields(mobee.RoadmapSettings)]
+    settings = {"method": "nes", "search": QUICK} | {name: others.pop(name) for name in names if name in others}
+    arguments = {"costs": COSTS, "task": TASK, "spacing": 0.05, "motors": MOTORS} | others
+    return mobee.build_roadmap(model, **arguments, settings=mobee.RoadmapSettings(**settings))  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -35,15 +37,15 @@ def whole(model: mobee.Model) -> mobee.Roadmap:
 
 
 class Cut(Exception):
-    """What ends a building before its end."""
+    """Interrupts a building."""
 
 
 def _cut_after(vertices: int) -> Callable[[Progress], None]:
-    def told(progress: Progress) -> None:
+    def report(progress: Progress) -> None:
         if progress.vertices >= vertices:
             raise Cut
 
-    return told
+    return report
 
 
 @pytest.mark.parametrize("method", ["nes", "hybrid", "least_squares"])
@@ -91,18 +93,18 @@ def test_motors_keep_the_margin_from_their_limits(method: str, model: mobee.Mode
 def test_the_same_seed_gives_the_same_map_whatever_the_number_of_threads(
     model: mobee.Model, whole: mobee.Roadmap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(build, "WORKERS", 1)
+    monkeypatch.setattr(build, "MAX_THREADS", 1)
     again = _build(model)
     assert np.array_equal(again.q, whole.q)
     assert np.array_equal(again.edges, whole.edges)
 
 
 @pytest.mark.parametrize(("method", "vertices"), [("nes", 0), ("nes", 6), ("hybrid", 1), ("hybrid", 13), ("least_squares", 4)])
-def test_a_building_that_was_cut_off_goes_on_to_the_same_map(
+def test_an_interrupted_building_resumes_to_the_same_map(
     method: str, vertices: int, model: mobee.Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(draft, "EVERY", 0.0)
-    monkeypatch.setattr(draft, "TELL", 0.0)
+    monkeypatch.setattr(checkpoint, "SAVE_PERIOD", 0.0)
+    monkeypatch.setattr(checkpoint, "PROGRESS_PERIOD", 0.0)
     file = tmp_path / "map.npz"
     whole = _build(model, method=method)
     with pytest.raises(Cut):
@@ -129,7 +131,7 @@ def test_a_finished_map_is_not_built_again(model: mobee.Model, whole: mobee.Road
         ({"spacing": 0.06}, "spacing"),
         ({"seed": 1}, "seed"),
         ({"costs": [*COSTS[:1], mobee.costs.plane("right_palm", [0, 0, 1], 0.01, 0.02)]}, "meaning"),
-        ({"front": dataclasses.replace(QUICK, delta=1.0)}, "front"),
+        ({"search": dataclasses.replace(QUICK, delta=1.0)}, "front"),
     ],
 )
 def test_a_file_of_other_settings_is_refused_with_both_digests(
@@ -156,15 +158,15 @@ def test_a_file_of_another_world_is_refused_with_the_digests_of_both(model: mobe
 def test_a_world_that_changed_meanwhile_is_an_error(icub: mobee.Robot) -> None:
     model = mobee.Model(icub, mobee.load_world("table"))
 
-    def told(progress: Progress) -> None:
+    def report(progress: Progress) -> None:
         if "cup" not in model.world.objects:
             model.world.add("cup", mobee.sphere(0.03), position=(0.5, 0.5, 0.0))
 
-    with pytest.raises(mobee.MobeeError, match="have changed while the map was built"):
-        _build(model, progress=told)
+    with pytest.raises(mobee.MobeeError, match="has changed while the map was built"):
+        _build(model, progress=report)
 
 
-def test_settings_are_plain_json_and_say_what_it_was_made_of(whole: mobee.Roadmap) -> None:
+def test_settings_are_plain_json(whole: mobee.Roadmap) -> None:
     settings = json.loads(json.dumps(whole.settings))
     assert settings["names"] == list(TASK.names)
     assert settings["units"] == ["m", "m"]
@@ -208,22 +210,22 @@ def test_plain_functions_are_costs_and_coordinates(model: mobee.Model) -> None:
         ({"start": [0.0]}, "a position for every motor"),
     ],
 )
-def test_what_cannot_be_built_is_said(others: dict[str, object], message: str, model: mobee.Model) -> None:
+def test_arguments_that_are_not_valid_are_refused(others: dict[str, object], message: str, model: mobee.Model) -> None:
     with pytest.raises(mobee.MobeeError, match=message):
         _build(model, **others)
 
 
-def test_a_task_out_of_reach_is_said(model: mobee.Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search_schedule, "FIRST_MOST", 2)
-    monkeypatch.setattr(search_schedule, "FIRST_PATIENCE", 1)
+def test_a_task_out_of_reach_is_an_error(model: mobee.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search_scheduler, "MAX_FIRST_SEARCHES", 2)
+    monkeypatch.setattr(search_scheduler, "FIRST_PATIENCE", 1)
     far = mobee.tasks.place("right_palm", "xy", [(2.0, 2.1), (0.0, 0.1)])
     with pytest.raises(mobee.MobeeError, match=r"no pose was found .* right_palm x is .*, outside 2 \.\. 2\.1"):
-        _build(model, task=far, front=QUICK)
+        _build(model, task=far, search=QUICK)
 
 
 @pytest.mark.parametrize(
     "wrong", [{"delta": 0.0}, {"delta": 1.5}, {"std": 0.0}, {"wide_std": 2.0}, {"population": 3}, {"patience": 0}, {"tries": 0}]
 )
-def test_a_front_that_cannot_advance_is_refused(wrong: dict[str, float]) -> None:
+def test_search_settings_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(mobee.InvalidValue, match=next(iter(wrong))):
-        mobee.Front(**wrong)  # type: ignore[arg-type]
+        mobee.SearchSettings(**wrong)  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ import pytest
 import mobee
 from mobee import tasks
 from mobee.errors import InvalidValue, UnknownName
-from mobee.roadmap.building.task import Task
+from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik import costs
 from mobee.roadmap.ik.least_squares import Descent
 from mobee.roadmap.ik.problem import Problem
@@ -108,7 +108,7 @@ def test_what_is_no_task_space_is_refused() -> None:
         (lambda: tasks.place(MARKER, "xx", BOX), "at most once"),
         (lambda: tasks.place(MARKER, "xw", BOX), "'x', 'y', 'z'"),
         (lambda: tasks.along(MARKER, (0, 0, 0), *ONE), "direction"),
-        (lambda: tasks.angle(MARKER, (0, 0, 1), (0, 0, 2), *ONE), "across"),
+        (lambda: tasks.angle(MARKER, (0, 0, 1), (0, 0, 2), *ONE), "perpendicular"),
         (lambda: tasks.angle(MARKER, (0, 0, 1), (0, 1, 0), -4.0, 1.0), "pi"),
         (lambda: tasks.function(3, *ONE), "function of a pose"),
         (lambda: tasks.motors({}), "at least"),

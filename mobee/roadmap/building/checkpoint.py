@@ -1,0 +1,188 @@
+"""Saves an unfinished roadmap with its settings, and resumes building from the file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.errors import MobeeError
+from mobee.model.model import Model
+from mobee.roadmap.archive import read, world_as_json, write
+from mobee.roadmap.building.tasks import Task
+from mobee.roadmap.graph import nearest, nearest_before, short
+from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.roadmap import Roadmap, digests, load_roadmap
+
+_PROBES, _DIGITS = 8, 9  # poses that identify costs and coordinates by their values, and significant digits of these
+
+
+def request(model: Model, problem: Problem, task: Task, spacing: Array, others: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all settings that determine the roadmap, as plain JSON values."""
+    return {
+        **digests(model),
+        "costs": list(problem.by_name),
+        "names": list(task.names),
+        "units": [one.unit for one in task.coordinates],
+        "box": task.box.tolist(),
+        "spacing": spacing.tolist(),
+        "motors": [model.robot.motors[k] for k in problem.free],
+        "start": problem.start.tolist(),
+        "meaning": _meaning(problem, task),
+        **others,
+    }
+
+
+def digest(requested: Mapping[str, Any]) -> str:
+    """Return 16 hex digits that identify a request."""
+    return hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _meaning(problem: Problem, task: Task) -> str:
+    """Return 16 hex digits of the values of costs and coordinates in some poses: functions can be compared only by their values."""
+    low, high = problem.limits.T
+    drawn = np.random.default_rng(0).uniform(low, high, (_PROBES, len(low)))
+    pose = problem.model.evaluate(np.concatenate([problem.start[None], problem.whole(drawn)]))
+    values = [one.weight * one.residual(pose) for one in problem.terms] + [task.of(pose).ravel()]
+    tolerances = [(one.weight, one.tolerance) for one in problem.terms]
+    numbers = [f"{value:.{_DIGITS - 1}e}" for value in np.concatenate(values) + 0.0]
+    return hashlib.sha256(json.dumps([tolerances, numbers]).encode()).hexdigest()[:16]
+
+
+SAVE_PERIOD = 5.0  # s between two writings, at least; at most 10 s of work are lost
+PROGRESS_PERIOD = 0.1  # s between two reports of progress
+_PREFIX = "front_"  # of the names of arrays that only the building needs
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Progress of a roadmap: vertices, evaluated poses, vertices or points that are still open, and seconds of work."""
+
+    vertices: int
+    evaluations: int
+    open: int
+    seconds: float
+
+
+class Builder(Protocol):
+    """Finds vertices step by step; equal states, generators and numbers of evaluations lead to equal steps."""
+
+    rng: np.random.Generator
+    problem: Problem
+
+    @property
+    def vertices(self) -> int: ...  # noqa: D102
+
+    @property
+    def open(self) -> int: ...  # noqa: D102
+
+    def step(self) -> bool: ...  # noqa: D102
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return the state, with the vertices' "q" (V, n) rad and "y" (V, m)."""
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None: ...  # noqa: D102
+
+
+class Checkpoint:
+    """Runs the builders of a roadmap, saves their state to a file if there is one, and reports progress.
+
+    `stage`: name of the stage in which the file was written; None without a file.
+    """
+
+    def __init__(
+        self, model: Model, requested: dict[str, Any], spacing: Array, file: str | Path | None, progress: Callable[[Progress], None] | None
+    ) -> None:
+        self._model, self._requested, self._spacing, self._progress = model, requested, spacing, progress
+        self._file = None if file is None else Path(file)
+        self._digest = digest(requested)
+        self._began = self._saved = time.monotonic()
+        self._reported = -np.inf
+        self.stage: str | None = None
+        self._found: tuple[dict[str, NDArray[Any]], dict[str, Any]] | None = None
+        if self._file is not None and self._file.exists():
+            self._found = read(self._file)
+            self._require_same(self._found[1].get("settings", {}))
+            self.stage = self._found[1].get("stage")
+
+    def finished(self) -> Roadmap | None:
+        """Return the roadmap if the file holds a finished one."""
+        if self._file is None or self._found is None or not self._found[1]["settings"].get("finished", False):
+            return None
+        return load_roadmap(self._file, self._model)
+
+    def run(self, name: str, builder: Builder) -> None:
+        """Take all steps of a builder, from the state in the file if this was written in the stage of that name."""
+        if self._found is not None and self.stage == name:
+            arrays, notes = self._found
+            state = {key.removeprefix(_PREFIX): value for key, value in arrays.items() if key.startswith(_PREFIX)}
+            builder.restore(state | {key: arrays[key] for key in ("q", "y")})
+            builder.rng.bit_generator.state = notes["generator"]
+            builder.problem.evaluations = notes["settings"]["evaluations"]
+            self._began -= notes["settings"]["seconds"]
+        while builder.step():
+            if self._file is not None and time.monotonic() - self._saved >= SAVE_PERIOD:
+                self._save(self._file, name, builder)
+            if self._progress is not None and time.monotonic() - self._reported >= PROGRESS_PERIOD:
+                self._report(builder.vertices, builder.problem.evaluations, builder.open)
+
+    def _save(self, file: Path, name: str, builder: Builder) -> None:
+        state = builder.state()
+        q, y = state.pop("q"), state.pop("y")
+        settings = self._settings(builder.problem.evaluations, False)
+        roadmap = Roadmap(self._model, q, y, self._edges(q, y), self._spacing, settings)
+        extra = {_PREFIX + key: value for key, value in state.items()}
+        self._write(file, roadmap, extra, {"generator": builder.rng.bit_generator.state, "stage": name})
+        self._saved = time.monotonic()
+
+    def _report(self, vertices: int, evaluations: int, open: int) -> None:
+        if self._progress is not None:
+            self._reported = time.monotonic()
+            self._progress(Progress(vertices, evaluations, open, self._reported - self._began))
+
+    def finish(self, q: Array, y: Array, evaluations: int) -> Roadmap:
+        """Return the finished roadmap and save it; raises MobeeError if the robot or the world has changed since the start."""
+        here = digests(self._model)
+        if any(self._requested[key] != here[key] for key in here):
+            made, now = (" ".join(one[f"{key}_digest"] for key in ("robot", "world")) for one in (self._requested, here))
+            raise MobeeError(f"the robot or the world has changed while the map was built: {made}, now {now}. Build it again.")
+        self._report(len(q), evaluations, 0)
+        roadmap = Roadmap(self._model, q, y, self._edges(q, y), self._spacing, self._settings(evaluations, True))
+        if self._file is not None:
+            self._write(self._file, roadmap, {}, {})
+        return roadmap
+
+    def _edges(self, q: Array, y: Array) -> Ints:
+        count, longest = self._requested["neighbours"], self._requested["longest"]
+        joined = nearest_before(y, self._spacing, len(self._spacing)) if count is None else nearest(y, self._spacing, count)
+        return short(q, joined, longest)
+
+    def _settings(self, evaluations: int, finished: bool) -> dict[str, Any]:
+        versions = {name: version(name) for name in ("mobee", "numpy")}
+        seconds = time.monotonic() - self._began
+        return self._requested | {"versions": versions, "evaluations": evaluations, "seconds": seconds, "finished": finished}
+
+    def _write(self, file: Path, roadmap: Roadmap, extra: dict[str, NDArray[Any]], notes: dict[str, Any]) -> None:
+        arrays = {"q": roadmap.q, "y": roadmap.y, "edges": roadmap.edges, "spacing": roadmap.spacing}
+        common = {"settings": roadmap.settings, "world": world_as_json(self._model.world)}
+        write(file, arrays | extra, common | notes)
+
+    def _require_same(self, settings: dict[str, Any]) -> None:
+        kept = {name: settings[name] for name in self._requested if name in settings}
+        if digest(kept) == self._digest:
+            return
+        other = [name for name in self._requested if settings.get(name) != self._requested[name]]
+        raise MobeeError(
+            f"{self._file}: built with settings {digest(kept)}, the requested ones are {self._digest}: they differ in {', '.join(other)}"
+            + "".join(f"; {name} {settings.get(name)}, now {self._requested[name]}" for name in other if name.endswith("_digest"))
+            + ". Give another file, or the settings of this one."
+        )

@@ -1,0 +1,215 @@
+"""Builds a roadmap by evolution-strategy searches that start at vertices and end beside them (thesis Algorithms 3 and 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.errors import MobeeError
+from mobee.roadmap.building.frontier import MAX_NEAREST, MAX_NEIGHBOURS, MIN_DISTANCE, Flags, Frontier, GrowingArray
+from mobee.roadmap.building.search_scheduler import IDLE, SearchScheduler
+from mobee.roadmap.building.settings import SearchSettings
+from mobee.roadmap.evolution.nes import default_population
+from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.terms import Term
+
+if TYPE_CHECKING:
+    from mobee.roadmap.building.tasks import Task
+
+OUTSIDE_SCALE = 0.25  # spacings outside the box that cost as much as a term at its tolerance
+STRICT_FACTOR = 10.0  # on the weight of a term of tolerance 0
+BATCH = 80  # poses per call of the model; fixed, so that results do not depend on the number of threads
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvaluatedPoses:
+    """N poses: cost (N,), which meet all terms inside the box (N,), and points in the task space in spacings (N, m)."""
+
+    cost: Array
+    valid: NDArray[np.bool_]
+    point: Array
+
+
+class PoseEvaluator:
+    """Evaluates poses for a task, in the threads of a pool: cost, validity, task coordinates."""
+
+    def __init__(self, problem: Problem, task: Task, spacing: Array, pool: Executor | None = None) -> None:
+        self.problem, self.task, self.spacing = problem, task, spacing
+        self.low, self.high = (task.box / spacing[:, None]).T
+        self._pool = pool
+
+    def evaluate(self, q: Array) -> EvaluatedPoses:
+        """Evaluate poses q (N, n) rad; the result for a pose does not depend on the others."""
+        self.problem.evaluations += len(q)
+        batches = [q[k : k + BATCH] for k in range(0, len(q), BATCH)]
+        if len(batches) == 1:
+            return self._evaluate(q)
+        done = list(map(self._evaluate, batches) if self._pool is None else self._pool.map(self._evaluate, batches))
+        return EvaluatedPoses(*(np.concatenate(column) for column in zip(*((one.cost, one.valid, one.point) for one in done), strict=True)))
+
+    def violations(self, q: Array) -> str:
+        """Return a text that lists which terms and task coordinates a pose (n,) violates."""
+        pose = self.problem.model.evaluate(q[None])
+        found = [
+            f"{name} by {float(term.residual(pose)[0]):.3g} (tolerance {term.tolerance:.3g})"
+            for name, term in self.problem.by_name.items()
+            if term.tolerance is not None and not term.residual(pose)[0] <= term.tolerance
+        ]
+        y, box = self.task.of(pose)[0], self.task.box
+        found += [
+            f"{name} is {value:.3g}, outside {low:.3g} .. {high:.3g}"
+            for name, value, (low, high) in zip(self.task.names, y, box, strict=True)
+            if not low <= value <= high
+        ]
+        return ", ".join(found)
+
+    def _evaluate(self, q: Array) -> EvaluatedPoses:
+        pose = self.problem.model.evaluate(q)
+        cost, valid = np.zeros(len(q)), np.ones(len(q), dtype=bool)
+        for term in self.problem.terms:
+            residual = term.residual(pose)
+            cost += scaled_cost(term, residual)
+            if term.tolerance is not None:
+                valid &= residual <= term.tolerance
+        point = self.task.of(pose) / self.spacing
+        outside = np.maximum(0.0, np.maximum(self.low - point, point - self.high))
+        cost += ((outside / OUTSIDE_SCALE) ** 2).sum(axis=1)
+        valid &= (outside == 0.0).all(axis=1)
+        return EvaluatedPoses(cost, valid, point)
+
+
+def scaled_cost(term: Term, residual: Array) -> Array:
+    """Return the cost of a term's residuals: (residual / tolerance)^2; for tolerance 0 a step of 1 and a slope; without one, the weight."""
+    if term.tolerance is None:
+        return term.weight * residual
+    if term.tolerance == 0.0:
+        return STRICT_FACTOR * term.weight * residual + (residual > 0.0)
+    return (residual / term.tolerance) ** 2
+
+
+NEIGHBOUR_SCALE = 0.25  # spacings of deviation from 1 that cost 1 (eq. 3.6)
+AIM_SCALE = 0.5  # spacings from the aim that cost 1
+LIMIT_COST = 1000.0  # of a sample that was clipped to the limits: times its squared distance, in ranges of the motors
+
+
+class FrontierBuilder:
+    """Grows a roadmap: each `step` computes one generation of every search and adds the vertices that they found.
+
+    `frontier`: the vertices in the task space, in spacings.  `rng`: draws all random numbers.  `problem`: counts the evaluations.
+    """
+
+    def __init__(self, evaluator: PoseEvaluator, settings: SearchSettings, rng: np.random.Generator) -> None:
+        self.evaluator, self.problem, self.rng = evaluator, evaluator.problem, rng
+        self._low, self._high = self.problem.limits.T
+        start = (self.problem.start[self.problem.free] - self._low) / (self._high - self._low)
+        self._has_aims = settings.frontier
+        self.frontier = Frontier(evaluator.low, evaluator.high)
+        self._postures = GrowingArray(start.shape)  # the free motors of the vertices, in fractions of their ranges
+        population = settings.population or default_population(len(start))
+        self.scheduler = SearchScheduler(self.frontier, self._postures, start, settings, population, rng)
+        self._best, self._best_cost = start, np.inf  # of the search for the first pose
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices."""
+        return len(self.frontier)
+
+    @property
+    def open(self) -> int:
+        """Number of vertices from which a search may still start."""
+        return int(self.scheduler.expandable().sum())
+
+    def result(self) -> tuple[Array, Array]:
+        """Return the poses (V, n) rad and their task coordinates (V, m)."""
+        return self._poses(self._postures.rows), self.frontier.points * self.evaluator.spacing
+
+    def begin_from(self, q: Array, y: Array) -> None:
+        """Add poses q (V, n) rad at task coordinates y (V, m) as the first vertices."""
+        postures = (q[:, self.problem.free] - self._low) / (self._high - self._low)
+        for posture, point in zip(postures, y / self.evaluator.spacing, strict=True):
+            self._add(posture, point)
+
+    def step(self) -> bool:
+        """Compute a generation of all searches and add the vertices found; return False if no search can start.
+
+        Raises:
+            MobeeError: no first pose was found.
+        """
+        self.scheduler.refill()
+        which = np.flatnonzero(self.scheduler.vertex != IDLE)
+        if not len(which):
+            if self.scheduler.exhausted:
+                raise MobeeError(self._failure())
+            return False
+        searches = self.scheduler.searches
+        z = self.rng.standard_normal((len(which), searches.population, len(self._low)))
+        samples = searches.ask(which, z)
+        inside = np.minimum(np.maximum(samples, 0.0), 1.0)
+        done = self.evaluator.evaluate(self._poses(inside.reshape(-1, inside.shape[-1])))
+        points, cost, valid = done.point.reshape(*z.shape[:2], -1), done.cost.reshape(z.shape[:2]), done.valid.reshape(z.shape[:2])
+        if len(self.frontier):
+            more, spread = self._spacing_cost(which, points)
+            cost, valid = cost + more, valid & spread
+        elif cost.min() < self._best_cost:
+            self._best, self._best_cost = inside.reshape(-1, inside.shape[-1])[cost.argmin()], float(cost.min())
+        searches.tell(which, z, cost + LIMIT_COST * ((samples - inside) ** 2).sum(axis=2))
+        for k in np.flatnonzero(valid.any(axis=1)):
+            if self.scheduler.vertex[which[k]] != IDLE:
+                self._commit(int(which[k]), inside[k], points[k], np.where(valid[k], cost[k], np.inf))
+        self.scheduler.end_failed()
+        return True
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return all that `restore` needs except the generator, with the vertices' poses "q" and task coordinates "y"."""
+        q, y = self.result()
+        known = {"q": q, "y": y, "postures": self._postures.rows, "places": self.frontier.points, "weights": self.frontier.weights}
+        return self.scheduler.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from the `state` of a builder with the same settings."""
+        for posture, point in zip(state["postures"], state["places"], strict=True):
+            self._add(posture, point)
+        self.frontier.weights[:] = state["weights"]
+        self.scheduler.restore(state)
+        self._best, self._best_cost = state["best"], float(state["best_cost"])
+
+    def _add(self, posture: Array, point: Array) -> Array | None:
+        self._postures.append(posture)
+        return self.frontier.add(point)
+
+    def _poses(self, postures: Array) -> Array:
+        """Return all motors (N, n) rad from fractions of the ranges of the free ones (N, d)."""
+        return self.problem.whole(np.minimum(self._low + postures * (self._high - self._low), self._high))
+
+    def _spacing_cost(self, which: Ints, points: Array) -> tuple[Array, Flags]:
+        """Return eq. 3.6 and the cost of the aims at points (k, population, m), and which points keep their distance to near vertices."""
+        n = min(self.frontier.dimensions, len(self.frontier))
+        squares = ((points[:, :, None] - self.scheduler.near[which, None]) ** 2).sum(axis=-1)
+        nearest = np.sqrt(np.sort(np.partition(squares, n - 1, axis=-1)[..., :n], axis=-1))
+        cost: Array = (((nearest - 1.0) / NEIGHBOUR_SCALE) ** 2).sum(axis=-1)
+        if self._has_aims:
+            cost += ((points - self.scheduler.aim[which, None]) ** 2).sum(axis=-1) / AIM_SCALE**2
+        valid: Flags = (nearest[..., 0] >= MIN_DISTANCE) & (nearest[..., 0] <= MAX_NEAREST) & (nearest[..., -1] <= MAX_NEIGHBOURS)
+        return cost, valid
+
+    def _commit(self, number: int, postures: Array, points: Array, cost: Array) -> None:
+        """Add the cheapest sample of a search that the present frontier accepts, and end the search."""
+        for k in np.argsort(cost, kind="stable"):
+            if not np.isfinite(cost[k]):
+                return
+            if self.frontier.accepts(points[k]):
+                self.scheduler.end_successful(number, points[k], self._add(postures[k], points[k]))
+                return
+
+    def _failure(self) -> str:
+        return (
+            f"no pose was found that meets all costs inside the task's box, by {self.problem.evaluations} evaluations from the start and "
+            f"from random postures. The best one misses {self.evaluator.violations(self._poses(self._best[None])[0])}. Loosen a tolerance, "
+            f"widen the box, let more motors move, or give a start that is nearer."
+        )

@@ -1,0 +1,205 @@
+"""Schedules the evolution-strategy searches of a growing roadmap: start vertex, aim, time-out (thesis Algorithm 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.roadmap.building.frontier import MIN_DISTANCE, Flags, Frontier, GrowingArray, inside_simplex
+from mobee.roadmap.building.settings import SearchSettings
+from mobee.roadmap.evolution.search import Searches
+
+AIM_DISTANCE = 2.0 * MIN_DISTANCE  # spacings between the aims of two simultaneous searches, at least
+FAILURE_RADIUS = 0.5  # spacings: failures nearer to an aim than this count for it
+FIRST_SEARCHES, MAX_FIRST_SEARCHES = 4, 60  # searches for the first pose: at once, and in all
+FIRST_PATIENCE = 30  # generations per motor, before enough searches have succeeded
+RECENT, MIN_SUCCESSES = 200, 8  # successful searches that determine the patience; fewer than the latter do not
+MIN_GENERATIONS = 100  # that a search gets, divided by the dimension of the task space
+RETRY_FACTOR = 4  # on the patience, after another search has failed at the same point
+STD_PER_MOVE, MIN_STD = 0.5, 0.003  # standard deviation: share of the predicted move; and the least one, in ranges of the motors
+STALLED_STD = 1e-4  # in ranges of the motors: a search that is narrower has failed
+KNOWN_VERTICES = {1: 16, 2: 48, 3: 96}  # number of vertices that a search compares with, by the dimension of the task space
+MANY_KNOWN_VERTICES = 192  # in higher dimensions
+IDLE, FIRST = -1, -2  # in place of a start vertex
+
+
+class SearchScheduler:
+    """Starts and ends L simultaneous searches.
+
+    `vertex` (L,): the start vertex of each search, IDLE, or FIRST for a search for the first pose.  `aim` (L, m): the point that it aims
+    at, in spacings; NaN without an aim.  `near` (L, K, m): the vertices nearest to this point; infinite where there are fewer.
+    """
+
+    def __init__(
+        self,
+        frontier: Frontier,
+        postures: GrowingArray,
+        start: Array,
+        settings: SearchSettings,
+        population: int,
+        rng: np.random.Generator,
+    ) -> None:
+        self._frontier, self._postures, self._start, self._settings, self._rng = frontier, postures, start, settings, rng
+        count, m = settings.searches, frontier.dimensions
+        self.searches = Searches(count, len(start), population)
+        self.vertex = np.full(count, IDLE)
+        self.aim = np.full((count, m), np.nan)
+        self.near = np.full((count, KNOWN_VERTICES.get(m, MANY_KNOWN_VERTICES), m), np.inf)
+        self._patience = np.zeros(count, dtype=np.int64)
+        self._failed = GrowingArray((m,))  # aims of failed searches
+        self._ages = GrowingArray((), np.int64)  # generations of successful searches
+        self._begun = 0  # searches for the first pose
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the search for the first pose has ended without a result."""
+        return not len(self._frontier) and self._begun >= MAX_FIRST_SEARCHES and not (self.vertex == FIRST).any()
+
+    def expandable(self) -> Flags:
+        """Return from which vertices a search may start, (V,) bool."""
+        able: Flags = self._frontier.weights > 0.0
+        return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
+
+    def refill(self) -> None:
+        """Start as many searches as there is room for, at the vertex of the largest weight first, the oldest of equal ones."""
+        room = np.flatnonzero(self.vertex == IDLE).tolist()
+        if not len(self._frontier):
+            self._begin_first(room)
+            return
+        if not room:
+            return
+        able = np.flatnonzero(self.expandable())
+        busy = [self._centre(number) for number in np.flatnonzero(self.vertex != IDLE).tolist()]
+        for vertex in able[np.argsort(-self._frontier.weights[able], kind="stable")].tolist():
+            if not room:
+                return
+            points = self._possible_aims(vertex)
+            if busy:
+                points = points[((points[:, None] - np.array(busy)) ** 2).sum(axis=-1).min(axis=1) >= AIM_DISTANCE**2]
+            if len(points) and self._begin(room[0], vertex, points):
+                busy.append(self._centre(room.pop(0)))
+
+    def end_successful(self, number: int, point: Array, simplex: Array | None) -> None:
+        """End a search that has found a vertex (m,) with its simplex, and those searches whose aims are now taken, without blame."""
+        if self.vertex[number] >= 0:
+            self._ages.append(self.searches.age[number])
+        self.vertex[number] = IDLE
+        self.vertex[self.vertex == FIRST] = IDLE
+        active = np.flatnonzero(self.vertex >= 0)
+        if not len(active):
+            return
+        if self._settings.frontier:
+            taken = ((self.aim[active] - point) ** 2).sum(axis=1) < MIN_DISTANCE**2
+            if simplex is not None:
+                taken |= inside_simplex(self.aim[active], point, simplex)
+            self.vertex[active[taken]] = IDLE
+        self._note_vertex(active, point)
+
+    def end_failed(self) -> None:
+        """End the searches that have failed, and lower the weights of their start vertices."""
+        over = (self.vertex != IDLE) & ((self.searches.age >= self._patience) | (self.searches.sigma < STALLED_STD))
+        for number in np.flatnonzero(over & (self.vertex >= 0)):
+            self._frontier.weights[self.vertex[number]] -= self._settings.delta
+            self._failed.append(self.aim[number])
+        self.vertex[over] = IDLE
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return all that `restore` needs except the frontier, its postures and the generator."""
+        searches = {name: getattr(self.searches, name) for name in ("mean", "sigma", "shape", "path", "age")}
+        own = {"vertex": self.vertex, "aim": self.aim, "patience": self._patience, "begun": np.array(self._begun)}
+        return searches | own | {"failed": self._failed.rows, "ages": self._ages.rows}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from a `state`; the frontier must be as it was."""
+        for array, name in ((self._failed, "failed"), (self._ages, "ages")):
+            for row in state[name]:
+                array.append(row)
+        for name in ("mean", "sigma", "shape", "path", "age"):
+            getattr(self.searches, name)[:] = state[name]
+        self.vertex[:], self.aim[:], self._patience[:] = state["vertex"], state["aim"], state["patience"]
+        self._begun = int(state["begun"])
+        for number in np.flatnonzero(self.vertex >= 0).tolist():
+            self._find_near(number)
+
+    def _begin_first(self, room: list[int]) -> None:
+        """Start searches for a first pose, alternately at the start posture and at random ones."""
+        active = int((self.vertex == FIRST).sum())
+        for number in room[: max(0, min(FIRST_SEARCHES - active, MAX_FIRST_SEARCHES - self._begun))]:
+            mean = self._start if self._begun % 2 == 0 else self._rng.uniform(size=len(self._start))
+            self._begun += 1
+            self.searches.begin(number, mean, self._settings.wide_std)
+            self.vertex[number], self._patience[number] = FIRST, FIRST_PATIENCE * len(self._start)
+
+    def _possible_aims(self, vertex: int) -> Array:
+        """Return the points that a search from a vertex may aim at, (k, m); without aims, the vertex's own point."""
+        here = self._frontier.points[vertex]
+        around: Array = here + self._frontier.directions[self._frontier.free[vertex]] if self._settings.frontier else here[None]
+        return around
+
+    def _begin(self, number: int, vertex: int, points: Array) -> bool:
+        """Start a search from a vertex to that of the points (k, m) with the fewest failures; return False if all were given up."""
+        mean, std, patience = self._postures.rows[vertex], self._settings.std, self._usual_patience()
+        if self._settings.frontier:
+            failed = (((points[:, None] - self._failed.rows) ** 2).sum(axis=-1) < FAILURE_RADIUS**2).sum(axis=1)
+            if failed.min() >= self._settings.tries:
+                self._frontier.weights[vertex] = 0.0
+                return False
+            points = points[failed == failed.min()]
+            self.aim[number] = points[self._rng.integers(len(points))]
+            if failed.min() > 0:
+                std, patience = self._settings.wide_std, RETRY_FACTOR * patience
+            elif self._settings.predict:
+                mean = predicted_posture(self._frontier, self._postures.rows, vertex, self.aim[number])
+                move = float(np.sqrt(((mean - self._postures.rows[vertex]) ** 2).mean()))
+                std = min(max(STD_PER_MOVE * move, MIN_STD), std)
+        self.vertex[number], self._patience[number] = vertex, patience
+        self.searches.begin(number, mean, std)
+        self._find_near(number)
+        return True
+
+    def _usual_patience(self) -> int:
+        """Return the generations after which a search fails, from the generations of recent successful searches."""
+        ages = self._ages.rows[-RECENT:]
+        if len(ages) < MIN_SUCCESSES:
+            return FIRST_PATIENCE * len(self._start)
+        return max(MIN_GENERATIONS // self._frontier.dimensions, int(self._settings.patience * np.sort(ages)[3 * len(ages) // 4]))
+
+    def _centre(self, number: int) -> Array:
+        """Return the aim of a search, or the point of its start vertex."""
+        point: Array = self.aim[number] if self._settings.frontier else self._frontier.points[self.vertex[number]]
+        return point
+
+    def _find_near(self, number: int) -> None:
+        """Set the vertices near a search."""
+        near, _ = self._frontier.nearest(self._centre(number), self.near.shape[1])
+        self.near[number] = np.inf
+        self.near[number, : len(near)] = self._frontier.points[near]
+
+    def _note_vertex(self, active: Ints, point: Array) -> None:
+        """Replace the furthest known vertex of active searches by a new vertex, where this is nearer."""
+        centres = self.aim[active] if self._settings.frontier else self._frontier.points[self.vertex[active]]
+        squares = ((self.near[active] - centres[:, None]) ** 2).sum(axis=-1)
+        furthest = squares.argmax(axis=1)
+        nearer = ((point - centres) ** 2).sum(axis=1) < squares[np.arange(len(active)), furthest]
+        self.near[active[nearer], furthest[nearer]] = point
+
+
+_FIT_RADIUS = 2.5  # spacings
+_SAME_BRANCH = 0.2  # of a motor's range: postures that differ by more are not fitted together
+_DAMPING = 0.1  # spacings squared
+
+
+def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Array) -> Array:
+    """Extrapolate a posture (d,) in [0, 1] at a point (m,), by a linear fit to similar postures (V, d) of vertices around a vertex."""
+    near, distances = frontier.nearest(frontier.points[vertex], 6 * frontier.dimensions + 1)
+    near = near[distances < _FIT_RADIUS]
+    near = near[(np.abs(postures[near] - postures[vertex]) < _SAME_BRANCH).all(axis=1)]
+    mean_posture, centre = postures[near].mean(axis=0), frontier.points[near].mean(axis=0)
+    offsets = frontier.points[near] - centre
+    slope = np.linalg.solve(offsets.T @ offsets + _DAMPING * np.eye(len(aim)), offsets.T @ (postures[near] - mean_posture))
+    found: Array = np.minimum(np.maximum(mean_posture + (aim - centre) @ slope, 0.0), 1.0)
+    return found

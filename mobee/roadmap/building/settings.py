@@ -1,0 +1,84 @@
+"""Settings of a roadmap: how its poses are found, and which of them edges join."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from mobee.errors import InvalidValue, UnknownName
+from mobee.roadmap.ik.ngik import METHODS
+
+MAX_TURN = 0.4  # rad: default of `RoadmapSettings.longest`
+
+
+@dataclass(frozen=True, slots=True)
+class SearchSettings:
+    """Settings of the searches by evolution strategy (thesis Algorithm 4; docs/roadmaps.md compares them).
+
+    Raises InvalidValue for a value out of range.
+
+    Attributes:
+        delta: by how much a vertex's expansion weight, 1 at first, falls when a search from it fails.
+        frontier: search only where a point one spacing away is free, and aim at it.  False: from all vertices, without an aim, as printed.
+        predict: begin a search that has an aim where the postures of the neighbours extrapolate to.  False: at the vertex.
+        std: largest standard deviation of a search from a vertex, in ranges of the motors.
+        wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
+        population: samples per generation; None: 4 + 3 ln(d).
+        patience: a search fails after this many times the generations in which three quarters of the recent searches succeeded.
+        tries: failed searches within half a spacing of a point, after which the point is given up.
+        searches: number of simultaneous searches.
+    """
+
+    delta: float = 0.5
+    frontier: bool = True
+    predict: bool = True
+    std: float = 0.02
+    wide_std: float = 0.2
+    population: int | None = None
+    patience: float = 3.0
+    tries: int = 3
+    searches: int = 32
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.delta <= 1.0:
+            raise InvalidValue(f"delta {self.delta!r}: must be above 0 and at most 1.")
+        for name in ("std", "wide_std"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be above 0 and at most 1, in ranges of the motors.")
+        if self.population is not None and self.population < 4:
+            raise InvalidValue(f"population {self.population!r}: must be at least 4, or None.")
+        for name in ("patience", "tries", "searches"):
+            if getattr(self, name) < 1:
+                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be at least 1.")
+
+
+@dataclass(frozen=True, slots=True)
+class RoadmapSettings:
+    """How `build_roadmap` finds the poses of a roadmap and joins them by edges.
+
+    Raises InvalidValue or UnknownName for a value that is not valid.
+
+    Attributes:
+        method: "nes": thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task points, for coordinates
+            with derivatives.  "hybrid": least squares where all coordinates have derivatives, then evolution for what it missed.
+        neighbours: how many of the nearest vertices each vertex is joined to.  None: as many of the earlier vertices as the task space
+            has dimensions (Algorithm 4).
+        longest: edges along which a motor turns by more [rad] are left out.  None: no edge is.
+        margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
+            out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.
+        search: settings of the searches by evolution strategy.
+    """
+
+    method: Literal["hybrid", "nes", "least_squares"] = "hybrid"
+    neighbours: int | None = None
+    longest: float | None = MAX_TURN
+    margin: float = 0.0
+    search: SearchSettings = field(default_factory=SearchSettings)
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UnknownName("method", self.method, METHODS)
+        if self.neighbours is not None and self.neighbours < 1:
+            raise InvalidValue(f"neighbours {self.neighbours!r}: must be at least 1, or None for the dimension of the task space.")
+        if self.longest is not None and not self.longest > 0.0:
+            raise InvalidValue(f"longest {self.longest!r} rad: must be above 0, or None for no limit.")
