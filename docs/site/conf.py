@@ -21,7 +21,7 @@ html_show_sourcelink = False
 myst_heading_anchors = 6  # a link to page.md#heading is checked, by the rule with which GitHub names headings
 
 autodoc_member_order = "bysource"
-autodoc_type_aliases = {name: name for name in ("Array", "Ints", "Bools")}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Bools", "Ints")}
 autodoc_default_options = {"members": True, "show-inheritance": True}
 napoleon_numpy_docstring = False
 suppress_warnings = ["ref.python"]  # annotations hold short names, such as Pose, which the library and the bus both have
