@@ -1,0 +1,155 @@
+"""Every block of code in README.md, CONTRIBUTING.md and docs/: Python runs, commands parse, files are well-formed.
+
+A block that is a file (a fence with a second word) or that has a test of its own is in test_documentation.py or test_add_a_force.py.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from mobee_cli.__main__ import VERBS, parser_of
+
+ROOT = Path(__file__).parents[2]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), ROOT / "mobee/robot/robots/README.md"]
+
+TABLE = """
+import numpy as np, mobee
+robot = mobee.load_robot("icub")
+model = mobee.Model(robot, mobee.load_world("table"))
+"""
+
+GIVEN = {
+    "docs/control.md": "",
+    "docs/law.md": TABLE + "q = goal = robot.home\nf, wrench = np.zeros(41), np.zeros(6)\n",
+    "docs/model.md": "",
+    "docs/reach.md": "",
+    "docs/reaching.md": TABLE
+    + """
+from pathlib import Path
+from mobee.learning.reaching.store import ReachStore
+arm = [f"r_shoulder_{axis}" for axis in ("pitch", "roll", "yaw")] + ["r_elbow"]
+space, plant = mobee.Lattice(robot, joints=arm), mobee.OfflinePlant(model, seed=0)
+beliefs = mobee.TransitionModel(space)
+target = mobee.ReachTarget([-0.3, 0.2, 0.1])
+targets = [target]
+goal, poses = plant.measure("right_arm"), robot.home + np.zeros((3, 1))
+""",
+    "docs/roadmaps.md": TABLE + "start, goals = robot.home, robot.home + 0.05 * np.eye(41)[robot.motor_index('r_elbow')]\n",
+}
+"""Pages whose Python blocks run here, one after the other, and what the text presumes before the first."""
+
+ELSEWHERE = {
+    "README.md": "test_documentation.py",
+    "docs/agents.md": "test_documentation.py",
+    "docs/learning.md": "test_documentation.py",
+    "docs/plant.md": "test_documentation.py",
+    "docs/robots.md": "test_documentation.py",
+    "docs/bus.md": "not run: two lines of a service, whose own names stand for any",
+}
+
+SHORTER = {"tries=400": "tries=4", "repetitions=5": "repetitions=1"}
+"""Numbers with which a block would take a minute."""
+
+
+@dataclass(frozen=True)
+class Block:
+    page: str
+    line: int
+    language: str
+    name: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def blocks_of(path: Path) -> list[Block]:
+    text, page = path.read_text(), path.relative_to(ROOT).as_posix()
+    found = re.finditer(r"^```(\w*) ?(\S*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    return [Block(page, text[: one.start()].count("\n") + 1, *one.groups()) for one in found]
+
+
+BLOCKS = [block for path in PAGES for block in blocks_of(path)]
+PYTHON = [block for block in BLOCKS if block.language == "python" and not block.name]
+
+
+def test_every_block_is_of_a_known_language() -> None:
+    assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml", "xml", "json", "yaml", "cpp"}
+
+
+def test_every_python_block_runs_here_or_has_a_reason() -> None:
+    assert {block.page for block in PYTHON} == GIVEN.keys() | ELSEWHERE.keys()
+
+
+@pytest.mark.parametrize("page", GIVEN)
+def test_the_python_blocks_of_a_page_run(page: str, tmp_path: Path) -> None:
+    for block in BLOCKS:
+        if block.page == page and block.name:
+            (tmp_path / block.name).write_text(block.text)
+    program = GIVEN[page] + "\n".join(block.text for block in PYTHON if block.page == page)
+    for long, short in SHORTER.items():
+        program = program.replace(long, short)
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=250)
+    assert done.returncode == 0, done.stderr
+
+
+def commands() -> list[tuple[str, str]]:
+    """The command lines on the pages, each with its place; a line of a console's output begins with no `$`."""
+    found = []
+    for block in BLOCKS:
+        if block.language in {"", "sh", "console"}:
+            lines = [
+                line.removeprefix("$ ")
+                for line in block.text.replace("\\\n", " ").splitlines()
+                if line.startswith("$ ") or "$ " not in block.text
+            ]
+            found += [(str(block), line) for line in lines if re.match(r"(mobee|python|pip|\./\w+) ", line)]
+    return found
+
+
+@pytest.mark.parametrize(("place", "line"), commands())
+def test_a_command_on_a_page_is_one_that_its_program_accepts(place: str, line: str) -> None:
+    program, *words = shlex.split(line, comments=True)
+    words = words[: words.index("&&")] if "&&" in words else words
+    match program:
+        case "mobee":
+            assert words[0] in VERBS, place
+            parser_of(words[0]).parse_args(words[1:])  # ends the test with its message if it refuses them
+        case "python":
+            assert importlib.util.find_spec(words[1]) if words[0] == "-m" else (ROOT / words[0]).is_file(), place
+        case "pip":
+            extras = re.findall(r"\[(\w+)\]", line)
+            declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+            assert set(extras) <= declared.keys(), place
+        case _:
+            assert (ROOT / program).is_file(), place
+
+
+@pytest.mark.parametrize("block", [block for block in BLOCKS if block.language in {"toml", "json"}], ids=str)
+def test_a_file_on_a_page_is_well_formed(block: Block) -> None:
+    (tomllib if block.language == "toml" else json).loads(block.text)
+
+
+def test_measured_intervals_on_the_pages_are_those_of_the_records() -> None:
+    """`0.26 [0.19, 0.35]` on a page is in the records of the claims, with at least as many digits."""
+    number = r"-?\d*\.?\d+"
+    interval = re.compile(rf"({number}) \[({number}), ({number})\]")
+    recorded = [tuple(map(float, found)) for found in interval.findall((ROOT / "experiments/claims.json").read_text())]
+    missing = set()
+    for page in ("README.md", "docs/results.md"):
+        for found in interval.finditer((ROOT / page).read_text()):
+            digits = len(found[1].partition(".")[2])
+            shown = tuple(map(float, found.groups()))
+            if not any(max(abs(a - b) for a, b in zip(shown, one, strict=True)) <= 0.51 * 10**-digits for one in recorded):
+                missing.add(f"{page}: {found[0]}")
+    assert missing == set()
