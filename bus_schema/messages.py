@@ -76,7 +76,9 @@ class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
 class Tick(Clock, frozen=True, kw_only=True):
     """Start of tick k, with the newest state of every part; each part has its own sampling time."""
 
-    stream: ClassVar[Stream] = Stream("tick", "CONTROL", writer="robot_sim, every tick", readers="model, controller, port_filter")
+    stream: ClassVar[Stream] = Stream(
+        "tick", "CONTROL", writer="robot_sim, every tick", readers="model, controller, port_filter; clients that need all motors"
+    )
 
     q: RobotVector  # rad, encoders
     parts: dict[Name, PartStatus]  # of all parts

@@ -1,11 +1,13 @@
-"""Starts a service with its robot, and ends it with one line on bad input."""
+"""Starts a service with its log and its robot, and ends it with one line on bad input."""
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from mobee.errors import InvalidValue, MobeeError, RobotFileError, UnknownName
 from mobee.robot.load import load_robot
@@ -38,3 +40,24 @@ def explained(prog: str) -> Iterator[None]:
     except (MobeeError, BusUnreachable) as error:
         print(f"{prog}: {error}", file=sys.stderr)
         raise SystemExit(BAD_INPUT if isinstance(error, (RobotFileError, UnknownName, InvalidValue)) else FAILED) from None
+
+
+class _LogFile(logging.FileHandler):
+    """A file of log lines."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """A line that the disk has no room for is lost: told without logging's traceback, which would cover the screen."""
+        if not isinstance(sys.exc_info()[1], OSError):
+            super().handleError(record)
+
+
+def set_up_log(who: str, file: Path | None = None) -> logging.Logger:
+    """The service's logger; `file` instead of standard error."""
+    logging.basicConfig(
+        handlers=[logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)],
+        level=logging.INFO,
+        format=f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s",
+        datefmt="%H:%M:%S",
+        force=True,
+    )
+    return logging.getLogger(who)

@@ -20,10 +20,10 @@ from bus_schema import VERSION, keys
 from bus_schema.rpc import Config, Done, Empty, Reply, Request, Stat
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
-from services.common import log, rpc
+from services.common import rpc
 from services.common.bus import Bus
 from services.common.config import ServiceConfig
-from services.common.entry import wait_until_released
+from services.common.entry import set_up_log, wait_until_released
 from services.common.exit_codes import ENVIRONMENT, OK
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
@@ -60,7 +60,7 @@ class Service(Listener):
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)
-        self.log = log.set_up(who)
+        self.log = set_up_log(who)
         if config.mode == "lock":
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE

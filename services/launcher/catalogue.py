@@ -36,7 +36,7 @@ _ENTRIES = {
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
     "renderer": Entry(
         "services.robot_sim.renderer",
-        "services.robot_sim.renderer_config:RendererConfig",
+        "services.robot_sim.config:RendererConfig",
         4,
         after=("robot_sim", "controller"),
         nice=_PICTURES,

@@ -16,8 +16,8 @@ from types import FrameType
 from bus_schema import keys
 from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
-from services.common import log
 from services.common.config import ConfigError, ServiceConfig
+from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -93,7 +93,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)
         service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
-        service.log = service.bus.log = log.set_up("launcher", directory / "logs" / "launcher.log")
+        service.log = service.bus.log = set_up_log("launcher", directory / "logs" / "launcher.log")
     except OSError as error:
         return _refuse(
             f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT

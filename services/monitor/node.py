@@ -23,8 +23,7 @@ from services.monitor.config import Config
 from services.monitor.learning import Learning
 from services.monitor.output import Output
 from services.monitor.plots import Plots
-from services.monitor.poses import Poses
-from services.monitor.scene import Scene
+from services.monitor.scene import Poses, Scene
 
 WORLD_PERIOD = 1.0  # s between looks at the model's world
 JPEG_QUALITY = 85

@@ -2,17 +2,73 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from bus_schema.messages import Answer, Command, Commands, PartStatus, State, Tick
+from bus_schema.messages import Answer, Command, Commands, Mode, PartStatus, State, Tick
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
+from services.common.bus import Bus
 from services.common.service import Service
-from services.port_filter.commands import Stream
-from services.port_filter.moves import Moves
+
+REST = 0.1  # s for which a reference has stayed the same before it is said to rest
+
+
+class Moves:
+    """Watches the commands of one part."""
+
+    def __init__(self) -> None:
+        self._reference: list[float] | None = None  # of position commands; None: the part was commanded otherwise, or not at all
+        self._since = 0  # ns, when the reference became what it is
+        self._moving = False
+
+    def begins(self, command: Command, t: int) -> bool:
+        """Whether this command begins a position move; t ns of the bus clock."""
+        if command.mode != "position":
+            self._reference, self._moving = None, False
+            return False
+        if command.ref == self._reference:
+            self._moving = self._moving and t - self._since < REST * 1e9
+            return False
+        begins = not self._moving
+        self._reference, self._since, self._moving = command.ref, t, True
+        return begins
+
+    def forget(self) -> None:
+        """The part is out of the client's hands."""
+        self._reference, self._moving = None, False
+
+
+REMEMBERED = 1000  # commands under way, at most
+
+
+class Stream:
+    """One stream with one numbering, and which number of the client's is behind each."""
+
+    def __init__(self, bus: Bus, part: str) -> None:
+        self._stream = bus.publisher(Command, part)
+        self._seq = 0
+        self._theirs: OrderedDict[int, int] = OrderedDict()
+
+    def forward(self, command: Command) -> None:
+        """Pass a client's command on."""
+        self._theirs[self._seq] = command.seq
+        if len(self._theirs) > REMEMBERED:
+            self._theirs.popitem(last=False)
+        self.put(command.epoch, command.re_k, command.mode, command.ref, command.ttl)
+
+    def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
+        """Command the part."""
+        self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
+        self._seq += 1
+
+    def theirs(self, seq: int) -> int:
+        """The client's number of what robot_sim knows as `seq`; -1 when it was none of the client's."""
+        return self._theirs.get(seq, -1)
+
 
 STALE = 100_000_000  # ns: a part whose state is older cannot be judged
 

@@ -12,8 +12,7 @@ from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import CallRefused, Service
-from services.robot_sim.admission import Limits, Order, orders_of, refused_as_call
-from services.robot_sim.gate import LOCKED_TTL, Gate
+from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, refused_as_call
 from services.robot_sim.kinematic import Backend
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds

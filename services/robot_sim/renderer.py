@@ -19,7 +19,7 @@ from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.rate import Percentiles
 from services.common.service import Service
-from services.robot_sim.renderer_config import RendererConfig
+from services.robot_sim.config import RendererConfig
 from services.robot_sim.renderer_scene import Scene
 
 

@@ -16,8 +16,7 @@ from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
 from services.common.bus import Bus
 from services.common.worlds import robot_hash
-from services.robot_sim.admission import Limits
-from services.robot_sim.gate import Gate
+from services.robot_sim.gate import Gate, Limits
 
 PHASES = 0.8  # share of the tick in which the phases lie
 AHEAD = 256  # ticks whose jitter is drawn at once

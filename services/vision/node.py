@@ -13,9 +13,8 @@ from mobee.robot.robot import Robot
 from services.common.eyes import frame_at_capture
 from services.common.rate import Percentiles
 from services.common.service import Service
-from services.vision.ball import Sighting, find_balls
+from services.vision.ball import Frame, Sighting, find_balls, locate
 from services.vision.config import Config
-from services.vision.triangulate import Frame, locate
 
 BALL = "ball"
 

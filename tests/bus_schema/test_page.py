@@ -17,7 +17,7 @@ from bus_schema.rpc import CALLS
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("robot_sim", "renderer", "model", "controller", "port_filter", "agents", "vision", "monitor", "launcher")
-SHARED = {"bus_plant.py": "agents", "bus_reach.py": "agents"}  # files of services/common that one service uses
+SHARED = {"bus_plant.py": "agents"}  # files of services/common that one service uses
 MIRRORS = "port_filter"  # publishes the robot's own streams to its clients
 
 

@@ -11,7 +11,7 @@ import pytest
 import services.monitor.view
 from mobee_cli import bench, check, robots, topic, topic_echo, topic_hz, topic_list
 from mobee_cli.__main__ import VERBS, main
-from tests.services.launched import mobee
+from tests.services.launcher.launched import mobee
 
 
 def test_without_a_verb_all_verbs_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

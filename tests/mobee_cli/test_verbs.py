@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.services.launched import Launched, is_free, mobee, toys, wait_until
+from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from bus_schema.rpc import Done, Empty, Place, World
 from mobee import load_robot
 from services.common import rpc
 from services.common.eyes import frame_at_capture
-from tests.services.test_vision import share_seen
+from tests.services.vision.test_locator import share_seen
 from tests.system.live import running
 
 ROBOT = load_robot("icub")

@@ -43,3 +43,18 @@ def test_a_service_that_is_started_by_hand_waits_for_nobody() -> None:
         [sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, text=True
     ) as process:
         assert process.wait(LIMIT) == 0
+
+
+LOG = "from pathlib import Path; from services.common.entry import set_up_log; set_up_log('launcher', Path('/dev/full')).info({})"
+
+
+def said_of(call: str) -> str:
+    return subprocess.run([sys.executable, "-c", LOG.format(call)], stderr=subprocess.PIPE, text=True, check=True).stderr
+
+
+def test_a_full_disk_puts_no_traceback_on_the_screen() -> None:
+    assert said_of("'a line'") == ""
+
+
+def test_a_mistake_in_a_log_call_is_still_told() -> None:
+    assert "TypeError" in said_of("'a line', 'too much'")

@@ -18,7 +18,7 @@ from tests.services.robots import ARM as OWN
 
 rr = pytest.importorskip("rerun")
 from services.monitor.learning import MOST, Learning  # noqa: E402  # only where Rerun is
-from services.monitor.poses import Poses  # noqa: E402  # only where Rerun is
+from services.monitor.scene import Poses  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]

@@ -11,8 +11,7 @@ from bus_schema.messages import Command
 from mobee.arrays import Array
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters, Motors
-from services.robot_sim.admission import Limits, Order
-from services.robot_sim.gate import Drive, Gate
+from services.robot_sim.gate import Drive, Gate, Limits, Order
 
 ROBOT = load_robot("icub")
 PART = "torso"

@@ -1,6 +1,9 @@
+"""The safety gate without a bus: what it admits, and what the motors get."""
+
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +12,7 @@ from hypothesis import strategies as st
 
 from bus_schema import Refused
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.admission import Order
-from services.robot_sim.gate import Gate
+from services.robot_sim.gate import MARGIN, START, Admission, Gate, Order
 from tests.services.robot_sim.gated import LIMITS, PART, ROBOT, WHERE, Gated, N
 
 VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]
@@ -334,3 +336,28 @@ def test_in_lockstep_an_age_is_counted_in_ticks_however_long_these_are() -> None
     with pytest.raises(Refused, match="4 ticks ago, limit 3") as caught:
         gate.admit(order(1, 6), 10, 0, ROBOT.home[WHERE])
     assert caught.value.reason == "age"
+
+
+FINE = np.full(N, 0.01)
+
+
+def order(position: float) -> Order:
+    reference = LIMITS.upper.copy()
+    reference[0] += position
+    return Order("controller", 1, 1, 1, "position", reference, 100)
+
+
+@pytest.mark.parametrize("fine", [np.ones(N), FINE])
+def test_a_position_may_be_beyond_its_limit_by_as_much_as_the_motor_is_exact(fine: np.ndarray) -> None:
+    admission = Admission("torso", replace(LIMITS, fine=fine), 0.01, None)
+    admission.check(order(0.9 * MARGIN * fine[0]), 1)
+    with pytest.raises(Refused, match="rad beyond a limit"):
+        admission.check(order(1.1 * MARGIN * fine[0]), 1)
+
+
+@pytest.mark.parametrize("fine", [np.ones(N), FINE])
+def test_the_first_position_may_be_as_far_from_the_measured_one(fine: np.ndarray) -> None:
+    admission, q = Admission("torso", replace(LIMITS, fine=fine), 0.01, None), np.zeros(N)
+    admission.check_step(q + 0.9 * START * fine, None, 1, q)
+    with pytest.raises(Refused, match="a jump of"):
+        admission.check_step(q + 1.1 * START * fine, None, 1, q)

@@ -31,8 +31,7 @@ from mobee import load_world
 from mobee.robot.load import load_robot
 from services.common.eyes import frame_at_capture
 from services.robot_sim.renderer_scene import Scene
-from services.vision.ball import Sighting, find_balls
-from services.vision.triangulate import Fix, locate, triangulate
+from services.vision.ball import Fix, Sighting, find_balls, locate, triangulate
 from tests.services.stage import LOOKING_DOWN, TICK, Stage, matched, posture
 
 ROBOT = load_robot("icub")

@@ -15,7 +15,7 @@ from services.controller.forces import PublishedContacts, load_terms
 from tests.services.controller.stage import ROBOT, Stage, staged
 from tests.services.harness import rig, wait_for
 
-HERE = "tests.services.controller.test_terms"
+HERE = "tests.services.controller.test_forces"
 LINK = ROBOT.marker("left_palm").link
 TOUCH = {"kind": "field", "depth": 0.01, "normal": [0.0, 0.0, 1.0], "point": [-0.3, -0.15, 0.03]}
 TOUCHES = [ContactItem(first="palm", second="table", first_link=LINK, second_link=-1, **TOUCH)]

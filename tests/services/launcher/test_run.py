@@ -12,7 +12,7 @@ import pytest
 from bus_schema.messages import EStop
 from services.common.observe import Heard, listen
 from services.common.session import open_client
-from tests.services.launched import Launched, is_free, mobee, toys, wait_until
+from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
 
 Launch = Callable[..., Launched]
 

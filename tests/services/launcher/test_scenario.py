@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from mobee.robot import load
 from services.common.config import ConfigError
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots, check_services
-from services.launcher.run_directory import make_run_directory
+from services.launcher.run_directory import make_run_directory, to_toml
 from services.launcher.scenario import read_scenario, shipped
-from services.launcher.toml import to_toml
-from tests.services.launched import mobee, toys
+from tests.services.launcher.launched import mobee, toys
 from tests.services.robots import ARM, chain, seer
 
 SCENARIO = """\

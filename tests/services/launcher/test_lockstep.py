@@ -10,7 +10,7 @@ from services.common.config import ConfigError
 from services.launcher.checks import check_lockstep, check_rate, check_robots
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.summary import as_text, summarise
-from tests.services.test_launcher_summary import RUN, child
+from tests.services.launcher.test_summary import RUN, child
 
 
 def participants(scenario: Scenario) -> tuple[str, ...]:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from bus_schema import VERSION
 from bus_schema.messages import Command, Mode
-from services.port_filter.moves import Moves
+from services.port_filter.passage import Moves
 
 TICK = 10_000_000  # ns
 
