@@ -33,7 +33,7 @@ An experiment is one module in `claims/`, by chapter of the thesis: its docstrin
 intervals, unless they say otherwise; how many runs they rest on is in the last column.
 
 A sweep (`--seeds N`) works on all cores; each finished cell is on disk at once, and `--resume` goes on behind them after Ctrl-C or a
-kill. `--engine ray` (`pip install '.[cluster]'`) works on the Ray cluster that this machine belongs to, on all its machines, and on
+kill. `--engine ray` (`pip install \"mobee[cluster]\"`) works on the Ray cluster that this machine belongs to, on all its machines, and on
 this machine alone if there is none; MoBeE must be installed on each of them in the same version. `--quick` shows whether it works.
 
 **confirmed**: our number is what was published. **refuted**: it is not. **open**: it was not measured, does not decide, or rests on

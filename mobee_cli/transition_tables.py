@@ -35,7 +35,7 @@ def write_parquet(file: Path, records: Iterable[Record]) -> int:
         import pyarrow as arrow
         from pyarrow import parquet
     except ModuleNotFoundError:
-        raise UserError("Parquet needs pyarrow: pip install '.[parquet]' in MoBeE's folder; or leave --parquet out", ENVIRONMENT) from None
+        raise UserError('Parquet needs pyarrow: pip install "mobee[parquet]"; or leave --parquet out', ENVIRONMENT) from None
     name, whole, real = arrow.dictionary(arrow.int32(), arrow.string()), arrow.int32(), arrow.float64()
     kinds = (name, name, whole, whole, whole, whole, real, arrow.bool_(), real, arrow.list_(real), arrow.list_(arrow.string()), real)
     schema = arrow.schema(list(zip(COLUMNS, kinds, strict=True)))

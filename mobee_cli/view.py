@@ -56,7 +56,7 @@ def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequen
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "rerun":
             raise
-        raise UserError("a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder", ENVIRONMENT) from None
+        raise UserError('a view needs rerun-sdk: pip install "mobee[viz]"', ENVIRONMENT) from None
     try:
         view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True), stretches)
     except KeyboardInterrupt:

@@ -320,7 +320,7 @@ def _agreement(result: dict[str, Any]) -> str:
             f"{100.0 * one['same_depths']:>10.1f} %{one['beaten']:>8.0e}{'' if one['passed'] else ' DIFFERS'}"
         )
     if not result["coal"]:
-        lines.append("  coal: not installed: pip install '.[dev]' in MoBeE's folder")
+        lines.append('  coal: not installed: pip install "mobee[dev]"')
     return "\n".join([*lines, _wrapped(_NOTE, "  ")])
 
 

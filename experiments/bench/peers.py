@@ -18,7 +18,7 @@ def import_peer(module: str, name: str, extra: str = "bench") -> Any:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise NotInstalled(f"{name} is not installed: pip install '.[{extra}]' in MoBeE's folder") from None
+        raise NotInstalled(f'{name} is not installed: pip install "mobee[{extra}]"') from None
 
 
 def load_cma() -> Any:

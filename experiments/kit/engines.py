@@ -184,7 +184,7 @@ def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done
     try:
         import ray
     except ImportError:
-        raise RayMissing("--engine ray needs Ray, which is not installed: pip install '.[cluster]' in MoBeE's folder") from None
+        raise RayMissing('--engine ray needs Ray, which is not installed: pip install "mobee[cluster]"') from None
     try:
         ray.init(address="auto", log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError:

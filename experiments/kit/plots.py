@@ -24,7 +24,7 @@ def new_figure(width: float, height: float) -> Any:
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MatplotlibMissing("figures need Matplotlib, which is not installed: pip install '.[figures]' in MoBeE's folder") from None
+        raise MatplotlibMissing('figures need Matplotlib, which is not installed: pip install "mobee[figures]"') from None
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -114,7 +114,7 @@ def _compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
     try:
         from experiments.originals.compare import compare
     except ImportError:
-        raise InvalidValue("coal, which judges contacts, is not installed: pip install '.[dev]' in MoBeE's folder.") from None
+        raise InvalidValue('coal, which judges contacts, is not installed: pip install "mobee[dev]".') from None
     return compare(path, robot, poses, seed)
 
 

@@ -34,7 +34,7 @@ class UrdfPeer:
         try:
             import pinocchio
         except ImportError:
-            raise PeerMissing("Pinocchio and coal are not installed: pip install '.[dev]' in MoBeE's folder") from None
+            raise PeerMissing('Pinocchio and coal are not installed: pip install "mobee[dev]"') from None
         self._pin, self._robot, self._path = pinocchio, robot, path.resolve()
         try:
             self._model = pinocchio.buildModelFromUrdf(str(self._path))

@@ -23,7 +23,7 @@ from mobee.robot.robot import Robot, Shape
 try:
     import fcl
 except ModuleNotFoundError:
-    raise NotInstalled("this needs python-fcl, which is not installed: pip install '.[fcl]' in MoBeE's folder") from None
+    raise NotInstalled('this needs python-fcl, which is not installed: pip install "mobee[reference]"') from None
 
 # fcl.collide is off by up to centimetres for capsules and boxes (it stops at any separating direction); signed distances are not.
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)

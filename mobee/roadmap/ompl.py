@@ -27,7 +27,7 @@ def require_ompl() -> tuple[Any, Any, Any]:
     try:
         from ompl import base, geometric, util
     except ImportError:
-        raise OmplMissing("this needs OMPL, which is not installed: pip install '.[planning]' in MoBeE's folder") from None
+        raise OmplMissing('this needs OMPL, which is not installed: pip install "mobee[planning]"') from None
     return base, geometric, util
 
 

@@ -28,12 +28,10 @@ def models_folder() -> Path:
     try:
         package = importlib.import_module("icub_models")
     except ModuleNotFoundError as error:
-        raise MobeeError(
-            "the iCub's meshes are missing (package icub-models). Install them: pip install '.[sim]' in MoBeE's folder"
-        ) from error
+        raise MobeeError('the iCub\'s meshes are missing (package icub-models). Install them: pip install "mobee[sim]"') from error
     folder = Path(package.get_models_path()).parent
     if not (folder / "robots" / MODEL / "model.urdf").is_file():
-        raise MobeeError(f"{folder} holds no robots/{MODEL}/model.urdf. Install icub-models again: pip install '.[sim]' in MoBeE's folder")
+        raise MobeeError(f'{folder} holds no robots/{MODEL}/model.urdf. Install icub-models again: pip install "mobee[sim]"')
     return folder
 
 

@@ -42,7 +42,7 @@ def _remedy(package: str, extra: str) -> str:
             f" and has no wheel for Python {version}: use Python 3.11, or the motor model alone, which runs on every version: "
             "mobee launch kinematic"
         )
-    return f": pip install '.[{extra}]' in MoBeE's folder"
+    return f': pip install "mobee[{extra}]"'
 
 
 def check_ports(scenario: Scenario) -> None:

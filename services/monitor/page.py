@@ -32,7 +32,7 @@ def program() -> Path:
     """Rerun's program, as its wheel brings it."""
     spec = find_spec("rerun_cli")
     if spec is None or spec.origin is None:
-        raise SystemExit("the page needs rerun-sdk: pip install '.[viz]' in MoBeE's folder")
+        raise SystemExit('the page needs rerun-sdk: pip install "mobee[viz]"')
     return Path(spec.origin).parent / "rerun"
 
 

@@ -40,7 +40,7 @@ def _make_backend(config: Config, robot: Robot) -> Backend:
         from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
     except ModuleNotFoundError as error:
         raise BackendUnavailable(
-            f"the pybullet back-end needs the module {error.name!r}: pip install '.[sim]' in MoBeE's folder on Python 3.11. "
+            f'the pybullet back-end needs the module {error.name!r}: pip install "mobee[sim]" on Python 3.11. '
             'Without it: backend = "kinematic".'
         ) from error
     return BulletBackend(robot, config.load_world, parameters, config.seed, round(1e9 / config.rate) / 1e9)

@@ -73,7 +73,7 @@ def test_without_mujoco_it_names_the_extra(monkeypatch: pytest.MonkeyPatch, caps
     assert main(["bench", "model", "--quick"]) == 3
     output = capsys.readouterr()
     assert output.out == ""
-    assert output.err == "mobee bench: MuJoCo is not installed: pip install '.[bench]' in MoBeE's folder\n"
+    assert output.err == 'mobee bench: MuJoCo is not installed: pip install "mobee[bench]"\n'
 
 
 @pytest.mark.parametrize("given", ["1001", "-1", "many"])

@@ -104,7 +104,7 @@ def test_a_failure_leaves_no_file_and_the_old_one_as_it_was(run: Path, capsys: p
 def test_without_pyarrow_the_extra_is_named(run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     assert main(["export", str(run), "--parquet"]) == 3
-    assert "pip install '.[parquet]'" in capsys.readouterr().err
+    assert 'pip install "mobee[parquet]"' in capsys.readouterr().err
 
 
 def test_what_was_learned_of_reaching_is_a_table_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

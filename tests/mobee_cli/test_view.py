@@ -54,7 +54,7 @@ def test_without_the_viewer_it_is_said_how_to_install_it(tmp_path: Path) -> None
     code = "import sys; sys.modules['rerun'] = None; from mobee_cli.__main__ import main; sys.exit(main(['view', 'katana']))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 3
-    assert done.stderr == "mobee view: a view needs rerun-sdk: pip install '.[viz]' in MoBeE's folder\n"
+    assert done.stderr == 'mobee view: a view needs rerun-sdk: pip install "mobee[viz]"\n'
 
 
 def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,9 +73,7 @@ def make_body(robot: Robot, seed: int) -> Backend:
     try:
         from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which not every Python has
     except ModuleNotFoundError as error:
-        raise BackendUnavailable(
-            f"identify needs the module {error.name!r}: pip install '.[sim]' in MoBeE's folder on Python 3.11."
-        ) from error
+        raise BackendUnavailable(f'identify needs the module {error.name!r}: pip install "mobee[sim]" on Python 3.11.') from error
     return BulletBackend(robot, World, MotorParameters(), seed, DT)
 
 

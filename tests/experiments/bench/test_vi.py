@@ -73,4 +73,4 @@ def test_without_quantecon_it_names_the_extra(monkeypatch, capsys):
     with pytest.raises(NotInstalled):
         load_quantecon()
     assert main(["bench", "vi", "--quick"]) == 3
-    assert capsys.readouterr().err == "mobee bench: quantecon is not installed: pip install '.[bench]' in MoBeE's folder\n"
+    assert capsys.readouterr().err == 'mobee bench: quantecon is not installed: pip install "mobee[bench]"\n'

@@ -12,7 +12,7 @@ from tests.experiments.kit.toy_sweep import cells, options, work
 
 def test_without_ray_it_is_said_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(RayMissing, match=r"pip install '\.\[cluster\]'"):
+    with pytest.raises(RayMissing, match=r'pip install "mobee\[cluster\]"'):
         run_cells(work, cells(2), tmp_path, options(str(tmp_path), "--engine", "ray"))
 
 

@@ -81,5 +81,5 @@ def test_bad_input_is_refused(call, complaint):
 
 def test_without_ompl_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
-    with pytest.raises(OmplMissing, match=r"pip install '\.\[planning\]'"):
+    with pytest.raises(OmplMissing, match=r'pip install "mobee\[planning\]"'):
         rrt_connect(model(), HOME, BEHIND)

@@ -47,5 +47,5 @@ def test_every_mesh_is_an_existing_file_and_every_link_has_a_mass(urdf: ET.Eleme
 
 def test_a_missing_package_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "icub_models", None)
-    with pytest.raises(MobeeError, match=r"pip install '\.\[sim\]'"):
+    with pytest.raises(MobeeError, match=r'pip install "mobee\[sim\]"'):
         icub_urdf.models_folder()

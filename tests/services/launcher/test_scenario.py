@@ -274,14 +274,14 @@ def missing(monkeypatch: pytest.MonkeyPatch, package: str, *settings: str) -> st
 @pytest.mark.parametrize(
     ("package", "service", "remedy"),
     [
-        ("icub_models", "robot_sim", ".[sim]"),
-        ("rerun", "monitor", ".[viz]"),
+        ("icub_models", "robot_sim", "mobee[sim]"),
+        ("rerun", "monitor", "mobee[viz]"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch, package: str, service: str, remedy: str) -> None:
     text = missing(monkeypatch, package)
     assert text.startswith(f"{service} needs {package}")
-    assert f"pip install '{remedy}'" in text
+    assert f'pip install "{remedy}"' in text
 
 
 def test_on_a_newer_python_the_motor_model_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:

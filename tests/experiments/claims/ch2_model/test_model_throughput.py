@@ -263,5 +263,5 @@ def test_without_matplotlib_the_error_says_what_to_install(tmp_path, monkeypatch
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(MatplotlibMissing, match=r"pip install '\.\[figures\]'"):
+    with pytest.raises(MatplotlibMissing, match=r'pip install "mobee\[figures\]"'):
         model_throughput.EXPERIMENT.method.figure(tmp_path)
