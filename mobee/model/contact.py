@@ -1,4 +1,4 @@
-"""Contacts, one by one and as a table, and the world objects that are touched."""
+"""Contacts, one by one and as a table, and the world objects that a part touches."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class ContactTable:
     Names are given by index: the robot's shapes, then the world's objects.
     """
 
-    # One is made for every pose, and often nothing of it is read: rows become arrays when they are asked for.
+    # A table is made for every pose and is often never read: its rows become arrays when they are first read.
     __slots__ = ("_objects", "_rows", "_shapes")
 
     def __init__(self, shapes: tuple[str, ...], objects: tuple[str, ...], rows: tuple[Column, Array] | bytearray) -> None:
-        """`rows`: `numbers` and `reals`, or both as the core writes them: all numbers, then all reals."""
+        """`rows`: the arrays `numbers` and `reals`, or both in one block as the core writes them, all numbers first."""
         self._shapes = shapes
         self._objects = objects
         self._rows = rows
@@ -58,7 +58,7 @@ class ContactTable:
         return len(self.reals)
 
     def name(self, index: int) -> str:
-        """The shape or object that `first` or `second` stands for."""
+        """Return the name of the shape or object with an index of `first` or `second`."""
         count = len(self._shapes)
         return self._shapes[index] if index < count else self._objects[index - count]
 
@@ -84,51 +84,51 @@ class ContactTable:
 
     @property
     def pose(self) -> Column:
-        """Index into the flattened batch, (c,)."""
+        """Indices into the flattened batch, (c,)."""
         return self.numbers[:, 0]
 
     @property
     def kind(self) -> Column:
-        """Index into KINDS, (c,)."""
+        """Indices into KINDS, (c,)."""
         return self.numbers[:, 1]
 
     @property
     def first(self) -> Column:
-        """Index of a name, (c,)."""
+        """Indices for `name`, (c,)."""
         return self.numbers[:, 2]
 
     @property
     def second(self) -> Column:
-        """Index of a name, (c,)."""
+        """Indices for `name`, (c,)."""
         return self.numbers[:, 3]
 
     @property
     def first_link(self) -> Column:
-        """The link that carries the first, (c,)."""
+        """The link of each first volume, (c,)."""
         return self.numbers[:, 4]
 
     @property
     def second_link(self) -> Column:
-        """The link that carries the second, -1 for a free world object, (c,)."""
+        """The link of each second volume, -1 for a free world object, (c,)."""
         return self.numbers[:, 5]
 
     @property
     def depth(self) -> Array:
-        """(c,) m."""
+        """Depths, (c,) m."""
         return self.reals[:, 0]
 
     @property
     def normal(self) -> Array:
-        """(c, 3) unit vectors."""
+        """Normals, (c, 3) unit vectors."""
         return self.reals[:, 1:4]
 
     @property
     def point(self) -> Array:
-        """(c, 3) m."""
+        """Points, (c, 3) m."""
         return self.reals[:, 4:7]
 
     def contacts(self) -> tuple[Contact, ...]:
-        """The rows as Contact objects."""
+        """Return the rows as Contact objects."""
         return tuple(
             Contact(self.name(a), self.name(b), KINDS[kind], depth, real[1:4], real[4:7], link_a, link_b)
             for (_, kind, a, b, link_a, link_b), depth, real in zip(
@@ -144,24 +144,24 @@ class ContactTable:
 
 
 def _read(rows: bytearray) -> tuple[Column, Array]:
-    """The numbers and the reals of a block, which they share."""
+    """Return numbers and reals as views of one block."""
     count = len(rows) // ROW_BYTES
     numbers: Column = np.ndarray((count, NUMBERS), np.int64, rows)
     return numbers, np.ndarray((count, REALS), np.float64, rows, offset=numbers.nbytes)
 
 
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
-    """For every part, the names of the world objects in contact (fields included) with a link that it moves; one pose."""
+    """Return for every part the names of the world objects in contact (fields included) with a link that it moves; for one pose."""
     return {part: touched_by(pose, part) for part in pose.robot.parts}
 
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
-    """The names of the world objects in contact (fields included) with a link that the part moves, in order; one pose."""
+    """Return the names, sorted, of the world objects in contact (fields included) with a link that the part moves; for one pose."""
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
-    """The names of the world objects in contact with these links, in order, from the contacts of one pose."""
+    """Return the names, sorted, of the world objects in contact with these links, from the contacts of one pose."""
     rows = table.numbers.tolist()
     found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}
     return tuple(sorted(map(table.name, found)))
@@ -169,7 +169,7 @@ def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def links_moved(robot: Robot) -> dict[str, frozenset[int]]:
-    """For every part, the links that its motors move in the root frame: those they drive and all that are mounted on them."""
+    """Return for every part the links that its motors move: those that they drive and all that are mounted on these."""
     matrix, _ = robot.coupling
     found: dict[str, frozenset[int]] = {}
     for name, part in robot.parts.items():

@@ -1,4 +1,4 @@
-"""The engine of one robot: holds the objects of the core that evaluations use, for any number of threads."""
+"""The compiled engine of one robot: holds the objects of the core that evaluations use, for any number of threads."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from mobee.model.robot_tables import Carried, robot_tables
 from mobee.model.snapshot import ATTACHED, NO_HANDS, Hands, Snapshot, hand_numbers
 from mobee.robot.robot import Robot, per_robot
 
-GRID_FROM = 100  # objects; fewer are looked at one after the other, in vector instructions, at no more cost
-PER_CELL = 8  # objects, aimed at
+GRID_MIN_OBJECTS = 100  # with fewer objects a grid costs more than checking one after the other in vector instructions
+OBJECTS_PER_CELL = 8  # of the grid, on average
 
 
 @per_robot
 def robot_handle(robot: Robot) -> core.Handle:
-    """The robot in the core."""
+    """Return the handle of the robot in the core."""
     return core.robot(*robot_tables(robot).for_core())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A robot among the free objects of one snapshot.  It never changes."""
+    """A robot among the free objects of one snapshot; immutable."""
 
     snapshot: Snapshot
     handle: core.Handle
-    nothing: ContactTable  # that of all poses without contacts
+    nothing: ContactTable  # of every pose without contacts
 
 
 class _Room(core.Room):
-    """A room, and what was asked last of one pose there."""
+    """The buffers of one evaluation at a time, and the arguments of the last evaluation of one pose."""
 
     __slots__ = ("cut", "reaching", "scene")
 
@@ -46,7 +46,7 @@ class _Room(core.Room):
         self.cut = False
 
     def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:
-        """Ask something else."""
+        """Set the arguments of the next evaluations of one pose."""
         self.ask(scene.handle, hand_numbers(reaching), cut)
         self.scene, self.reaching, self.cut = scene, reaching, cut
         return scene
@@ -62,25 +62,25 @@ class Engine:
         self._bare = robot_handle(robot)
         self._laden: tuple[tuple[bytes, ...], core.Handle] = (), self._bare
         self._scene: Scene | None = None
-        self._rooms: list[_Room] = []  # of evaluations that have ended
+        self._rooms: list[_Room] = []  # buffers that no evaluation uses now
 
     def transforms(self, q: Array) -> Array:
-        """Every link in every pose, (B, L, 4, 4) from q (B, n)."""
+        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
         return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """How the point (3,) of a link, root frame at zero pose, moves with each motor in the poses q (B, n): (B, 6, n)."""
+        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
         return core.jacobians(self._bare, q, link, point)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
+        """Return all contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
 
-        `reaching`: who spares the targets; `cut`: a part's motors feel only what happens to its own links, as in the original
-        program.  The results are the same for any number of threads.
+        `reaching`: the hands whose contacts with targets are ignored; `cut`: a contact acts only on the motors of its own part, as in
+        the original program. The results are the same for any number of threads.
         """
         scene = self.scene_of(snapshot)
         try:
-            room = self._rooms.pop()  # as one step: other threads take rooms too
+            room = self._rooms.pop()  # atomic: other threads take buffers too
         except IndexError:
             room = _Room(self._motors)
         numbers, reals, torque = room.evaluate(scene.handle, q, hand_numbers(reaching), cut, threads)
@@ -88,9 +88,9 @@ class Engine:
         return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """The same for one pose, of which `q` are the bytes."""
+        """Return the same for one pose, given as the bytes of its q."""
         try:
-            room = self._rooms.pop()  # as one step: other threads take rooms too
+            room = self._rooms.pop()  # atomic: other threads take buffers too
         except IndexError:
             room = _Room(self._motors)
         scene = room.scene
@@ -106,17 +106,17 @@ class Engine:
         return found
 
     def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
-        """The table of what the core has written."""
+        """Return the contact table of rows that the core has written."""
         return ContactTable(self._shapes, snapshot.names, (numbers, reals))
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
-        """The robot among the free objects of a snapshot; the same as before for the same snapshot."""
+        """Return the robot among the free objects of a snapshot; the same object for the same snapshot."""
         known = self._scene
         if known is not None and known.snapshot is snapshot:
             return known
         carried = [k for k, role in enumerate(snapshot.roles) if role == ATTACHED] if snapshot.attached else []
         count = len(snapshot.roles)
-        side = 1 if count < GRID_FROM else max(1, int((count / PER_CELL) ** (1.0 / 3.0)))
+        side = 1 if count < GRID_MIN_OBJECTS else max(1, int((count / OBJECTS_PER_CELL) ** (1.0 / 3.0)))
         robot = self._robot_with(snapshot, carried)
         handle = core.scene(robot, snapshot.rows, snapshot.roles, np.array(carried, dtype=np.int64), side)
         new = Scene(snapshot, handle, ContactTable(self._shapes, snapshot.names, (core.NO_NUMBERS, core.NO_REALS)))
@@ -124,7 +124,7 @@ class Engine:
         return new
 
     def _robot_with(self, snapshot: Snapshot, carried: list[int]) -> core.Handle:
-        """The robot with what it carries; made anew only when that has changed."""
+        """Return the robot with the objects that it carries; built again only when these have changed."""
         if not carried:
             return self._bare
         links = [snapshot.objects[snapshot.names[k]].link or "" for k in carried]

@@ -1,6 +1,6 @@
-"""A slow, independent engine on python-fcl that judges the core's contacts, and the rules for which pairs are tested.
+"""A slow, independent engine on python-fcl, the reference for the core's contacts, and the rules for which pairs are tested.
 
-Depths are exact to 1e-6 m, fcl's tolerance.  Bounding spheres keep pairs from fcl that cannot touch.
+Depths are exact to 1e-6 m, fcl's tolerance. Only pairs whose bounding spheres overlap are given to fcl.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ _COLLISION = fcl.CollisionRequest(enable_contact=True)
 
 
 class FclEngine:
-    """Evaluates poses of one robot, with the same results as the compiled engine within fcl's tolerance."""
+    """Evaluates poses of one robot, with the results of the compiled engine within fcl's tolerance."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._pairs: tuple[Snapshot | None, Hands, tuple[Ints, Ints, Ints] | None] = None, NO_HANDS, None
 
     def transforms(self, q: Array) -> Array:
-        """Every link in the poses q (B, n), (B, L, 4, 4)."""
+        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
         return link_transforms(self.robot, q)
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
+        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
         transforms = link_transforms(self.robot, q)
         moved = transforms[:, link, :3, :3] @ point + transforms[:, link, :3, 3]
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n).
+        """Return all contacts in the poses q (B, n), and the projection of those of fields, (B, n).
 
-        `reaching`: who spares the targets; `cut`: a motor feels only what happens to links of its own part.  `threads`: fcl knows but one.
+        `reaching`, `cut`: as of the compiled engine; `threads` is ignored.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -63,7 +63,7 @@ class FclEngine:
         return _table(self.robot, snapshot, numbers, reals), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """The same for one pose, of which `q` are the bytes."""
+        """Return the same for one pose, given as the bytes of its q."""
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
 
@@ -87,7 +87,7 @@ class FclEngine:
         return total
 
     def _own_columns(self, link: int) -> slice:
-        """Where the motors of the part that moves the link stand in q; none for what no motor moves."""
+        """Return the motors, as a slice of q, of the part that moves a link; an empty one for a link that no motor moves."""
         matrix, _ = self.robot.coupling
         while link > 0:
             driven = np.flatnonzero(matrix[link - 1])
@@ -98,7 +98,7 @@ class FclEngine:
 
 
 def _contact_table(robot: Robot, transforms: Array, snapshot: Snapshot, pairs: tuple[Ints, Ints, Ints]) -> ContactTable:
-    """Every contact in the pose of `transforms` (L, 4, 4)."""
+    """Return every contact in the pose of `transforms` (L, 4, 4)."""
     volumes: tuple[Shape | WorldObject, ...] = (*robot.shapes, *snapshot.objects.values())
     links = _links(robot, snapshot)
     objects, centers, bounds = _placed(volumes, links, transforms)
@@ -121,19 +121,19 @@ def _table(robot: Robot, snapshot: Snapshot, numbers: Ints, reals: Array) -> Con
 
 
 def _links(robot: Robot, snapshot: Snapshot) -> list[int]:
-    """Each volume's link, -1 for a free object and for a ghost on another robot."""
+    """Return each volume's link, -1 for a free object and for a ghost on a link of another robot."""
     carrying = [robot.links.index(thing.link) if thing.link in robot.links else -1 for thing in snapshot.objects.values()]
     return [shape.link for shape in robot.shapes] + carrying
 
 
 def _placed(volumes: tuple[Shape | WorldObject, ...], links: list[int], transforms: Array) -> tuple[list[Any], Array, Array]:
-    """Of all volumes: fcl's objects, centres (v, 3) and radii (v,) of enclosing spheres, root frame now."""
+    """Return fcl's objects of all volumes, and centres (v, 3) and radii (v,) of their bounding spheres, root frame now."""
     moved = np.concatenate([transforms, np.eye(4)[None]])[links]  # the last stands for -1
     position = np.array([volume.position for volume in volumes]).reshape(-1, 3)
     rotation = np.array([volume.rotation for volume in volumes]).reshape(-1, 3, 3)
     centers = np.einsum("vij,vj->vi", moved[:, :3, :3], position) + moved[:, :3, 3]
     turns = moved[:, :3, :3] @ rotation
-    # Made anew in every pose, so that no two threads share one; only the geometries, which never change, are kept.
+    # New objects for every pose, so that no two threads share one; only the geometries, which never change, are kept.
     objects = [fcl.CollisionObject(_geometry(one), fcl.Transform(*at)) for one, *at in zip(volumes, turns, centers, strict=True)]
     return objects, centers, np.array([_bound(volume) for volume in volumes])
 
@@ -146,22 +146,22 @@ def _found(volumes: tuple[Shape | WorldObject, ...], objects: list[Any], centers
 
 
 def _overlap(first: Any, second: Any) -> tuple[float, ...] | None:
-    """Depth, the way the first must move and the point, midway between the two deepest points; None: apart."""
+    """Return depth, the direction in which the first must move, and the point midway between the two deepest points; None: apart."""
     if not fcl.collide(first, second):
         return None
-    # One in some thousand shallow overlaps counts as a small distance, but not if the two are asked for in the other order.
+    # fcl reports one in some thousand shallow overlaps as a small distance, but not with the two objects exchanged.
     for one, other in ((first, second), (second, first)):
         result = fcl.DistanceResult()
         depth = -fcl.distance(one, other, _DISTANCE, result)
         if depth > 0.0:
-            deepest, surface = (np.array(point) for point in result.nearest_points)  # the one's, inside the other, and where it must go
+            deepest, surface = (np.array(point) for point in result.nearest_points)  # of `one`: inside the other, and where it must go
             way = (surface - deepest) / np.linalg.norm(surface - deepest)
             return depth, *(way if one is first else -way), *(deepest + surface) / 2.0
-    return _contact(first, second)  # they graze
+    return _contact(first, second)  # they touch without overlap
 
 
 def _contact(first: Any, second: Any) -> tuple[float, ...] | None:
-    """The same by fcl.collide; the point is any that both share."""
+    """Return the same, computed by fcl.collide; the point is any that both share."""
     result = fcl.CollisionResult()
     fcl.collide(first, second, _COLLISION, result)
     if not result.contacts or not result.contacts[0].penetration_depth > 0.0:
@@ -171,7 +171,7 @@ def _contact(first: Any, second: Any) -> tuple[float, ...] | None:
 
 
 def _ball_overlap(first: Any, second: Any, ball: Array, radius: float, sign: float) -> tuple[float, ...] | None:
-    """The same where one is a ball, for which fcl has closed forms; `sign`: 1.0 if it is the first, -1.0 if the second."""
+    """Return the same where one is a ball, for which fcl has closed forms; `sign`: 1.0 if it is the first, -1.0 if the second."""
     found = _contact(first, second)
     if found is None:
         return None
@@ -196,7 +196,7 @@ def _primitive(kind: str, size: tuple[float, ...]) -> Any:
 
 @lru_cache(maxsize=4096)
 def _hull(vertices: bytes) -> Any:
-    """The hull of vertices (v, 3).  Its faces are only hints: with one that does not close it, fcl looks at every vertex."""
+    """Return the hull of vertices (v, 3). Its faces are only hints: given an open one, fcl checks every vertex."""
     points = np.frombuffer(vertices).reshape(-1, 3)
     return fcl.Convex(points, 1, np.array([3, 0, 1, 2]))
 
@@ -205,11 +205,12 @@ SOLID, FIELD = 0, 1
 
 
 def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
-    """First and second volume, the robot's shapes and then the objects, and kind (0 solid, 1 field) of every tested pair.
+    """Return first volume, second volume and kind (0 solid, 1 field) of every tested pair; volumes are shapes, then objects.
 
-    Own pairs are the robot's.  A free object meets every shape but those of the base; a target spares the hands that are `reaching`.
-    An object on a link meets the shapes of all links that its own is tested against, whatever else such links carry, and the free
-    objects, as a solid.  Ghosts meet nothing.  Raises UnknownName for an object on no link of the robot.
+    Pairs of shapes are the robot's own list. A free object is tested against every shape but those of the base, and a target not
+    against the hands that are `reaching`. An attached object is tested as a solid against the shapes and objects on all links that its
+    own link is tested against, and against free objects. Ghosts are not tested. Raises UnknownName for an object that is attached to a
+    link which the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]
@@ -233,7 +234,7 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Int
 
 
 def _carried(robot: Robot, link: int) -> set[int]:
-    """The link and all that is mounted on it."""
+    """Return a link and all links that are mounted on it."""
     found = {link}
     for j, joint in enumerate(robot.joints):
         if joint.parent in found:

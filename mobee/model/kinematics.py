@@ -1,4 +1,7 @@
-"""Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy."""
+"""Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy; rotations as quaternions.
+
+Quaternions are in the order w, x, y, z; only this module knows it.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from mobee.robot.robot import Joint, Robot, per_robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tables:
-    """A joint's motion is I + sin(a) S + (1 - cos(a)) C + a D: Rodrigues' formula about a line of the root frame."""
+    """Constants of a robot: a joint's motion is I + sin(a) S + (1 - cos(a)) C + a D, Rodrigues' formula about a line of the root frame."""
 
     coupling: Array  # (n, J), transposed: joint angles = q @ coupling + offset
     offset: Array  # (J,)
@@ -28,7 +31,7 @@ class Tables:
 
 @per_robot
 def tables(robot: Robot) -> Tables:
-    """The tables of this robot object."""
+    """Return the constants of a robot."""
     count = len(robot.joints)
     sine, cosine, slide = (np.zeros((count, 4, 4)) for _ in range(3))
     for j, joint in enumerate(robot.joints):
@@ -70,7 +73,10 @@ def _ancestry(joints: tuple[Joint, ...]) -> tuple[Ints, ...]:
 
 
 def _doubling_rounds(joints: tuple[Joint, ...]) -> tuple[tuple[Ints, Ints], ...]:
-    """Pointer jumping: after round r a link's matrix spans its last 2^r joints, so the deepest chain takes log2 rounds."""
+    """Return which links to multiply with which ancestors in each round of pointer jumping.
+
+    After round r a link's matrix spans its last 2^r joints, so that the longest chain takes log2 rounds.
+    """
     ancestor = np.array([0, *(joint.parent for joint in joints)], dtype=np.intp)
     rounds = []
     while ancestor.any():
@@ -81,7 +87,7 @@ def _doubling_rounds(joints: tuple[Joint, ...]) -> tuple[tuple[Ints, Ints], ...]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross products over the last dimension, (..., 3); np.cross costs several times as much on a few rows."""
+    """Return cross products over the last dimension, (..., 3); np.cross costs several times as much on a few rows."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -93,7 +99,7 @@ _IDENTITY = np.eye(4)
 
 
 def link_transforms(robot: Robot, q: Array) -> Array:
-    """Where every link has gone: maps a point of the root frame at zero pose to where it is at q.
+    """Return the transform of every link: it maps a point of the root frame at zero pose to where it is at q.
 
     `q`: (..., n) motor positions in rad.  Returns (..., L, 4, 4) with L = len(robot.links); link 0 is the base.
     """
@@ -112,15 +118,15 @@ def link_transforms(robot: Robot, q: Array) -> Array:
 
 
 def joint_axes(robot: Robot, transforms: Array) -> tuple[Array, Array]:
-    """The joints' axes and points now, root frame: two arrays (..., J, 3), unit and m, from (..., L, 4, 4)."""
+    """Return the joints' axes and points now, root frame: two arrays (..., J, 3), unit vectors and m, from (..., L, 4, 4)."""
     return _moved_axes(robot, transforms, np.arange(len(robot.joints)))
 
 
 def point_jacobian(robot: Robot, transforms: Array, link: int, point: Array) -> Array:
-    """How a point fixed to a link moves with each motor.
+    """Return the Jacobian of a point that is fixed to a link (thesis eq. 5.1), (..., 6, n).
 
+    Three rows of velocity [m/rad], then three of angular velocity, root frame, per motor.
     `transforms`: (..., L, 4, 4); `point`: (..., 3) m in the root frame now.
-    Returns (..., 6, n): three rows of velocity [m/rad], then three of angular velocity, root frame.
     """
     t = tables(robot)
     chain = t.ancestry[link]

@@ -22,14 +22,14 @@ class Masses:
     moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
 
     def moved(self, transforms: Array) -> Array:
-        """Mass times centre (..., B, 3) kg m, root frame, from all links' transforms (..., L, 4, 4)."""
+        """Return mass times centre (..., B, 3) kg m, root frame, from all links' transforms (..., L, 4, 4)."""
         moments: Array = (transforms[..., self.links, :3, :] @ self.moments)[..., 0]
         return moments
 
 
 @per_robot
 def masses(robot: Robot) -> Masses:
-    """Those of a robot; B is 0 where its file says nothing of masses."""
+    """Return the masses of a robot; B is 0 where its file names none."""
     links = np.array([body.link for body in robot.bodies], dtype=np.intp)
     weights = np.array([body.mass for body in robot.bodies])
     centres = np.array([[*body.centre, 1.0] for body in robot.bodies]).reshape(len(links), 4)
@@ -37,9 +37,9 @@ def masses(robot: Robot) -> Masses:
 
 
 def centre_of_mass(robot: Robot, transforms: Array) -> Array:
-    """The centre of mass (..., 3) m, root frame, from all links' transforms (..., L, 4, 4); raises InvalidValue if no link has a mass."""
+    """Return the centre of mass (..., 3) m, root frame, from all links' transforms (..., L, 4, 4); raises InvalidValue without masses."""
     if not robot.bodies:
-        raise InvalidValue(f"{robot.name!r} has no masses (<mass> in its file), so nothing says where its centre of mass is.")
+        raise InvalidValue(f"{robot.name!r} has no masses (<mass> in its file), so it has no centre of mass.")
     known = masses(robot)
     centre: Array = known.moved(transforms).sum(axis=-2) / known.weights.sum()
     return centre
@@ -47,7 +47,7 @@ def centre_of_mass(robot: Robot, transforms: Array) -> Array:
 
 @per_robot
 def centre_of_mass_at_home(robot: Robot) -> Array:
-    """The same (3,) m in the robot's home posture."""
+    """Return the centre of mass (3,) m in the robot's home posture."""
     return centre_of_mass(robot, link_transforms(robot, robot.home))
 
 
@@ -67,10 +67,10 @@ class _Carriers:
 
 
 def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
-    """The torque [N m] with which the motors hold the robot still against its weight.
+    """Return the torques [N m] that hold the robot still against its weight, (..., n): the gradient of the potential energy.
 
-    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame.  Returns (..., n), for a prismatic joint's motor that
-    counts in m the force [N]: the derivative of the potential energy with respect to q.  Zeros where the robot has no masses.
+    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame. For the motor of a prismatic joint, which counts
+    in m, it is the force [N]. Zeros where the robot has no masses.
     """
     q = _checked(robot, q)
     if not robot.bodies:
@@ -88,7 +88,7 @@ def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
 
 
 def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
-    """The potential energy [J] of the robot's masses, shape (...,), zero at the root frame's origin; arguments as gravity_torque."""
+    """Return the potential energy [J] of the robot's masses, (...,), zero at the root frame's origin; arguments as of `gravity_torque`."""
     q = _checked(robot, q)
     if not robot.bodies:
         return np.zeros(q.shape[:-1])
@@ -104,7 +104,7 @@ def _checked(robot: Robot, q: Array) -> Array:
 
 
 def _crossed(v: Array) -> Array:
-    """The matrix (3, 3) whose product with rows of axes gives v x axis."""
+    """Return the matrix (3, 3) whose product with rows of axes gives v x axis."""
     return np.array([[0.0, v[2], -v[1]], [-v[2], 0.0, v[0]], [v[1], -v[0], 0.0]])
 
 

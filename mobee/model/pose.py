@@ -1,4 +1,4 @@
-"""The result of an evaluation: positions and rotations, contacts, projected contact forces, for one pose or a batch."""
+"""The result of an evaluation, for one pose or a batch: positions and rotations, contacts, projected contact forces."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ from mobee.robot.robot import Robot
 
 
 class Finder(Protocol):
-    """What finds contacts."""
+    """An object that computes contacts."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
+        """Return all contacts in the poses q (B, n), and the projection of those of fields (see `Pose.projection`), (B, n)."""
 
 
 class Engine(Protocol):
-    """What evaluates poses: the compiled engine, or python-fcl as its exact reference."""
+    """An engine that evaluates poses: the compiled one, or python-fcl as its independent reference."""
 
     def transforms(self, q: Array) -> Array:
-        """Every link in the poses q (B, n), (B, L, 4, 4)."""
+        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
+        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """All contacts in the poses q (B, n), and the projected depths of those of fields, (B, n)."""
+        """Return all contacts in the poses q (B, n), and the projection of those of fields, (B, n)."""
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """The same for one pose, of which `q` are the bytes."""
+        """Return the same for one pose, given as the bytes of its q."""
 
 
 class Pose:
     """The robot at one q or at a batch of them, in the world as it was when `Model.evaluate` was called.
 
-    What is asked for is computed when it is first asked for, and kept.
+    Every result is computed when it is first read, and kept.
     """
 
-    __slots__ = ("_contacts", "_engine", "_felt", "_given", "_reaching", "_snapshot", "_threads", "_transforms", "robot")
+    __slots__ = ("_contacts", "_engine", "_evaluated", "_given", "_reaching", "_snapshot", "_threads", "_transforms", "robot")
 
-    # Kept by hand: functools.cached_property takes one lock for all poses before Python 3.12, and no evaluation may wait for another.
+    # Not functools.cached_property: before Python 3.12 it takes one lock for all poses, and no evaluation may wait for another.
 
     def __init__(self, robot: Robot, engine: Engine, q: Array | bytes, snapshot: Snapshot, reaching: Hands, threads: int = 1) -> None:
-        """`q`: (..., n) rad; or the bytes of one (n,), which is sooner."""
+        """`q`: (..., n) rad, or the bytes of one pose (n,), which is faster."""
         self.robot = robot
         self._given = q
         self._engine = engine
@@ -59,7 +59,7 @@ class Pose:
         self._reaching = reaching
         self._threads = threads
         self._transforms: Array | None = None
-        self._felt: tuple[ContactTable, Array] | None = None
+        self._evaluated: tuple[ContactTable, Array] | None = None
         self._contacts: tuple[Contact, ...] | None = None
 
     @property
@@ -72,59 +72,62 @@ class Pose:
 
     @property
     def transforms(self) -> Array:
-        """Where every link has gone: (..., L, 4, 4), from the root frame at zero pose to now."""
+        """The transform of every link, (..., L, 4, 4): from the root frame at zero pose to now."""
         if self._transforms is None:
             found = self._engine.transforms(self._flat)
             self._transforms = found.reshape(*self.q.shape[:-1], *found.shape[1:])
         return self._transforms
 
     def position(self, marker: str) -> Array:
-        """Where a marker is, (..., 3) m in the root frame; raises UnknownName."""
+        """Return the position of a marker, (..., 3) m in the root frame; raises UnknownName."""
         m = self.robot.marker(marker)
         link = self.transforms[..., m.link, :3, :]
         return link[..., :3] @ m.position + link[..., 3]
 
     def rotation(self, marker: str) -> Array:
-        """How a marker is turned, (..., 3, 3) in the root frame; raises UnknownName."""
+        """Return the rotation of a marker, (..., 3, 3) in the root frame; raises UnknownName."""
         m = self.robot.marker(marker)
         return self.transforms[..., m.link, :3, :3] @ m.rotation
 
     def normal(self, marker: str) -> Array:
-        """Where a marker's normal points, (..., 3) unit vector in the root frame; raises UnknownName."""
+        """Return the normal of a marker, (..., 3) unit vectors in the root frame; raises UnknownName."""
         m = self.robot.marker(marker)
         return self.transforms[..., m.link, :3, :3] @ m.normal
 
     def point_jacobian(self, link: int, point: Array) -> Array:
-        """How a point (..., 3) m, root frame now, fixed to a link moves per motor: (..., 6, n), linear rows then angular."""
+        """Return the Jacobian of a point (..., 3) m, root frame now, that is fixed to a link: (..., 6, n), linear rows, then angular."""
         return point_jacobian(self.robot, self.transforms, link, point)
 
     @property
     def table(self) -> ContactTable:
         """Every overlap of the tested pairs in every pose, as columns."""
-        felt = self._felt
-        if felt is None:
-            felt = self._felt = self._found(False)
-        return felt[0]
+        evaluated = self._evaluated
+        if evaluated is None:
+            evaluated = self._evaluated = self._computed(False)
+        return evaluated[0]
 
     @property
     def projection(self) -> Array:
-        """The contacts of fields as the motors see them: sum of J^T (depth * normal), (..., n) in [m^2/rad] (thesis eq. 5.11).
+        """The contacts of fields projected to the motors: sum of J^T (depth * normal), (..., n) in [m^2/rad] (the sum in thesis eq. 5.11).
 
-        Both sides of a self contact get opposite vectors, and all motors down to the base feel it.
+        The two sides of a self contact get opposite vectors. A contact acts on all motors from its link down to the base.
         """
-        felt = self._felt
-        if felt is None:
-            felt = self._felt = self._found(False)
-        return felt[1]
+        evaluated = self._evaluated
+        if evaluated is None:
+            evaluated = self._evaluated = self._computed(False)
+        return evaluated[1]
 
     @property
     def projection_of_part(self) -> Array:
-        """The projection, cut where a part ends, as in the original program: an arm's contact does not reach the torso."""
-        return self._found(True)[1]
+        """The projection, where a contact acts on the motors of its own part only: an arm's contact does not reach the torso.
+
+        So it was in the original program.
+        """
+        return self._computed(True)[1]
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """Every overlap of the tested pairs, solids before fields; one pose only (InvalidValue for a batch)."""
+        """Every overlap of the tested pairs, solids before fields; for one pose only (InvalidValue for a batch)."""
         if self.q.ndim != 1:
             raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use table, or evaluate one q.")
         if self._contacts is None:
@@ -133,16 +136,16 @@ class Pose:
 
     @property
     def count(self) -> int | Ints:
-        """How many solid contacts: an int for one pose, (...,) integers for a batch."""
+        """The number of solid contacts: an int for one pose, (...,) integers for a batch."""
         table = self.table
         counted = np.bincount(table.pose[table.kind == 0], minlength=len(self._flat))
         return int(counted[0]) if self.q.ndim == 1 else counted.reshape(self.q.shape[:-1])
 
     @property
     def objects(self) -> dict[str, WorldObject]:
-        """The world's objects as this evaluation saw them; one pose only: attached ones are where their link carries them.
+        """The world's objects at the time of this evaluation; for one pose only. Attached ones are where their link is in this pose.
 
-        Raises UnknownName if one is attached to no link of the robot.
+        Raises UnknownName if an object is attached to a link that the robot does not have.
         """
         return {
             name: thing if thing.link is None else placed(thing, link_pose(self, thing.link))
@@ -150,23 +153,23 @@ class Pose:
         }
 
     def each(self) -> Iterator[Pose]:
-        """The poses of a batch one by one; their contacts are found anew when they are asked for."""
+        """Yield the poses of a batch one by one; contacts are computed again when they are read."""
         transforms = self.transforms.reshape(-1, *self.transforms.shape[-3:])
         for q, placed_links in zip(self._flat, transforms, strict=True):
             one = Pose(self.robot, self._engine, q, self._snapshot, self._reaching)
             one._transforms = placed_links
             yield one
 
-    def feel(self, finder: Finder) -> None:
-        """Have the contacts found now, and by other means than the model's own."""
+    def compute_contacts(self, finder: Finder) -> None:
+        """Compute the contacts now, with the given finder instead of the model's engine."""
         table, torque = finder.contacts(self._flat, self._snapshot, self._reaching)
-        self._felt = table, torque.reshape(self.q.shape)
+        self._evaluated = table, torque.reshape(self.q.shape)
 
     @property
     def _flat(self) -> Array:
         return self.q.reshape(-1, self.q.shape[-1])
 
-    def _found(self, cut: bool) -> tuple[ContactTable, Array]:
+    def _computed(self, cut: bool) -> tuple[ContactTable, Array]:
         given = self._given
         if not isinstance(given, bytes):
             if given.ndim > 1:

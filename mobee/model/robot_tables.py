@@ -1,4 +1,4 @@
-"""The tables of a robot that the core reads, and the clusters of shapes that are bounded together."""
+"""The tables of a robot that the core reads, and the clusters of shapes that share a bounding sphere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mobee.errors import InvalidValue
 from mobee.model.volumes import VOLUME, Volumes, convex_row, volume_row
 from mobee.robot.robot import LinkPair, Robot, Shape
 
-MANY_CORNERS = 32  # of a hull: with more, the farthest one is sought along its edges
+MANY_CORNERS = 32  # of a hull: with more, the core searches the farthest corner along the edges
 
 Flags = NDArray[np.bool_]
 _Edges = tuple[NDArray[np.int32], NDArray[np.int32]]
@@ -31,31 +31,31 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """`RobotTables` of core/robot.cpp: of S shapes in the order of C clusters, J joints, and the corners of all hulls."""
+    """`RobotTables` of core/robot.cpp: S shapes in the order of C clusters, J joints, and the corners of all hulls."""
 
     motors: int
-    own_shapes: int  # without what is carried
+    own_shapes: int  # without carried objects
     parent: Ints  # (J,) links
     slides: Flags  # (J,)
-    border: Flags  # (J,) whether the link it moves belongs to another part than the link it is mounted on
+    border: Flags  # (J,) whether the link that it moves belongs to another part than the link that it is mounted on
     axis: Array  # (J, 3)
     point: Array  # (J, 3) m
     motor: Ints  # (K, J) each joint's motors, K the largest number of motors on one joint
-    scale: Array  # (K, J) by how much they turn it
+    scale: Array  # (K, J) joint angle per motor angle
     offset: Array  # (J,)
     volume: Volumes  # (S,)
     link: Ints  # (S,)
-    name: Ints  # (S,) which shape each is; from len(robot.shapes) on, which carried object
+    name: Ints  # (S,) index into the robot's shapes; from len(robot.shapes) on, into the carried objects
     field: Flags  # (S,)
     meets_world: Flags  # (S,)
-    cluster: Ints  # (C + 1,) where each begins
+    cluster: Ints  # (C + 1,) the first shape of each cluster
     tested: Flags  # (S, S) symmetric: which two shapes are tested against each other
     corner: Array  # (V, 3) m, in the axes of their hull
     edge_start: NDArray[np.int32]  # (V + 1,) where the edges of each corner begin
     edge: NDArray[np.int32]  # the corner of the same hull that each edge leads to
 
     def for_core(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
-        """Counts and arrays as `mobee._core.engine.robot` takes them."""
+        """Return counts and arrays as `mobee._core.engine.robot` takes them."""
         integers = ("parent", "slides", "border", "motor", "link", "name", "field", "meets_world", "cluster")
         others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge")
         arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.int64) for name in integers}
@@ -74,7 +74,7 @@ class RobotTables:
 
 
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
-    """The tables of a robot with what its links carry; raises InvalidValue for a robot whose numbers contradict each other."""
+    """Return the tables of a robot with the objects that its links carry; raises InvalidValue for a robot that contradicts itself."""
     _check(robot)
     rows, corner, edges = _rows(robot.shapes)
     rows = np.concatenate([rows, *(one.row.reshape(1) for one in carried)])
@@ -109,7 +109,7 @@ def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
 
 
 def _check(robot: Robot) -> None:
-    """What the core takes for granted."""
+    """Raise InvalidValue for indices that the core would follow without a check."""
     for index, joint in enumerate(robot.joints):
         if not 0 <= joint.parent <= index:
             raise InvalidValue(f"joint {joint.name!r} of {robot.name!r} is mounted on link {joint.parent}; it must be one of 0 to {index}.")
@@ -145,7 +145,10 @@ def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:
 
 
 def _hull(vertices: Array) -> tuple[Array, list[list[int]]]:
-    """The corners (v, 3) of the hull of some points and which others an edge joins each one to; without edges if they are few, or flat."""
+    """Return the corners (v, 3) of the hull of points, and for each the corners that an edge joins it to.
+
+    Few points, and points in a plane, are returned as they are, without edges.
+    """
     none: tuple[Array, list[list[int]]] = vertices, [[] for _ in vertices]
     if len(vertices) <= MANY_CORNERS:
         return none
@@ -178,7 +181,7 @@ def _tested(robot: Robot, carried: Sequence[Carried]) -> Flags:
 
 
 def meets(robot: Robot, link: int, other: int) -> bool:
-    """Whether what a link carries is tested against what is on another: never on its own, nor where the robot's links are not."""
+    """Return whether an object on one link is tested against another link: not against its own, nor where the links themselves are not."""
     pair: LinkPair = frozenset((link, other))
     return link != other and pair not in robot.untested
 
@@ -202,16 +205,16 @@ def _borders(robot: Robot) -> Flags:
     return np.array([part[j + 1] != part[joint.parent] for j, joint in enumerate(robot.joints)], dtype=np.bool_)
 
 
-SMALL = 0.25  # of the robot's own radius; measured on the benchmark: 0.1 and 0.5 make the broad phase a fifth slower
-SAMPLES = 16
+MAX_CLUSTER_RADIUS = 0.25  # of the robot's own radius; measured: 0.1 and 0.5 make the broad phase a fifth slower
+SAMPLED_POSES = 16
 
 
 _CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 
 
 def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
-    """Indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
-    groups = _CACHE.get(robot)  # what is carried changes while the robot moves, its own groups never do
+    """Return indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
+    groups = _CACHE.get(robot)  # carried objects change while the robot moves, its own groups never do
     if groups is None:
         groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], field[:own])
     return groups + [[index] for index in range(own, len(rows))]
@@ -223,15 +226,15 @@ def _own_clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags) -> list
     for kind in (False, True):
         members = [[int(i) for i in np.flatnonzero((link == k) & (field == kind))] for k in range(len(robot.links))]
         groups += _merge(robot, members, centers, rows["bound"])
-    return [sorted(group, key=lambda index: rows["kind"][index]) for group in groups]  # runs of one kind are guessed right
+    return [sorted(group, key=lambda index: rows["kind"][index]) for group in groups]  # equal kinds side by side help the branch prediction
 
 
 def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array) -> list[list[int]]:
-    """Merge every link, leaves first, into the group of the link that carries it where the two together are small."""
+    """Merge every link, leaves first, into the group of its parent link where the two together are small."""
     present = [i for group in members for i in group]
     if not present:
         return []
-    limit = SMALL * _radius(centers, bound, present)
+    limit = MAX_CLUSTER_RADIUS * _radius(centers, bound, present)
     groups = [list(group) for group in members]
     for joint in range(len(robot.joints) - 1, -1, -1):
         parent, child = robot.joints[joint].parent, joint + 1
@@ -243,19 +246,19 @@ def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array)
 
 
 def _radius(centers: Array, bound: Array, group: list[int]) -> float:
-    """Mean over the sampled poses of the radius of the sphere about the group's mean that holds it."""
+    """Return the radius of the sphere about the group's mean that contains it, averaged over the sampled poses."""
     inside = centers[:, group]
     between = inside - inside.mean(axis=1, keepdims=True)
     return float((np.sqrt((between * between).sum(axis=2)) + bound[group]).max(axis=1).mean())
 
 
 def _sampled_centers(robot: Robot, rows: Volumes, link: Ints) -> Array:
-    """Where the shapes are in random poses, (SAMPLES, S, 3)."""
+    """Return the positions of the shapes in random poses, (SAMPLED_POSES, S, 3)."""
     rng = np.random.default_rng(0)
-    low, high = np.clip(robot.limits, -10.0, 10.0).T  # rad; some joints turn without end
+    low, high = np.clip(robot.limits, -10.0, 10.0).T  # rad; some joints have no limits
     matrix, offset = robot.coupling
-    angles = rng.uniform(low, high, (SAMPLES, len(low))) @ matrix.T + offset
-    turn, shift = [np.broadcast_to(np.eye(3), (SAMPLES, 3, 3))], [np.zeros((SAMPLES, 3))]
+    angles = rng.uniform(low, high, (SAMPLED_POSES, len(low))) @ matrix.T + offset
+    turn, shift = [np.broadcast_to(np.eye(3), (SAMPLED_POSES, 3, 3))], [np.zeros((SAMPLED_POSES, 3))]
     for j, joint in enumerate(robot.joints):
         carrier_turn, carrier_shift = turn[joint.parent], shift[joint.parent]
         if joint.kind == "prismatic":

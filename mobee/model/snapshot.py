@@ -24,11 +24,11 @@ _CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A consistent state of the world; it never changes, each edit makes the next.
+    """An immutable state of the world; each edit makes the next one.
 
-    `names`, `rows` and `roles` are in the order of `objects`, in which they were added.  `rows` (N,): see
-    mobee.model.volumes; of an attached object in the frame of its link.  `roles` (N,): OBSTACLE, TARGET, GHOST, or ATTACHED
-    and ATTACHED_GHOST for what is attached to a link.
+    `names`, `rows` and `roles` are in the order of `objects`, in which they were added. `rows` (N,): see `mobee.model.volumes`; those
+    of attached objects are in the frame of their link. `roles` (N,): OBSTACLE, TARGET, GHOST, or for attached objects ATTACHED and
+    ATTACHED_GHOST.
     """
 
     version: int
@@ -36,14 +36,14 @@ class Snapshot:
     names: tuple[str, ...]
     rows: Volumes  # (N,) VOLUME, contiguous
     roles: NDArray[np.int64]  # (N,)
-    attached: tuple[str, ...]  # names
+    attached: tuple[str, ...]  # names of attached objects
 
 
 EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empty(0, dtype=np.int64), ())
 
 
 def extended(old: Snapshot, new: WorldObject) -> Snapshot:
-    """The next snapshot, with an object more at the end."""
+    """Return the next snapshot, with one more object at the end."""
     count, role = len(old.names), _code(new)
     rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
     rows[:count], rows[count] = old.rows, volume_row(new)
@@ -53,7 +53,7 @@ def extended(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def changed(old: Snapshot, new: WorldObject) -> Snapshot:
-    """The next snapshot, with the object of that name replaced at its place."""
+    """Return the next snapshot, with the object of that name replaced."""
     place, role = old.names.index(new.name), _code(new)
     rows, roles, attached = old.rows.copy(), old.roles, old.attached
     rows[place] = volume_row(new)
@@ -65,7 +65,7 @@ def changed(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def shortened(old: Snapshot, name: str) -> Snapshot:
-    """The next snapshot, without the object of that name."""
+    """Return the next snapshot, without the object of that name."""
     place, count = old.names.index(name), len(old.names)
     rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
     rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
@@ -87,7 +87,7 @@ def _code(thing: WorldObject) -> int:
     return (_FREE if thing.link is None else _CARRIED)[thing.role]
 
 
-MAX_HANDS = 2  # that reach at once; as in core/scene.hpp
+MAX_HANDS = 2  # hands that may reach at once; as `most_hands` in core/scene.hpp
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Evaluates poses that follow each other closely, with a neighbour list."""
+"""Evaluates poses that follow each other closely, with a list of the pairs that are near each other (a neighbour list)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Neighbours:
-    """Finds the contacts of one robot pose after pose, with a list of the pairs nearer than the skin [m].  Not for two threads at once.
+    """Computes the contacts of one robot pose after pose, with a list of the pairs nearer than `skin` [m]; for one thread at a time.
 
     `cut`: as of `Engine.contacts`.
     """
@@ -29,13 +29,13 @@ class Neighbours:
         self._known: tuple[Scene, Hands] | None = None
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """What `Engine.contacts` gives for the poses q (B, n), one after the other."""
+        """Return what `Engine.contacts` returns, for the poses q (B, n) one after the other."""
         self.enter(snapshot, reaching)
         numbers, reals, torque = self._core.follow(q)
         return self._engine.table(snapshot, numbers, reals), torque
 
     def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
-        """Be in that world; what is remembered of another is forgotten.  Returns the address of the core's `Neighbours`."""
+        """Use this world from now on, with a new list if it changed; return the address of the core's `Neighbours`."""
         scene = self._engine.scene_of(snapshot)
         known = self._known
         if known is None or known[0] is not scene or known[1] != reaching:
@@ -45,10 +45,10 @@ class Neighbours:
 
 
 class Track:
-    """Evaluates poses of one model that follow each other closely: the same results as `Model.evaluate`, sooner.
+    """Evaluates poses of one model that follow each other closely: the same results as `Model.evaluate`, faster.
 
-    Pairs that cannot touch before something has moved by half the skin are not looked at again.  Cheap to make; not for two
-    threads at once: each user has its own.  Where the steps are large it is as fast as `Model.evaluate`.
+    Pairs that cannot touch before something has moved by half the skin are not checked again. A track is cheap to make and serves
+    one thread at a time. Where the steps are large it is as fast as `Model.evaluate`.
     """
 
     def __init__(self, model: Model, engine: object, skin: float) -> None:
@@ -63,5 +63,5 @@ class Track:
         """
         pose = self._model.evaluate(q, reaching=reaching)
         if self._neighbours is not None:
-            pose.feel(self._neighbours)
+            pose.compute_contacts(self._neighbours)
         return pose

@@ -1,4 +1,4 @@
-"""Volumes as rows of the table that the core reads."""
+"""Volumes as rows of a table that the core reads."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ VOLUME = np.dtype(
     ]
 )
 """`VolumeRow` of core/robot.hpp.  Half sizes: sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges; convex (first
-corner in the table of corners, number of corners, 0).  `bound`: radius of the ball about the position that holds the volume."""
+corner in the table of corners, number of corners, 0).  `bound`: radius of the ball about the position that contains the volume."""
 
 Volumes = NDArray[Any]  # of VOLUME
 
 
 class Volume(Protocol):
-    """What a robot's Shape and a WorldObject have in common."""
+    """The members that a robot's Shape and a WorldObject have in common."""
 
     @property
     def kind(self) -> ShapeKind: ...  # noqa: D102
@@ -42,7 +42,7 @@ class Volume(Protocol):
 
 
 def bound(volume: Volume, vertices: Array | None = None) -> float:
-    """The radius [m] of the ball about a volume's position that holds it; a convex one needs its vertices (v, 3) m."""
+    """Return the radius [m] of the ball about a volume's position that contains it; a convex volume needs its vertices (v, 3) m."""
     if vertices is not None:
         return float(np.sqrt((vertices * vertices).sum(axis=1)).max())
     size = volume.size
@@ -53,14 +53,14 @@ def bound(volume: Volume, vertices: Array | None = None) -> float:
 
 
 def volume_row(volume: Volume) -> Volumes:
-    """The row () of a sphere, capsule, cylinder or box."""
+    """Return the row () of a sphere, capsule, cylinder or box."""
     size = volume.size
     half = [length / 2.0 for length in size] if volume.kind == "box" else [size[0], size[1] / 2.0 if len(size) > 1 else 0.0, 0.0]
     return _row(volume, half, bound(volume))
 
 
 def convex_row(volume: Volume, vertices: Array, first: int) -> Volumes:
-    """The row () of a convex volume whose vertices (v, 3) m stand from `first` on in the table of corners."""
+    """Return the row () of a convex volume whose vertices (v, 3) m begin at `first` in the table of corners."""
     return _row(volume, [first, len(vertices), 0.0], bound(volume, vertices))
 
 

@@ -1,4 +1,4 @@
-"""The objects around the robot; they may be edited while other threads evaluate."""
+"""The world: named objects around the robot, which any thread may edit while others evaluate."""
 
 from __future__ import annotations
 
@@ -32,42 +32,42 @@ from mobee.robot.robot import Robot
 __all__ = ["Color", "Role", "Snapshot", "World", "WorldObject", "placed", "seen_from"]
 
 
-class Followed(Protocol):
-    """A pose of a robot, as a Model gives it."""
+class LinkPoses(Protocol):
+    """One pose of a robot, as `Model.evaluate` returns it."""
 
     @property
     def robot(self) -> Robot:
-        """Whose links."""
+        """The robot."""
 
     @property
     def transforms(self) -> Array:
-        """Where its links are, (L, 4, 4)."""
+        """The transforms of its links, (L, 4, 4)."""
 
 
 class World:
-    """A set of named objects; every edit makes a new snapshot, so any thread may edit while others evaluate.
+    """A set of named objects; every edit makes a new snapshot, so that any thread may edit while others evaluate.
 
-    Roles: an "obstacle" repels; a "target" too, except from the link that reaches for it; a "ghost" is only shown.
+    Roles: an "obstacle" repels the robot; a "target" repels all of it but the hand that reaches for it; a "ghost" is only drawn.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._snapshot = EMPTY
-        self._followed: Followed | None = None
+        self._followed: LinkPoses | None = None
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest consistent state; reading it takes no lock."""
+        """The newest snapshot; reading it takes no lock."""
         return self._snapshot
 
     @property
     def objects(self) -> Mapping[str, WorldObject]:
-        """The newest objects by name, read-only, in the order in which they were added."""
+        """The objects by name, read-only, in the order in which they were added."""
         return self._snapshot.objects
 
     @property
     def version(self) -> int:
-        """How many edits there have been."""
+        """The number of edits so far."""
         return self._snapshot.version
 
     def add(
@@ -91,7 +91,7 @@ class World:
             self._snapshot = extended(self._snapshot, new)
 
     def move(self, name: str, *, position: ArrayLike | None = None, rotation: ArrayLike | None = None) -> None:
-        """Put an object elsewhere in the root frame; what is not given stays.  An attached object must be detached first."""
+        """Change position (3,) m, rotation (3, 3) or both of an object, in the root frame; raises InvalidValue for an attached object."""
         at = None if position is None else valid_position(name, position)
         turn = None if rotation is None else valid_rotation(name, rotation)
         with self._lock:
@@ -102,19 +102,19 @@ class World:
             self._snapshot = changed(self._snapshot, moved)
 
     def remove(self, name: str) -> None:
-        """Take an object away."""
+        """Remove an object; raises UnknownName."""
         with self._lock:
             self._get(name)
             self._snapshot = shortened(self._snapshot, name)
 
     def set_role(self, name: str, role: Role) -> None:
-        """Make an object an "obstacle", a "target" or a "ghost"."""
+        """Make an object an "obstacle", a "target" or a "ghost"; raises UnknownName and InvalidValue."""
         valid = valid_role(name, role)
         with self._lock:
             self._snapshot = changed(self._snapshot, replace(self._get(name), role=valid))
 
     def attach(self, name: str, link: str, relative: tuple[ArrayLike, ArrayLike] | None = None) -> None:
-        """Let an object move with a link of the robot, which then no longer touches it.
+        """Attach an object to a link of the robot: it moves with the link, and contacts between the two are ignored.
 
         `relative`: position (3,) m and rotation (3, 3) in the link's frame, which is the root frame at zero pose. Without it the
         object keeps the place that it has relative to the link in the pose of the last `follow`; `Model.attach` takes q instead.
@@ -139,8 +139,8 @@ class World:
                 raise InvalidValue(f"world object {name!r} is not attached to any link.")
             self._snapshot = changed(self._snapshot, placed(old, link_pose(self._followed, old.link)))
 
-    def follow(self, pose: Followed) -> None:
-        """Take a pose as where the robot is now, for `attach` and `detach`; it must be one pose, not a batch."""
+    def follow(self, pose: LinkPoses) -> None:
+        """Use this pose, one and no batch, as where the robot is now: `attach` and `detach` take the places of links from it."""
         self._followed = pose
 
     def _get(self, name: str) -> WorldObject:
@@ -149,8 +149,8 @@ class World:
         return self._snapshot.objects[name]
 
 
-def link_pose(seen: Followed | None, link: str) -> Array:
-    """Where a link is, (4, 4); raises UnknownName, and InvalidValue where no pose has been seen."""
+def link_pose(seen: LinkPoses | None, link: str) -> Array:
+    """Return the transform (4, 4) of a link; raises UnknownName, and InvalidValue where no pose is known."""
     if seen is None:
         raise InvalidValue(
             f"the world does not know where link {link!r} is: call world.follow(model.evaluate(q)) first, or give `relative`."

@@ -17,19 +17,19 @@ ROLES: dict[str, Role] = {"obstacle": "obstacle", "target": "target", "ghost": "
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """A shipped world by name (see shipped_worlds), or the world of an .xml file; errors as load_robot."""
+    """Load a shipped world by name (see `shipped_worlds`), or the world of an .xml file; raises the errors of `load_robot`."""
     return read_world(find_file(name_or_path, WORLDS, "world"))
 
 
 def shipped_worlds() -> tuple[str, ...]:
-    """Names of the worlds that come with this library, sorted."""
+    """Return the names of the worlds that come with this library, sorted."""
     return shipped(WORLDS)
 
 
 def read_world(path: Path) -> World:
-    """The world described by an XML file of any version; positions in [m] in the root frame, angles in [deg].
+    """Read the world of an XML file of any version; positions in [m] in the root frame, angles in [deg].
 
-    Raises RobotFileError with file, line, field and remedy; warns of what it ignores or repairs.
+    Raises RobotFileError with file, line, field and remedy; warns of everything that it ignores or repairs.
     """
     root = read_xml(path, repair=True)
     if root.tag not in WORLD_TAGS:

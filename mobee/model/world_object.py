@@ -1,4 +1,4 @@
-"""Objects of the world: geometry, place and role, checked."""
+"""Objects of the world: geometry, position, rotation and role, and the checks of each."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
 from mobee.robot.robot import ShapeKind
 
-SMALLEST, LARGEST = 1e-9, 1e5  # m: from lengths between these, depths and forces are finite, and exact to a part of the length
+SMALLEST, LARGEST = 1e-9, 1e5  # m: valid lengths; between them depths and forces are finite and exact relative to the length
 
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """A primitive about its own origin.
+    """A primitive shape, centred at its own origin.
 
     `size` in m: sphere (r,); capsule and cylinder (r, height along local z, a capsule's caps lie beyond it);
     box (x, y, z) full edges.
@@ -30,27 +30,27 @@ class Geometry:
 
 
 def sphere(radius: float) -> Geometry:
-    """A sphere of this radius [m]; raises InvalidValue unless it is 1e-9 to 1e5."""
+    """Return a sphere of this radius [m]; raises InvalidValue unless it is 1e-9 to 1e5."""
     return Geometry("sphere", _lengths("sphere", radius=radius))
 
 
 def box(x: float, y: float, z: float) -> Geometry:
-    """A box with these full edges [m] along its own axes; raises InvalidValue unless they are 1e-9 to 1e5."""
+    """Return a box with these full edges [m] along its own axes; raises InvalidValue unless they are 1e-9 to 1e5."""
     return Geometry("box", _lengths("box", x=x, y=y, z=z))
 
 
 def cylinder(radius: float, height: float) -> Geometry:
-    """A cylinder about its own z [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
+    """Return a cylinder about its own z [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
     return Geometry("cylinder", _lengths("cylinder", radius=radius, height=height))
 
 
 def capsule(radius: float, height: float) -> Geometry:
-    """A cylinder about its own z with a half sphere beyond each end [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
+    """Return a cylinder about its own z with a half sphere beyond each end [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
     return Geometry("capsule", _lengths("capsule", radius=radius, height=height))
 
 
 def is_length(value: object) -> bool:
-    """Whether that is a number from SMALLEST to LARGEST."""
+    """Return whether the value is a number from SMALLEST to LARGEST."""
     return isinstance(value, Real) and not isinstance(value, bool) and SMALLEST <= float(value) <= LARGEST
 
 
@@ -65,7 +65,7 @@ Role = Literal["obstacle", "target", "ghost"]
 Color = tuple[float, float, float, float]
 
 LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
-_LONG, _SKEW = 1.1e-5, 1e-6  # allowed of a rotation: squares of its rows beside 1, products of two rows
+_MAX_LENGTH_ERROR, _MAX_SKEW = 1.1e-5, 1e-6  # of a rotation: of the squares of its rows, which are 1, and of products of two rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,26 +86,26 @@ class WorldObject:
 
 
 def placed(thing: WorldObject, link_pose: Array) -> WorldObject:
-    """An attached object as a free one, where its link (4, 4) carries it now."""
+    """Return an attached object as a free one, where its link at (4, 4) has carried it."""
     turn, shift = link_pose[:3, :3], link_pose[:3, 3]
     return replace(thing, position=turn @ thing.position + shift, rotation=turn @ thing.rotation, link=None)
 
 
 def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
-    """Position (3,) and rotation (3, 3) of a free object in the frame of a link at (4, 4)."""
+    """Return position (3,) and rotation (3, 3) of a free object in the frame of a link at (4, 4)."""
     back = link_pose[:3, :3].T
     return back @ (thing.position - link_pose[:3, 3]), back @ thing.rotation
 
 
 def valid_name(name: str) -> str:
-    """The name, if it is text and not empty; raises InvalidValue."""
+    """Return the name; raises InvalidValue unless it is text that is not empty."""
     if not isinstance(name, str) or not name:
         raise InvalidValue(f"world object {name!r}: its name must be text that is not empty.")
     return name
 
 
 def valid_shape(name: str, shape: Geometry) -> Geometry:
-    """The shape, if it is one of the four primitives with all of its lengths, SMALLEST to LARGEST; raises InvalidValue."""
+    """Return the shape; raises InvalidValue unless it is one of the four primitives with valid lengths."""
     if not isinstance(shape, Geometry):
         raise InvalidValue(f"world object {name!r}: shape {shape!r}; it must be a Geometry, as sphere(0.1), box, cylinder or capsule.")
     lengths = LENGTHS.get(shape.kind)
@@ -118,7 +118,7 @@ def valid_shape(name: str, shape: Geometry) -> Geometry:
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """A copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
+    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
     value = _numbers(given)
     if value is None or value.shape != (3,) or not np.isfinite(value).all():
         raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
@@ -126,7 +126,7 @@ def valid_position(name: str, given: ArrayLike) -> Array:
 
 
 def valid_rotation(name: str, given: ArrayLike) -> Array:
-    """A copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed."""
+    """Return a copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed."""
     value = _numbers(given)
     if value is None or value.shape != (3, 3) or not _is_rotation(value):
         raise InvalidValue(f"world object {name!r}: rotation {given!r}; it must be a (3, 3) rotation matrix.")
@@ -134,7 +134,7 @@ def valid_rotation(name: str, given: ArrayLike) -> Array:
 
 
 def _numbers(given: ArrayLike) -> Array | None:
-    """A copy as an array; None if it is no array of real numbers."""
+    """Return a copy as an array; None if it is no array of real numbers."""
     try:
         return real_array("", given)
     except InvalidValue:
@@ -142,26 +142,27 @@ def _numbers(given: ArrayLike) -> Array | None:
 
 
 def _is_rotation(value: Array) -> bool:
-    """Orthonormal and right-handed.  In plain floats: a product of matrices gives up the interpreter's lock for a moment.
+    """Return whether a matrix is orthonormal and right-handed.
 
-    A thread that edits without a pause would then be woken again before any other has its turn.
+    Plain floats, not NumPy: a product of matrices releases the interpreter's lock for a moment, and a thread that edits without a
+    pause would then get it back before any other thread.
     """
     (a, b, c), (d, e, f), (g, h, i) = value.tolist()
     squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
     products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
-    orthonormal = all(abs(one - 1.0) <= _LONG for one in squares) and all(abs(one) <= _SKEW for one in products)
+    orthonormal = all(abs(one - 1.0) <= _MAX_LENGTH_ERROR for one in squares) and all(abs(one) <= _MAX_SKEW for one in products)
     return orthonormal and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0
 
 
 def valid_role(name: str, role: Role) -> Role:
-    """The role; raises InvalidValue for anything but "obstacle", "target" and "ghost"."""
+    """Return the role; raises InvalidValue for anything but "obstacle", "target" and "ghost"."""
     if role not in get_args(Role):
         raise InvalidValue(f"world object {name!r}: role {role!r}; valid: {', '.join(get_args(Role))}.")
     return role
 
 
 def valid_color(name: str, given: Sequence[float] | None) -> Color | None:
-    """Red, green, blue and opacity (1 if not given); raises InvalidValue unless each is 0 to 1."""
+    """Return red, green, blue and opacity (1 if not given); raises InvalidValue unless each is 0 to 1."""
     if given is None:
         return None
     channels = tuple(float(c) for c in given)

@@ -90,7 +90,7 @@ class RobotLaw:
         if not self._needs_contacts:
             return self._law.step(self.q, dt, forces)
         pose = self._law.model.evaluate(self.q)
-        pose.feel(PublishedContacts(pose, self.forces.contacts))
+        pose.compute_contacts(PublishedContacts(pose, self.forces.contacts))
         try:
             command = self._law.step(self.q, dt, forces, pose)
         except InvalidValue as error:  # a restart would fail at the same term

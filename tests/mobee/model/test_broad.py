@@ -33,7 +33,7 @@ def test_a_grid_hides_nothing(robot: str, places: str, rng: np.random.Generator,
         world.add(f"o{index}", mobee.sphere(float(rng.uniform(0.01, 0.1))), position=where)
     q, found = posed(rng, loaded(robot), 20), []
     for first in (1, 10**9):
-        monkeypatch.setattr(engines, "GRID_FROM", first)
+        monkeypatch.setattr(engines, "GRID_MIN_OBJECTS", first)
         found.append(Engine(loaded(robot)).contacts(q, world.snapshot, NO_HANDS))
     (gridded, torque), (plain, plain_torque) = found
     assert len(plain) > 0 or places == "all far away"

@@ -51,7 +51,7 @@ def test_told_contacts_push_as_those_of_a_model_that_knows_the_world(rng: np.ran
     model, blind = Model(ROBOT, load_world("table")), Model(ROBOT)
     for q in rng.uniform(*ROBOT.limits.T, (20, len(ROBOT.motors))):
         seen, told = model.evaluate(q), blind.evaluate(q)
-        told.feel(PublishedContacts(told, [item(contact) for contact in seen.contacts]))
+        told.compute_contacts(PublishedContacts(told, [item(contact) for contact in seen.contacts]))
         assert [item(contact) for contact in told.contacts] == [item(contact) for contact in seen.contacts]
         np.testing.assert_allclose(told.projection, seen.projection, atol=1e-12)
 
@@ -76,7 +76,7 @@ def test_a_live_controller_adds_them_and_tells_them(lifted: Stage) -> None:
     velocity = np.concatenate([lifted.motion(part).dq for part in ROBOT.parts])
     k = lifted.tick()
     pose = Model(ROBOT).evaluate(lifted.sim.q)
-    pose.feel(PublishedContacts(pose, TOUCHES))
+    pose.compute_contacts(PublishedContacts(pose, TOUCHES))
     expected = lift(State(ROBOT, lifted.sim.q, velocity, 0.01, lambda: pose))
     said = wait_for(lambda: [one for one in told if one.re_k == k], "the forces")[-1]
     assert list(said.terms) == ["lift"]
