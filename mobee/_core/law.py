@@ -104,7 +104,7 @@ def term_names() -> tuple[str, ...]:
 
 
 @cache
-def moving_names() -> tuple[str, ...]:
+def state_term_names() -> tuple[str, ...]:
     """Those of them that depend on the law's state."""
     moving = function("law_moving", INTEGER, result=INTEGER)
     return tuple(name for index, name in enumerate(term_names()) if moving(index))

@@ -1,4 +1,4 @@
-"""Reactive control: squashing, constraint forces, the dynamical system, reaching, and when a motion has settled."""
+"""Reactive control (thesis chapter 5): constraint forces, the dynamical system, reaching, and the test whether a part has settled."""
 
 from mobee.control.controller import Controller as Controller
 from mobee.control.forces import Forces as Forces

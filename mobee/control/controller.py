@@ -1,4 +1,4 @@
-"""The MoBeE controller: a dynamical system between an attractor and the forces that constrain it (thesis 5.2)."""
+"""The MoBeE controller: a dynamical system that an attractor pulls and forces constrain (thesis 5.2)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.law import moving_names, term_names
+from mobee._core.law import state_term_names, term_names
 from mobee._core.tables import Table
 from mobee.arrays import Array
 from mobee.control.forces import Forces, Propagate, checked, checked_force, forces_of
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
 
 class Controller:
-    """Eq. 5.7 over all motors of a robot, every tick a command.
+    """Integrates thesis eq. 5.7 over all motors of a robot and returns a command in every tick.
 
-    The velocity in the law is the controller's own state; only q comes from the encoders.  Velocity commands are the
-    original modality; position commands integrate the controller's own reference; torque commands also carry
-    the robot's weight where its file says what it is.  The motors' limits on velocity (times `speed_scale`, 0 to 1) and
-    acceleration are kept here, so that the robot's safety gate has nothing to refuse.
+    The velocity in the law is the controller's own state; only q comes from the encoders. Velocity commands are the original modality;
+    position commands integrate the controller's own reference; torque commands also carry the robot's weight where its file names
+    masses. Commands keep the motors' limits of velocity (times `speed_scale`, 0 to 1) and acceleration, so that the safety gate
+    refuses none.
 
-    An attractor may be outside the motors' limits: it pulls no harder than `max_spring`, and the limits push back.  The plants
-    refuse such a goal.
+    An attractor may be outside the motors' limits: it pulls with at most `max_spring`, and the limits push back. The plants refuse
+    such a goal.
     """
 
     __slots__ = (
@@ -55,11 +55,19 @@ class Controller:
         alive: NDArray[np.bool_] | None = None,
         terms: Sequence[Term] = (),
     ) -> None:
-        """`alive` (n,): motors that there are forces for; the others are never moved.  None: all.
+        """Start at rest, with the attractor at the robot's home; raises InvalidValue and UnknownName.
 
-        `terms`: further forces, functions in Python, added to those of the law.  `max_dt` knows nothing of them.
+        Args:
+            model: evaluates contacts where `step` is given neither forces nor a pose.
+            gains: of the law; None: the default ones.
+            modality: of the commands.
+            propagate: how far down the body a contact acts, "tree" or "part".
+            speed_scale: share of the motors' speed that is used, above 0 to 1.
+            contact_forces: False leaves f_coll at zero.
+            alive: (n,) the motors on which forces act; the others are never moved. None: all.
+            terms: user-defined forces, added to those of the law; `max_dt` does not include them.
         """
-        if not callable(getattr(model, "track", None)):  # who brings a model of their own is welcome
+        if not callable(getattr(model, "track", None)):  # other classes with the same methods are valid too
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
             raise InvalidValue(f"gains is {gains!r}; it must be Gains, as Gains.default() or Gains.named(name), or None.")
@@ -77,10 +85,10 @@ class Controller:
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
         self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
-        """The law with its numbers."""
+        """The law as tables for the core."""
         self.terms = valid_terms(terms)
         self.force_names = (*term_names(), *(term.name for term in self.terms))
-        """The names of all forces in `last_forces`, in the order in which they are added."""
+        """The names of the forces in `last_forces`, in the order in which they are added."""
         self._reaches = Reaches(self.robot, self.law)
         self._last_forces: Forces | Array
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
@@ -110,7 +118,7 @@ class Controller:
 
     @property
     def state(self) -> Table:
-        """The law's state, a row for each motor (see `mobee._core.law.STATE`): always the same array, which a plant advances."""
+        """The state of the law, a row for each motor (see `mobee._core.law.STATE`); always the same array, which a plant advances."""
         return self._state
 
     @property
@@ -127,67 +135,67 @@ class Controller:
         return known
 
     def note_forces(self, forces: Array) -> None:
-        """Take the rows for `last_forces`, (forces, n) in the order of `force_names`, a copy."""
+        """Set `last_forces` from rows (forces, n) in the order of `force_names`; they are copied."""
         self._last_forces = forces.copy()
 
     @property
     def pushed(self) -> bool:
-        """Whether forces act on markers, which depend on the pose."""
+        """Whether a client pushes markers; such forces depend on the pose."""
         return bool(self._pushes)
 
     @property
     def reaches(self) -> Reaches:
-        """The reaches under way."""
+        """The reaches in progress."""
         return self._reaches
 
     def client_force(self, q: Array) -> Array:
-        """f_config and f_work at q (n,) rad, bounded, shape (n,), in [rad/s^2] (thesis eqs. 5.9-5.10)."""
+        """Return f_config + f_work at q (n,) rad, each bounded, (n,) rad/s^2 (thesis eqs. 5.9 and 5.10)."""
         total = np.zeros(len(q))
         if self._pushes or self.forced:
             self._add_client(q, total)
         return total
 
     def set_attractor(self, part: str, q: Array) -> None:
-        """Set the slice of q* that belongs to a part: (n_part,) rad."""
+        """Set the attractor of one part, (n_part,) rad; raises InvalidValue and UnknownName."""
         where = self.robot.part(part)
         self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
 
     def force(self, f: Array) -> None:
-        """Apply a force in configuration space, (n,) rad/s^2 or m/s^2, until the next or `clear` (thesis 5.2.2); it is squashed."""
+        """Apply a force on the motors, (n,) rad/s^2 or m/s^2, until the next call or `clear` (f of thesis eq. 5.9)."""
         self._client = checked_force("force", f, len(self.robot.motors))
         self.forced = bool(self._client.any())
 
     def push(self, marker: str, f: Array) -> None:
-        """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next or `clear` (thesis 5.2.3).
+        """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next call or `clear` (thesis eq. 5.10).
 
-        Per unit mass: J^T f is in rad/s^2 before it is squashed.
+        It is per unit mass: J^T f is in rad/s^2 before it is bounded.
         """
         self.robot.marker(marker)
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
-        """End all forces of the client; reaches go on."""
+        """End `force` and all pushes; reaches go on."""
         self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 
     def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
-        """Draw a marker to a target with the motors of one part, against its attractor, until the next or `end_reach` (8.2).
+        """Draw a marker to a target with the motors of one part, against its attractor, until the next call or `end_reach` (thesis 8.2).
 
-        `part` None: with all motors that move the marker.  Raises InvalidValue if there are none that may be moved; UnknownName.
+        `part` None: with all motors that move the marker. Raises InvalidValue if no such motor may be moved, and UnknownName.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
         self._reaches[part].aim(target)
 
     def end_reach(self, part: str | None) -> None:
-        """End the pull on a part's marker, or on that of the whole body (None), if there is one."""
+        """End the reach of a part, or of the whole body (None), if there is one."""
         if part is not None:
             self.robot.part(part)
         self._reaches.end(part)
 
-    def still_nears(self, part: str | None) -> bool:
-        """Whether the part's reach brings its marker nearer: then it is not over, although the part has settled."""
-        return self._reaches.go_on(part)
+    def is_approaching(self, part: str | None) -> bool:
+        """Return whether the part's reach still brings its marker nearer: then it is not over, although the part has settled."""
+        return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
         """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
@@ -197,25 +205,25 @@ class Controller:
         self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
-        """Stay where the part is: own velocity 0 and attractor at its measured q (n_part,) rad.
+        """Stop a part: own velocity 0, attractor at its measured q (n_part,) rad.
 
-        The commanded velocity follows as fast as the acceleration limit lets it.
+        The commanded velocity follows as fast as the acceleration limit allows.
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
         self._state["velocity"][where] = self._state["acceleration"][where] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
-        """Have a part that something else keeps still begin anew, as `reset` does for all; q (n_part,) rad measured.
+        """Reset one part to rest at its measured q (n_part,) rad, as `reset` does for all; for a part that something else keeps still.
 
-        Unlike `hold` the commanded velocity starts from 0 and the position reference from q.
+        Unlike after `hold`, the commanded velocity starts from 0 and the position reference from q.
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
         self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """The law's own constraint forces at a pose, as `step` computes them when it is given none."""
+        """Return the law's own constraint forces at a pose, as `step` computes them when it is given none."""
         return forces_of(self.law, pose, self.propagate, self._state)
 
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
@@ -228,15 +236,15 @@ class Controller:
         state = State(self.robot, q, self.velocity, dt, lambda: self._track.evaluate(q, reaching) if pose is None else pose)
         found = {term.name: np.zeros(len(q)) for term in self.terms}
         for term in self.terms:
-            found[term.name][self.law.felt] = term.force(state)[self.law.felt]
+            found[term.name][self.law.live] = term.force(state)[self.law.live]
         return found
 
     def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
-        """Advance the law by dt [s] from the measured q (n,) rad; `forces` None: computed with the model, or of the `pose`.
+        """Advance the law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
 
-        Forces that lack what depends on the law's state, or what `terms` give, are filled up.  Raises InvalidValue for a dt at which
-        the gains are unstable (`max_dt` and above), for a q that is not finite, and for forces that are not or whose sum is beyond
-        LARGEST_FORCE.
+        `forces`: the constraint forces; None: computed at `pose`, or with the model. Forces that depend on the law's state, and those of
+        `terms`, are added if they are absent. Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), for a q
+        that is not finite, and for forces that are not finite or whose sum is beyond LARGEST_FORCE.
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
@@ -257,14 +265,14 @@ class Controller:
         return Command(*commands)
 
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
-        """With all that it lacks."""
+        """Return the forces together with those that are absent."""
         more = self.own_forces(q, dt, pose)
-        if any(name not in forces for name in moving_names()):
+        if any(name not in forces for name in state_term_names()):
             more |= self.forces(self._track.evaluate(q) if pose is None else pose)
         return Forces(**{**more, **forces})
 
     def _add_client(self, q: Array, total: Array) -> None:
-        """Add f_config and f_work (thesis eqs. 5.9-5.10); of a motor that slides f_work too counts in its unit, as a contact does."""
+        """Add f_config and f_work (thesis eqs. 5.9 and 5.10); for a motor that slides f_work is converted to its unit, as for a contact."""
         self.law.add_client(self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))

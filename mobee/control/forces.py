@@ -1,4 +1,4 @@
-"""The constraint forces that the model computes for the controller in every tick."""
+"""The constraint forces of the law, by name, as the model publishes them in every tick; checks of forces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from mobee._core.law import moving_names, term_names
+from mobee._core.law import state_term_names, term_names
 from mobee._core.tables import Table
 from mobee.arrays import Array, real_array
 from mobee.control.gains import Gains
@@ -20,7 +20,7 @@ from mobee.robot.robot import Robot
 if TYPE_CHECKING:
     from mobee.model.pose import Pose
 
-# "tree": a contact is felt down to the base, so that a hand on the table also stops the torso; "part": by the part's own motors.
+# "tree": a contact acts on all motors down to the base, so that a hand on the table also stops the torso; "part": on its part only.
 Propagate = Literal["tree", "part"]
 
 _FLOAT = np.dtype(np.float64)
@@ -28,17 +28,18 @@ LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far above what any squash l
 
 
 class Forces(Mapping[str, Array]):
-    """The forces that constrain the robot, by name, each (n,) in rad/s^2 (force per unit mass), already bounded.
+    """The constraint forces by name, each (n,) in rad/s^2 (force per unit mass), already bounded.
 
-    First those of the law, in the order in which they are added: `limits`, `constraints` and `collision`, f_lim, f_cst and f_coll of
-    eq. 5.7; then those of terms from outside.  Each is an attribute too.  Those of the law that depend on its state may lack.
+    First those of the law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim, f_cst and
+    f_coll of thesis eq. 5.7; then those of user-defined terms. Each is an attribute too. Forces of the law that depend on its state may be
+    absent.
     """
 
     __slots__ = ("_rows",)
     __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __init__(self, *rows: Array, **more: Array) -> None:
-        """The law's in their order or by their names, and any others by theirs."""
+        """`rows`: forces of the law in their order; `more`: other forces of the law, and those of user-defined terms, by name."""
         if not more and len(rows) == len(term_names()):
             self._rows = dict(zip(term_names(), rows, strict=True))
             return
@@ -47,8 +48,8 @@ class Forces(Mapping[str, Array]):
             raise InvalidValue(
                 f"forces: {len(rows)} without a name, {', '.join(more) or 'none'} by name; the law has {', '.join(term_names())}"
             )
-        if lacking := [name for name in told_terms() if name not in given]:
-            raise InvalidValue(f"forces: {', '.join(lacking)} lacking")
+        if lacking := [name for name in published_terms() if name not in given]:
+            raise InvalidValue(f"forces: {', '.join(lacking)} missing; give all of {', '.join(published_terms())}")
         self._rows = {name: given.pop(name) for name in term_names() if name in given} | given
 
     def __getitem__(self, name: str) -> Array:
@@ -70,31 +71,31 @@ class Forces(Mapping[str, Array]):
 
     @property
     def total(self) -> Array:
-        """Their sum, shape (n,), in [rad/s^2]."""
+        """The sum of all forces, (n,) rad/s^2."""
         return reduce(np.add, self._rows.values())
 
 
-def told_terms() -> tuple[str, ...]:
-    """The names of the law's terms that a pose alone decides: the model tells them, what depends on the law's state it cannot."""
-    return tuple(name for name in term_names() if name not in moving_names())
+def published_terms() -> tuple[str, ...]:
+    """Return the names of the terms that depend on the pose only: the model publishes these, the controller computes the others."""
+    return tuple(name for name in term_names() if name not in state_term_names())
 
 
 def needs_contacts() -> bool:
-    """Whether the law has terms that the model cannot tell: then it tells the contacts."""
-    return bool(moving_names())
+    """Return whether the law has terms that depend on its own state: then the model publishes the contacts too."""
+    return bool(state_term_names())
 
 
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:
-    """The constraint forces at one pose (thesis eqs. 5.11-5.17).
+    """Return the constraint forces at one pose (thesis eqs. 5.11 to 5.17); raises InvalidValue for a batch.
 
-    `propagate`: how far down the body a contact is felt.  `contact_forces` False leaves f_coll
-    at zero, for the control experiment in which touching has no effect.
+    `propagate`: how far down the body a contact acts. `contact_forces` False leaves f_coll at zero, for experiments in which contacts
+    have no effect.
     """
     return forces_of(_law(pose.robot, gains, contact_forces), pose, propagate)
 
 
 def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = None) -> Forces:
-    """The constraint forces at one pose, of a law with its numbers, in a state or at rest."""
+    """Return the constraint forces of a law at one pose; `state`: of the law, None: at rest."""
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")
     if propagate not in ("tree", "part"):

@@ -19,7 +19,7 @@ from mobee.robot.robot import Robot
 Law = Literal["default", "published_2014"]
 ClientSquash = Literal["each", "direction"]
 
-_ANGLES = ("max_spring", "limit_width", "max_limit", "max_client")  # gains that count in rad
+_ANGLES = ("max_spring", "limit_width", "max_limit", "max_client")  # gains in units of rad
 _OF_MOTORS = ("damping", "stiffness", "max_spring", "limit_width", "max_limit", "client_slope", "max_client", "weight")
 _NO_NUMBERS = ("law", "settle", "client_squash", "weights", "motors", "groups")
 Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor names; value)
@@ -27,21 +27,21 @@ Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor 
 
 Verdict = Literal["moving", "settled", "timeout"]
 VERDICTS: tuple[Verdict, ...] = ("moving", "settled", "timeout")
-"""In the order of the core's."""
+"""The verdicts, in the order of the core."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settle:
-    """The thresholds of the settle test: physics, not bookkeeping (they set which states are hard to reach).
+    """The thresholds of the settle test. They are part of the physics: they decide which states are hard to reach.
 
-    A part is settled when every motor is commanded at most `speed` and accelerated at most `acceleration`; of a motor that slides
-    both count in its fine unit (`mobee.robot.motor_units`): 3 deg/s are 0.4 % of its range a second.
+    A part has settled when no motor is commanded beyond `speed` and `acceleration`. For a motor that slides both are in its fine unit
+    (`mobee.robot.motor_units`): 3 deg/s are 0.4 % of its range per second.
     """
 
     speed: float  # rad/s
     acceleration: float  # rad/s^2
-    first_look: float = 1.0  # s after the start of the action
-    interval: float = 0.2  # s between looks
+    first_look: float = 1.0  # s from the start of the action to the first check
+    interval: float = 0.2  # s between checks
     timeout: float = 20.0  # s
 
     def __post_init__(self) -> None:
@@ -54,20 +54,26 @@ class Settle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """A variant of the law of eq. 5.7 with its numbers; the mass is 1, so a force is an acceleration in rad/s^2.
+    """The numbers of the law of thesis eq. 5.7, and its variant. The mass is 1, so a force is an acceleration in rad/s^2.
 
-    All numbers are those of motors that turn.  For a motor that slides 1 rad is a share of its range (`mobee.robot.motor_units`), so
-    that the law is the same in that unit: `limit_width` of 10 degrees is 5 % of its range, a `max_` of 12 rad/s^2 3.4 ranges/s^2.
+    All numbers are for motors that turn. For a motor that slides, 1 rad is a share of its range (`mobee.robot.motor_units`), so that
+    the law is the same in that unit: `limit_width` of 10 degrees is 5 % of its range, a `max_` of 12 rad/s^2 is 3.4 ranges/s^2.
+    `dataclasses.asdict` of a set of gains goes through JSON and back by `Gains(**read)`.
 
-    `law`: how constraints and contacts become forces (see `mobee.reference.forces`).  `damping` C in 1/s,
-    `stiffness` K in 1/s^2, each of the `max_` in rad/s^2.  `limit_width` in rad; `constraint_width` in rad along the
-    row's normal (published law: in units of a.q + b).  `contact_gain`: default law, rad/s^2 for a lever
-    and penetration of 1 m; published law, deg/s^2 before it is squared.  `contact_slope`, `client_slope`: the slope
-    of the squash at 0.  `client_squash`: whether a client's force is bounded motor by motor (eq. 5.8 as printed), or in each part
-    by its norm, which keeps its direction.  `weights`: (pattern of motor names, 0 or 1), the first that matches counts, 1 where
-    none does; a motor of weight 0 is never moved.  `motors`: (pattern, gains of these motors), see `with_motors`.  `groups`: the
-    same, looked at after `motors`; a robot without such motors passes them over.  What `dataclasses.asdict` gives of a set
-    goes through JSON and back: Gains(**read).
+    Attributes:
+        law: the variant: how constraints and contacts become forces (see `mobee.reference.forces`).
+        damping: C in 1/s.
+        stiffness: K in 1/s^2.
+        max_spring, max_limit, max_constraint, max_contact, max_client: bounds of the forces, rad/s^2.
+        limit_width: width of the zone before each limit, rad.
+        constraint_width: width of the zone of a clause, rad along the row's normal; published law: in units of a.q + b.
+        contact_gain: default law: rad/s^2 for a lever and a depth of 1 m; published law: deg/s^2 before it is squared.
+        contact_slope, client_slope: slope of the squash at 0.
+        client_squash: "each" bounds a client's force motor by motor (eq. 5.8 as printed), "direction" bounds its norm in each part.
+        settle: thresholds of the settle test.
+        weights: (pattern of motor names, 0 or 1); the first match counts, 1 without a match. A motor of weight 0 is never moved.
+        motors: (pattern, gains of these motors), see `with_motors`.
+        groups: the same, applied after `motors`; patterns that match no motor of a robot are ignored.
     """
 
     law: Law
@@ -92,9 +98,9 @@ class Gains:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if isinstance(value, list):  # as JSON has it
+            if isinstance(value, list):  # read from JSON
                 object.__setattr__(self, name, _tuples(value))
-            if name not in _NO_NUMBERS and value != self.__dataclass_fields__[name].default:  # 0 as default: a force that is not there
+            if name not in _NO_NUMBERS and value != self.__dataclass_fields__[name].default:  # a default of 0: no such force
                 _require_positive(name, value)
         if self.law not in get_args(Law):
             raise UnknownName("law", self.law, get_args(Law))
@@ -114,12 +120,12 @@ class Gains:
 
     @classmethod
     def default(cls) -> Gains:
-        """The thesis' equations with our own tuning: time constant C/K = 0.32 s, contacts held within the fields.
+        """Return the thesis' equations with our own tuning: time constant C/K = 0.32 s, contacts that stay within the fields.
 
-        Tuned by the experiment `gain-tuning`, with the lag and delay of the motors and commands up to three ticks old at 100 Hz: with a
-        stiffer contact it begins to oscillate, with stronger springs the fields are left.  The springs of torso and shoulders are
-        weaker, for many motors push a hand together.  The contact force is bounded a little above what the springs of an
-        arm do together, so that it is stiff where a field begins.
+        Tuned by the experiment `gain-tuning`, with the lag and delay of the motors and commands up to three ticks old at 100 Hz. With a
+        stiffer contact the robot begins to oscillate; with stronger springs it passes through the fields. The springs of torso and
+        shoulders are weaker, because many motors push a hand together. The bound of the contact force is a little above the springs
+        of an arm together, so that the force is stiff where a field begins.
         """
         return cls(
             law="default",
@@ -141,9 +147,9 @@ class Gains:
 
     @classmethod
     def published_2014(cls) -> Gains:
-        """The 2014 program's numbers, given there in degrees: they carry the published findings.
+        """Return the numbers of the 2014 program, which show the published findings; it gives them in degrees.
 
-        Fingers and eyes do not move.  The fields of the robot model are penetrated by centimetres.
+        Fingers and eyes do not move. Contacts go centimetres deep into the fields of the robot model.
         """
         return cls(
             law="published_2014",
@@ -166,23 +172,23 @@ class Gains:
 
     @classmethod
     def named(cls, name: str) -> Gains:
-        """The set of that name, "default" or "published_2014"; raises UnknownName."""
+        """Return the gains named "default" or "published_2014"; raises UnknownName."""
         sets = {"default": cls.default, "published_2014": cls.published_2014}
         if name not in sets:
             raise UnknownName("gain set", name, sets)
         return sets[name]()
 
     def with_motors(self, pattern: str, **gains: float) -> Gains:
-        """Give the motors that match a pattern gains of their own, as `gains.with_motors("*_elbow", stiffness=50.0)`.
+        """Return gains in which the motors that match a pattern have their own, as `gains.with_motors("*_elbow", stiffness=50.0)`.
 
-        What is set last counts first.  Values are in the unit of the motor: of one that slides limit_width in m, each `max_` in m/s^2
-        (others of its gains keep following its range).  Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
-        client_slope, max_client and weight; clauses and contacts bind several motors and have one set of gains.
+        The last setting has priority. Values are in the unit of the motor: for one that slides, limit_width in m and each `max_` in
+        m/s^2; its other gains still follow its range. Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
+        client_slope, max_client and weight. Clauses and contacts involve several motors and have one set of gains.
         """
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """A gain of each of the motors, all of which turn, shape (n,); raises UnknownName for a pattern of `motors` that matches none."""
+        """Return a gain of each motor, as for motors that turn, (n,); raises UnknownName for a pattern of `motors` without a match."""
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
                 raise UnknownName("motor pattern", pattern, motors)
@@ -190,7 +196,7 @@ class Gains:
         return _first_match(self._changed(name), motors, common)
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """A gain of each motor of a robot, in the unit of the motor, shape (n,); raises UnknownName as `of_motors` does."""
+        """Return a gain of each motor of a robot, in the unit of the motor, (n,); raises UnknownName as `of_motors`."""
         values = self.of_motors(name, robot.motors)
         if name not in _ANGLES:
             return values
@@ -198,11 +204,11 @@ class Gains:
         return values * np.where([any(fnmatchcase(m, p) for p in own) for m in robot.motors], 1.0, motor_units(robot))
 
     def weight(self, motors: tuple[str, ...]) -> Array:
-        """The weight of each of the motors, shape (n,)."""
+        """Return the weight of each motor, (n,)."""
         return _first_match((*self._changed("weight"), *self.weights), motors, 1.0)
 
     def _changed(self, name: str) -> Changes:
-        """The patterns that change a gain, with its value."""
+        """Return the patterns that change a gain, each with the value."""
         chosen = (*self.motors, *self.groups)
         return tuple((pattern, value) for pattern, changes in chosen for changed, value in changes if changed == name)
 
@@ -221,21 +227,21 @@ def _require_positive(name: str, value: float) -> None:
 
 
 class SettleTest:
-    """One action's test: looks at the commanded motion now and then, as the original's poll did."""
+    """The settle test of one action: checks the commanded motion at intervals, as the original did."""
 
     def __init__(self, settle: Settle, start: float) -> None:
-        """Begin at time `start` [s]."""
+        """`start`: when the action begins [s]."""
         self.settle = settle
         self._thresholds = core.Settle(*(getattr(settle, name) for name in core.SETTLE))
         self._memory = core.SettleTest(start, start + settle.first_look)
-        self._look = core.calls().look
+        self._check = core.calls().look
 
-    def look(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
-        """Judge the part's motion at time t [s]; between two looks the answer is always "moving".
+    def update(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
+        """Return the verdict on the part's motion at time t [s]; always "moving" between two checks.
 
-        `speeds` rad/s and `accelerations` rad/s^2: what the controller commands the part's motors, shape (n_part,); of motors that
-        slide divided by their `fine_units`.
+        `speeds` rad/s and `accelerations` rad/s^2: the commands to the part's motors, (n_part,); those of motors that slide are
+        divided by their `fine_units`.
         """
         motion = np.array([speeds, accelerations], dtype=np.float64)
-        found: int = self._look(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])
+        found: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])
         return VERDICTS[found]

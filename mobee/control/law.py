@@ -1,4 +1,7 @@
-"""The control law of eq. 5.7 with its numbers for one robot; core/law.cpp has the formulas."""
+"""The control law of thesis eq. 5.7 with its numbers for one robot, as tables for the core.
+
+The compiled formulas are in core/law.cpp, the readable ones in `mobee.reference.forces` and `mobee.reference.law`.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +21,14 @@ from mobee.control.gains import Gains
 from mobee.robot.motor_units import fine_units, limit_zones, motor_units
 from mobee.robot.robot import Clause, Robot
 
-INSIDE = 0.999  # of the velocity and acceleration limits, so that no rounding on the way makes the gate refuse
-LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a motor that something blocks
+INSIDE = 0.999  # share of the velocity and acceleration limits, so that no rounding makes the safety gate refuse a command
+LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a blocked motor
 
 _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 
 class Law:
-    """The law as tables with names, made once; bare numbers, all of them checked before.  Several threads may use it at once."""
+    """The law of one robot as tables; any number of threads may use it. The callers have checked all arrays."""
 
     def __init__(
         self,
@@ -36,25 +39,25 @@ class Law:
         contact_forces: bool = True,
         alive: NDArray[np.bool_] | None = None,
     ) -> None:
-        """`alive` (n,): motors that there are forces for; the others are never moved, as those of weight 0."""
-        live = np.ones(len(robot.motor_table), dtype=bool) if alive is None else alive
+        """`alive` (n,): the motors on which forces act; None: all. The others are never moved, as motors of weight 0."""
+        mask = np.ones(len(robot.motor_table), dtype=bool) if alive is None else alive
         self.motors = _motors(robot, gains, speed_scale)
-        self.active: Ints = np.flatnonzero(live & (gains.weight(robot.motors) > 0))
-        """Indices of the motors that are ever moved."""
-        self.felt: Ints = np.flatnonzero(live)
+        self.active: Ints = np.flatnonzero(mask & (gains.weight(robot.motors) > 0))
+        """Indices of the motors that may be moved."""
+        self.live: Ints = np.flatnonzero(mask)
         """Indices of the motors on which forces are computed."""
-        felt = ([i for i in range(part.start, part.start + len(part)) if live[i]] for part in robot.parts.values())
-        self.parts = np.array([(of_part[0], of_part[-1] + 1) for of_part in felt if of_part], dtype=INTERVAL)
-        clauses = [clause for clause in robot.clauses if clause.a[:, live].any()]
+        spans = ([i for i in range(part.start, part.start + len(part)) if mask[i]] for part in robot.parts.values())
+        self.parts = np.array([(of_part[0], of_part[-1] + 1) for of_part in spans if of_part], dtype=INTERVAL)
+        clauses = [clause for clause in robot.clauses if clause.a[:, mask].any()]
         self.clauses, self.rows, self.entries = _clauses(clauses, gains, motor_units(robot))
         self._struct = core.Law(
-            *(view(table) for table in (self.motors, self.active, self.felt, self.parts, self.clauses, self.rows, self.entries)),
+            *(view(table) for table in (self.motors, self.active, self.live, self.parts, self.clauses, self.rows, self.entries)),
             gains.law == "published_2014", contact_forces, gains.client_squash == "direction", core.MODALITIES.index(modality),
             *(getattr(gains, name) for name in core.TERM_GAINS),
             core.Settle(*(getattr(gains.settle, name) for name in core.SETTLE)),
         )  # fmt: skip
         self.address = ctypes.addressof(self._struct)
-        """Where the core finds the law."""
+        """The address of the law in memory, for the core."""
         self._core = core.calls()
         self._still: Table = np.zeros(len(self.motors), dtype=core.STATE)
 
@@ -62,10 +65,9 @@ class Law:
         return len(self.motors)
 
     def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
-        """The forces that constrain the robot at q, (len(term_names()), n) in rad/s^2.
+        """Return the constraint forces at q, (len(term_names()), n) in rad/s^2: f_lim, f_cst, f_coll (thesis eqs. 5.11 to 5.17).
 
-        `torque` (n,): the sum of J^T (depth * normal) over the contacts of fields, over the whole tree or cut at the parts.  `state`:
-        of the law, before the step; None: it is at rest.
+        `torque` (n,): `Pose.projection`, or `Pose.projection_of_part`. `state`: of the law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
         given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
@@ -73,18 +75,18 @@ class Law:
         return found
 
     def at_rest(self, q: Array) -> Table:
-        """The state at rest at the measured q (n,)."""
+        """Return the state of the law at rest at the measured q (n,)."""
         state: Table = np.zeros(len(self), dtype=core.STATE)
         state["reference"] = np.clip(q, self.motors["low"], self.motors["high"])
         state["reference"][self.active] = q[self.active]
         return state
 
     def add_client(self, f: Array, total: Array) -> None:
-        """Add L(f), f_config or f_work (eqs. 5.9 and 5.10), to a total, both (n,)."""
+        """Add L(f), which is f_config or f_work (thesis eqs. 5.9 and 5.10), to a total, both (n,)."""
         self._core.client(self.address, numbers(f, len(self)), address(total))
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
-        """Advance a state by dt [s] under the sum of all forces (n,); the commands: position, velocity, torque, (3, n)."""
+        """Advance a state by dt [s] under the sum of all forces (n,); return the commands position, velocity and torque, (3, n)."""
         n, commands = len(self), np.empty((3, len(self)))
         given = numbers(q, n), dt, numbers(attractor, n), numbers(force, n)
         self._core.step(self.address, *given, address(state), address(commands))
@@ -92,7 +94,7 @@ class Law:
 
 
 def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
-    """A row for each motor."""
+    """Return a row for each motor."""
     table: Table = np.zeros(len(robot.motor_table), dtype=core.MOTOR_GAINS)
     table["low"], table["high"] = robot.limits.T
     for name in _OF_MOTORS:
@@ -111,7 +113,7 @@ def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
 
 
 def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Table, Table, Table]:
-    """The clauses, which say where their rows are, which say where their entries are."""
+    """Return three tables: the clauses as intervals of rows, the rows with intervals of entries, and the entries."""
     spans, rows, entries = list[tuple[int, int]](), list[tuple[float, float, tuple[int, int]]](), list[tuple[int, float, float]]()
     for clause in clauses:
         spans.append((len(rows), len(rows) + len(clause.b)))
@@ -127,7 +129,7 @@ def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Tab
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClauseRows:
-    """Row i belongs to clause `clause[i]`."""
+    """The rows a.q + b > 0 of all clauses of a robot; row i belongs to clause `clause[i]`."""
 
     a: Array  # (rows, n)
     b: Array  # (rows,) rad
@@ -138,7 +140,7 @@ class ClauseRows:
 
 
 def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
-    """Put the clauses of a robot with n motors into one matrix."""
+    """Return the rows of all clauses of a robot with n motors as one matrix."""
     counts = [len(c.b) for c in clauses]
     a = np.concatenate([c.a for c in clauses]) if clauses else np.zeros((0, n))
     b = np.concatenate([c.b for c in clauses]) if clauses else np.zeros(0)
@@ -149,14 +151,14 @@ def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
 
 Modality = Literal["position", "velocity", "torque"]
 
-# What a torque-commanded motor is taken to be, here and in the simulated motors: inertia * dv/dt = torque - friction * v.
+# Model of a motor in torque mode, here and in the simulated motors: inertia * dv/dt = torque - friction * v.
 INERTIA = 0.5  # kg m^2
 FRICTION = 5.0  # N m s/rad
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What the motors are told: the modality in force says which one counts; each (n,), motor order of the robot."""
+    """One command for all motors, each array (n,) in the order of `robot.motors`; the modality decides which array is used."""
 
     position: Array  # rad
     velocity: Array  # rad/s

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 Chain = tuple[int, Marker, Table, Table, Table]
-"""What a reach with one marker by one part begins with, see `Reaching`."""
+"""The arguments of `Reaching` for one marker and one part."""
 
 
 class Reaching:
-    """One reach, with what it remembers."""
+    """One reach, with its state in the core."""
 
     def __init__(self, part: int, marker: Marker, joints: Table, drives: Table, motors: Table) -> None:
-        """`part`: its first motor, see `_first`; the tables: see `mobee._core.law`, what the reach changes is copied."""
+        """`part`: the index of its first motor, see `_first`. The tables: see `mobee._core.law`; those that change are copied."""
         self.marker = marker.name
         self.joints, self.motors = joints.copy(), motors.copy()
         self._drives, self._curve = drives, np.zeros((len(motors), len(motors)))
@@ -41,14 +41,14 @@ class Reaching:
         self.address = ctypes.addressof(self.struct)
 
     def aim(self, target: ReachTarget) -> None:
-        """Tell it where to."""
+        """Set the target."""
         self.struct.surface, self.struct.turned = target.aim == "surface", target.normal is not None
         self.struct.target[:], self.struct.radius = target.position.tolist(), target.radius
         self.struct.wanted[:] = [0.0] * 3 if target.normal is None else target.normal.tolist()
 
 
 class Reaches:
-    """One for each part that reaches."""
+    """The reaches in progress: at most one for each part, and one of the whole body."""
 
     __slots__ = ("_addresses", "_chains", "_core", "_law", "_robot", "_under_way", "address")
 
@@ -66,9 +66,9 @@ class Reaches:
         return self._under_way[part]
 
     def begin(self, part: str | None, marker: str) -> None:
-        """Let a part draw a marker, None: the whole body, to nowhere yet; its reach before is forgotten.
+        """Begin a reach of a part with a marker, None: of the whole body, instead of the one before; it has no target yet.
 
-        Raises InvalidValue if none of its motors that may be moved moves the marker; UnknownName.
+        Raises InvalidValue if none of the motors that may be moved moves the marker, and UnknownName.
         """
         if (part, marker) not in self._chains:
             self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))
@@ -77,31 +77,31 @@ class Reaches:
         self._list()
 
     def end(self, part: str | None) -> None:
-        """Forget a part's reach, if there is one."""
+        """End a part's reach, if there is one."""
         if self._under_way.pop(part, None) is not None:
             self._list()
 
     def marker(self, part: str | None) -> str | None:
-        """The marker that a part draws."""
+        """Return the marker that a part reaches with; None if it does not reach."""
         reaching = self._under_way.get(part)
         return None if reaching is None else reaching.marker
 
     def add_forces(self, q: Array, attractor: Array, dt: float, total: Array) -> None:
-        """Add the forces at the measured q (n,) rad to `total` (n,) in rad/s^2, which has all others."""
+        """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2, the sum of all other forces."""
         copy = q.copy()
         self._core.add_reaches(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
 
-    def go_on(self, part: str | None) -> bool:
-        """Whether a part reaches, and goes on although it has settled; never under the published law."""
+    def is_approaching(self, part: str | None) -> bool:
+        """Return whether a part's reach still brings its marker nearer, although the part has settled; False under the published law."""
         return bool(self._core.reach_goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:
-        """Write down where the core finds them."""
+        """Update the list of addresses for the core."""
         self._addresses = np.array([reaching.address for reaching in self._under_way.values()], dtype=np.int64)
         self.address = address(self._addresses)
 
     def _drawn(self, part: str | None, marker: str) -> Ints:
-        """The motors of a part, or of the whole body, that may be moved and that move a marker."""
+        """Return the motors of a part, or of the whole body, that may be moved and that move a marker."""
         robot = self._robot
         link, where = robot.marker(marker).link, slice(0, None) if part is None else robot.part(part).slice
         moving = np.zeros(len(robot.motors), dtype=bool)
@@ -116,17 +116,17 @@ class Reaches:
 
 
 def _first(robot: Robot, part: str | None) -> int:
-    """The motor that stands for a part in the core; the whole body is no part, so that no part's action waits for its reach."""
+    """Return the motor that identifies a part in the core; -1 for the whole body, for whose reach no action of a part waits."""
     return -1 if part is None else robot.part(part).start
 
 
 def _chain(robot: Robot, part: str | None, marker: str, motors: Ints) -> Chain:
-    """From the base to a marker that these motors draw."""
+    """Return the tables of the chain from the base to a marker that these motors draw."""
     placed, (matrix, offset), units = robot.marker(marker), robot.coupling, motor_units(robot)
     links = tables(robot).ancestry[placed.link]
     number = {int(motor): k for k, motor in enumerate(motors)}
     joints: Table = np.zeros(len(links), dtype=core.JOINT)
-    joints["angle"] = np.nan  # no pose yet
+    joints["angle"] = np.nan  # no pose computed yet
     joints["frame"][:1] = np.eye(3)
     drives = list[tuple[int, int, float, float]]()
     for row, j in zip(joints, links, strict=True):

@@ -1,4 +1,4 @@
-"""MoBeE 1.0: switching control and the reflex that retraces the recent poses (thesis chapter 4)."""
+"""MoBeE 1.0: the reflex that takes control from the client at a contact and retraces the recent poses (thesis chapter 4)."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReflexSettings:
-    """Numbers of the reflex; times in s.
+    """Settings of the reflex; times in s.
 
-    `confirm`: how long a violation must last, in every tick, before it counts; `release`: how long it must be away.
-    `brake`: how long the robot brakes before it is rewound; `dead_time`: how long it rests behind the rewinding, before it is judged.
-    `pace`: recorded poses that are rewound a tick.  `must_be_clear`: a waypoint that is itself in violation is passed by, and
-    control is given back at a clear pose only.
+    Attributes:
+        history: how long poses are recorded.
+        confirm: how long a violation must last without a break before it counts.
+        release: how long it must be absent before it counts as over.
+        brake: how long the robot brakes before it retraces its poses.
+        dead_time: how long it waits after retracing, before the pose is checked.
+        pace: recorded poses that are retraced per tick.
+        must_be_clear: continue past a waypoint that is in violation, and return control at a pose without violations only.
     """
 
     history: float = 30.0
@@ -46,21 +50,21 @@ class ReflexSettings:
 
     @classmethod
     def naive(cls) -> ReflexSettings:
-        """As chapter 4.1 describes it: the first violation counts, and control goes back where a waypoint is reached.
+        """Return the settings of thesis 4.1: the first violation counts, and control returns where a waypoint is reached.
 
-        4.4 tells what became of that: oscillation between the two controllers, and recoveries that fail.
+        Thesis 4.4 reports the result: oscillation between the two controllers, and recoveries that fail.
         """
         return cls(confirm=0.0, release=0.0, brake=0.0, dead_time=0.0, must_be_clear=False)
 
 
 ContactKind = Literal["solid", "field"]
 KINDS: tuple[ContactKind, ...] = ("solid", "field")
-TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate grants the same beyond a limit
+TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate allows the same beyond a limit
 
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One thing that is wrong with a pose."""
+    """One contact, limit or clause that a pose violates."""
 
     kind: Literal["contact", "limit", "clause"]
     what: str  # "first - second", the motor, or the part and number of the clause
@@ -68,12 +72,12 @@ class Violation:
 
 
 class Watch:
-    """Says what is wrong with a pose."""
+    """Checks poses for violations: contacts, motors beyond their limits, clauses that do not hold."""
 
     def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
-        """`kinds`: of contacts that count; `tolerance` rad by which a limit or a clause may be exceeded: encoders are noisy.
+        """`kinds`: of contacts that count; `tolerance` rad: by how much a limit or a clause may be exceeded, since encoders are noisy.
 
-        Of a motor that slides the tolerance counts in its fine unit (`mobee.robot.motor_units`).
+        For a motor that slides the tolerance is in its fine unit (`mobee.robot.motor_units`). Raises InvalidValue.
         """
         if unknown := set(kinds) - set(KINDS):
             raise InvalidValue(f"kinds {sorted(unknown)}: contacts are of the kinds {', '.join(KINDS)}")
@@ -84,8 +88,8 @@ class Watch:
         self._rows = stack_clauses(robot.clauses, len(robot.motors))
         self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
 
-    def look(self, pose: Pose) -> tuple[Violation, ...]:
-        """Everything that is wrong with one pose: contacts, the deepest first, then limits, then clauses."""
+    def check(self, pose: Pose) -> tuple[Violation, ...]:
+        """Return all violations of one pose: contacts, the deepest first, then limits, then clauses."""
         contacts = [Violation("contact", f"{c.first} - {c.second}", float(c.depth)) for c in pose.contacts if c.kind in self._kinds]
         contacts.sort(key=lambda violation: -violation.depth)
         beyond = np.maximum(self._limits[:, 0] - pose.q, pose.q - self._limits[:, 1])
@@ -94,7 +98,7 @@ class Watch:
         return (*contacts, *limits, *self._broken(pose))
 
     def _broken(self, pose: Pose) -> list[Violation]:
-        """The clauses none of whose rows is satisfied."""
+        """Return the clauses of which no row holds."""
         rows = self._rows
         if not len(rows.b):
             return []
@@ -108,37 +112,37 @@ Outcome = Literal["under way", "waypoint", "end of history", "stuck"]
 
 @dataclass(slots=True)
 class Recovery:
-    """One reflex, as it stands or as it ended."""
+    """One recovery by the reflex, in progress or ended."""
 
     cause: tuple[Violation, ...]
     ticks: int = 0
     deepest: float = 0.0  # m, of all contacts since it began
-    again: int = 0  # how often a violation came back after it was away
-    passed: int = 0  # waypoints in violation that were passed by
+    again: int = 0  # how often a violation came back
+    passed: int = 0  # waypoints in violation, at which it did not stop
     outcome: Outcome = "under way"
 
 
 @dataclass(slots=True)
 class Counts:
-    """What happened since the reflex was made."""
+    """Counts of events since the reflex was created."""
 
     reflexes: int = 0
     recovered: int = 0
     stuck: int = 0
-    flips: int = 0  # changes of the unfiltered judgement
+    flips: int = 0  # changes of the unfiltered result of the check
 
 
 class Debounce:
-    """A signal that changes only after the raw one has said the same for some ticks without a break (thesis 4.4)."""
+    """A filtered signal: it changes only after the raw one has differed from it for some ticks without a break (thesis 4.4)."""
 
     def __init__(self, confirm: int, release: int) -> None:
-        """Ticks until it becomes true, and until it becomes false; at least 1 each."""
+        """`confirm`: ticks until it becomes true; `release`: ticks until it becomes false; at least 1 each."""
         self._needed = {True: max(confirm, 1), False: max(release, 1)}
-        self._ticks = 0  # for which the raw signal has differed
+        self._ticks = 0  # since the raw signal differs
         self.on = False
 
     def update(self, raw: bool) -> bool:
-        """One tick of the raw signal; the filtered one."""
+        """Take one tick of the raw signal; return the filtered one."""
         self._ticks = self._ticks + 1 if raw != self.on else 0
         if self._ticks >= self._needed[raw]:
             self.on, self._ticks = raw, 0
@@ -146,46 +150,51 @@ class Debounce:
 
 
 class Reflex:
-    """Who commands the robot: the client (state forward), or the reflex, which rewinds the recent poses.
+    """A state machine that decides who commands the robot: the client (state forward), or the reflex, which retraces recent poses.
 
-    forward -> brake when a violation is confirmed; brake -> rewind when the time for it is over; rewind -> dead at a waypoint
-    or at the end of the history; dead -> forward when the time is over and the pose is clear, else -> rewind to the waypoint
-    before, or -> stuck when there is no history left.  stuck -> forward when the pose is clear after all, or by `accept`.
+    forward -> brake when a violation is confirmed; brake -> rewind when its time is over; rewind -> dead at a waypoint or at the end of
+    the history; dead -> forward when its time is over and the pose is clear, else -> rewind to the waypoint before, or -> stuck when no
+    history is left; stuck -> forward when the pose is clear, or by `accept`.
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:
-        """`dt` s a tick; `max_velocity` (n,) rad/s, beyond which no target of the rewinding moves."""
+        """`dt`: the tick [s]; `max_velocity` (n,) rad/s: the fastest motion of the target while it retraces poses."""
         if not 0.0 < dt < math.inf:
             raise InvalidValue(f"tick of {dt} s: must be a finite time above 0")
         self.settings, self.counts = settings, Counts()
         self.state: State = "forward"
-        self.recovery: Recovery | None = None  # the one under way, else the last
+        self.recovery: Recovery | None = None  # the one in progress, else the last
         self._dt, self._max_step = dt, np.asarray(max_velocity, dtype=float) * dt
-        self._history = deque[tuple[Array, bool]](maxlen=max(self._ticks(settings.history), 1))  # the newest poses; is it a waypoint
+        self._history = deque[tuple[Array, bool]](
+            maxlen=max(self._ticks(settings.history), 1)
+        )  # recent poses, and whether each is a waypoint
         self._debounce = Debounce(self._ticks(settings.confirm), self._ticks(settings.release))
         self._all_clear = Debounce(1, self._ticks(settings.release))
         self._accepted: frozenset[str] = frozenset()
         self._raw = False
-        self._left = 0  # ticks of a state that ends by itself
-        self._credit = 0.0  # recorded poses that may be rewound now
-        self._goal: Array | None = None  # recorded pose on the way to which the target is
-        self._at_waypoint = False  # the goal is one
+        self._left = 0  # ticks left of a state that ends by time
+        self._credit = 0.0  # recorded poses that may be retraced now
+        self._goal: Array | None = None  # the recorded pose that the target moves to
+        self._at_waypoint = False  # whether the goal is a waypoint
         self._target = np.zeros(len(self._max_step))
 
     @property
     def recorded(self) -> int:
-        """How many poses could be rewound now."""
+        """The number of poses that could be retraced now."""
         return len(self._history)
 
     def mark(self) -> bool:
-        """A waypoint: the newest recorded pose is safe.  False when nothing is recorded, or the reflex is in control."""
+        """Mark the newest recorded pose as a waypoint, which is safe; False if nothing is recorded or the reflex is in control."""
         if self.state != "forward" or not self._history:
             return False
         self._history[-1] = self._history[-1][0], True
         return True
 
     def accept(self, q: Array, violations: Sequence[Violation]) -> None:
-        """Leave `stuck`: somebody answers for the pose q (n,) rad as it is.  What is wrong now counts again once all was clear."""
+        """Leave the state `stuck` at the pose q (n,) rad, by a decision of the client.
+
+        The given violations are ignored until the pose has been without any.
+        """
         if self.state != "stuck":
             return
         self._accepted = frozenset(violation.what for violation in violations)
@@ -193,9 +202,9 @@ class Reflex:
         self._keep_place(q)
 
     def tick(self, q: Array, violations: Sequence[Violation]) -> Array | None:
-        """One tick at the measured pose q (n,) rad: the target (n,) rad of the rewinding; None while the client commands.
+        """Advance by one tick at the measured pose q (n,) rad; return the target (n,) rad of the reflex, None while the client commands.
 
-        While the robot brakes or is stuck, the target is where it shall stay: the pose at which the state began.
+        While the robot brakes or is stuck, the target is the pose at which that state began.
         """
         violated, recovery = self._judge(violations), self.recovery
         if self.state == "forward" or recovery is None:
@@ -209,12 +218,12 @@ class Reflex:
         return None if self.state == "forward" else self._target
 
     def give_up(self) -> None:
-        """The robot does not obey the reflex: whoever holds it must decide."""
+        """Enter the state `stuck`, because the robot does not follow the reflex."""
         if self.state not in ("forward", "stuck") and self.recovery is not None:
             self._end_stuck(self.recovery)
 
     def _judge(self, violations: Sequence[Violation]) -> bool:
-        """Whether the pose is in violation, after the filter; what was accepted does not count until all was clear."""
+        """Return whether the pose is in violation, filtered; accepted violations are ignored until the pose has been without any."""
         if self._accepted and not self._all_clear.update(bool(violations)):
             self._accepted = frozenset()
         raw = any(violation.what not in self._accepted for violation in violations)
@@ -234,9 +243,9 @@ class Reflex:
         return self.recovery
 
     def _advance(self, recovery: Recovery, q: Array, violated: bool) -> None:
-        """Go through the states as far as this tick leads."""
+        """Make all transitions of this tick."""
         if self.state == "brake" and self._is_over():
-            self._target = q.copy()  # nothing was commanded on the way that braking took
+            self._target = q.copy()  # no command was given while it braked
             self.state = "rewind"
         if self.state == "rewind" and self._rewind():
             self._enter("dead", self.settings.dead_time)
@@ -246,7 +255,7 @@ class Reflex:
             self._keep_place(q)
 
     def _rewind(self) -> bool:
-        """Move the target back along the history; True when it is where the rewinding may end."""
+        """Move the target back along the history; return True when it is where retracing may end."""
         self._credit += self.settings.pace
         while self._credit >= 1.0 and self._history and not self._at_waypoint:
             self._goal, self._at_waypoint = self._history.pop()
@@ -254,13 +263,13 @@ class Reflex:
         may_end = self._at_waypoint or not self._history
         if self._goal is None:
             return may_end
-        way = self._goal - self._target
-        near = np.abs(way) <= self._max_step
-        self._target = np.where(near, self._goal, self._target + way.clip(-self._max_step, self._max_step))
+        path = self._goal - self._target
+        near = np.abs(path) <= self._max_step
+        self._target = np.where(near, self._goal, self._target + path.clip(-self._max_step, self._max_step))
         return may_end and bool(near.all())
 
     def _conclude(self, recovery: Recovery, violated: bool) -> None:
-        """The robot has rested where the rewinding ended: give control back, or go back further."""
+        """End the dead time: return control to the client, or retrace further."""
         if not violated or not self.settings.must_be_clear:
             recovery.outcome = "waypoint" if self._at_waypoint else "end of history"
             self.counts.recovered += 1
@@ -278,7 +287,7 @@ class Reflex:
         self.state = "stuck"
 
     def _keep_place(self, q: Array) -> None:
-        """Give control back where the robot is; the client's next motion begins there."""
+        """Return control to the client at q, as a waypoint."""
         self._history.append((q.copy(), True))
         self.state = "forward"
 

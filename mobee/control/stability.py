@@ -1,4 +1,4 @@
-"""Computes the largest stable time step of the law for each motor."""
+"""The largest time step at which the law is stable."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest step, and the motion that becomes unstable there."""
+    """The largest stable step, and the motion that becomes unstable beyond it."""
 
     step: float  # s
-    motor: str  # that moves most in it
+    motor: str  # the motor that moves most in that motion
     damping: float  # 1/s, along that motion
     stiffness: float  # 1/s^2
 
 
 def largest_step(robot: Robot, gains: Gains) -> float:
-    """The time step [s] at which the semi-implicit Euler step of the law stops being stable."""
+    """Return the time step [s] at which the semi-implicit Euler step of the law becomes unstable."""
     return stability_bound(robot, gains).step
 
 
 def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
-    """Raise InvalidValue if the law cannot be integrated with steps of dt [s], naming the motor and the bound that is broken."""
+    """Raise InvalidValue, with the motor and the violated bound, if the law is unstable at steps of dt [s]."""
     if not (dt > 0 and np.isfinite(dt)):
         raise InvalidValue(f"time step {dt} s: must be a finite time above 0")
     bound = stability_bound(robot, gains)
@@ -50,12 +50,12 @@ def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
 
 @lru_cache(maxsize=8)
 def stability_bound(robot: Robot, gains: Gains) -> Bound:
-    """Where all springs act at once (attractor, limits, all clauses), at their steepest.
+    """Return the bound for all springs at once (attractor, limits, all clauses), each at its steepest.
 
     With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive
-    definite: with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular.  Contacts are not in the bound: their
-    stiffness depends on the pose and on how many there are, and their force is bounded.  Nor is the age of the commands, which
-    depends on the motors.  docs/law.md has both in numbers.
+    definite: with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular. Contacts are not in the bound: their
+    stiffness depends on the pose and on their number, and their force is bounded. Nor is the age of the commands, which depends on
+    the motors. docs/law.md has numbers for both.
     """
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):
@@ -72,13 +72,13 @@ def stability_bound(robot: Robot, gains: Gains) -> Bound:
 
 
 def _stiffness(robot: Robot, gains: Gains) -> Array:
-    """The steepest springs of all motors, each motor in its unit of `motor_units`, symmetric, (n, n) in 1/s^2."""
+    """Return the stiffness of all springs at their steepest, each motor in its unit of `motor_units`, symmetric, (n, n) in 1/s^2."""
     single = gains.of_robot("stiffness", robot) + gains.of_robot("max_limit", robot) / gains.of_robot("limit_width", robot)
     rows = stack_clauses([replace(clause, a=clause.a * motor_units(robot)) for clause in robot.clauses], len(robot.motors))
     slope = gains.max_constraint / gains.constraint_width
     if gains.law == "published_2014":
         steep = slope * rows.norms
-    else:  # all rows of a clause push by what one of them lacks: by at most the root of their number more than if each were alone
+    else:  # all rows of a clause push by the lack of one: at most the root of their number stronger than each alone
         steep = slope * np.sqrt(np.bincount(rows.clause))[rows.clause] if len(rows.b) else rows.norms
     found: Array = np.diag(single) + (rows.normals.T * steep) @ rows.normals
     return found

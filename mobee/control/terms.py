@@ -1,4 +1,4 @@
-"""User-defined forces of eq. 5.7, as Python functions."""
+"""User-defined forces of thesis eq. 5.7, as Python functions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 
 
 class State:
-    """What a force may depend on: `q` (n,) rad measured, `velocity` (n,) rad/s, the law's own, the tick `dt` s, `robot` and `pose`."""
+    """The input of a user-defined force: `q` (n,) rad, measured; `velocity` (n,) rad/s, the law's own; `dt` s; `robot`; `pose`."""
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
 
@@ -31,7 +31,7 @@ class State:
 
     @property
     def pose(self) -> Pose:
-        """The robot at q in the world of now, with its contacts; evaluated when it is first asked for."""
+        """The robot at q in the world of now, with its contacts; evaluated when it is first read."""
         if self._pose is None:
             self._pose = self._evaluate()
         return self._pose
@@ -39,10 +39,10 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A force of one's own on the right-hand side of eq. 5.7.
+    """A user-defined force on the right-hand side of thesis eq. 5.7.
 
-    `name`: of a-z, 0-9 and _, and none that the law has.  `function`: gives the force on the motors (n,), rad/s^2, or m/s^2 of one
-    that slides.  It is called in every tick.
+    `name`: of a-z, 0-9 and _, and different from those of the law. `function`: returns the force on the motors (n,), rad/s^2, or m/s^2
+    for a motor that slides. It is called in every tick.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Term:
             raise InvalidValue(f"term {self.name!r}: its function is {self.function!r}; it must be a function of the state.")
 
     def force(self, state: State) -> Array:
-        """What the function gives, checked; raises InvalidValue, which names the term."""
+        """Return the force of the function; raises InvalidValue with the name of the term if it fails or is not valid."""
         try:
             given = self.function(state)
         except Exception as error:
@@ -64,19 +64,19 @@ class Term:
 
 
 def _kept(array: Array) -> Array:
-    """The same numbers, which nobody can change by this array."""
+    """Return a read-only view."""
     seen = array.view()
     seen.flags.writeable = False
     return seen
 
 
 def valid_terms(given: Sequence[Term]) -> tuple[Term, ...]:
-    """Terms that can stand beside those of the law and each other; raises InvalidValue."""
+    """Return the terms; raises InvalidValue unless their names differ from each other and from those of the law."""
     terms, taken = tuple(given), set(term_names())
     for term in terms:
         if not isinstance(term, Term):
             raise InvalidValue(f"terms has {term!r}; each must be a Term, as Term(name, function).")
         if term.name in taken or hasattr(Forces, term.name):
-            raise InvalidValue(f"term {term.name!r}: there is one of that name; taken are {', '.join(sorted(taken))} and what Forces has")
+            raise InvalidValue(f"term {term.name!r}: the name is taken; taken are {', '.join(sorted(taken))} and the members of Forces")
         taken.add(term.name)
     return terms

@@ -43,7 +43,7 @@ class Action:
     def update(self, k: int, t: float, speeds: Array, accelerations: Array, continues: Callable[[], bool] = lambda: False) -> None:
         """Test whether the motion has settled; an action whose motion has settled is still "moving" while `continues` is true."""
         if self._test is not None and self.status == "moving":
-            verdict = self._test.look(t, speeds, accelerations)
+            verdict = self._test.update(t, speeds, accelerations)
             self._set_status("moving" if verdict == "settled" and continues() else verdict, k)
 
     def hold(self, k: int) -> None:

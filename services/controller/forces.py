@@ -10,7 +10,7 @@ from bus_schema.messages import ContactItem
 from bus_schema.messages import Forces as ForcesMessage
 from mobee.arrays import Array
 from mobee.control import Forces
-from mobee.control.forces import LARGEST_FORCE, told_terms
+from mobee.control.forces import LARGEST_FORCE, published_terms
 from mobee.control.terms import Term, valid_terms
 from mobee.learning.settings import imported
 from mobee.model.contact import KINDS, ContactTable
@@ -64,8 +64,8 @@ class ModelForces:
 
     def _refusal(self, message: ForcesMessage) -> str:
         terms = message.terms
-        if terms.keys() != set(told_terms()):
-            return f"the terms are {', '.join(terms) or 'none'}; this law has {', '.join(told_terms())}"
+        if terms.keys() != set(published_terms()):
+            return f"the terms are {', '.join(terms) or 'none'}; this law has {', '.join(published_terms())}"
         largest = LARGEST_FORCE / len(terms)
         if any(max(row, default=0.0) > largest or min(row, default=0.0) < -largest for row in terms.values()):
             return f"a force is larger than {largest:.3g} rad/s^2, the largest that the law accepts"

@@ -149,7 +149,7 @@ class RobotLaw:
 
     def is_approaching(self, part: str) -> bool:
         """Whether the marker of the part's reach still comes nearer to its target."""
-        return self._law.still_nears(part)
+        return self._law.is_approaching(part)
 
     def marker_position(self, marker: str) -> Array:
         """Where the marker is at the measured positions, (3,) m."""
@@ -199,6 +199,6 @@ def warm_up(law: Controller, robot: Robot) -> None:
                 except InvalidValue:  # only motors of weight 0 move it: a request for such a reach is refused
                     continue
                 law.step(robot.home, min(WARM_UP_TICK, 0.5 * law.max_dt), Forces(**dict.fromkeys(law.force_names, nothing)))
-                law.still_nears(part)
+                law.is_approaching(part)
                 law.end_reach(part)
     law.reset(robot.home)

@@ -13,7 +13,7 @@ from bus_schema.rpc import JacobianAt, JacobianReply
 from mobee import Gains, Model
 from mobee.arrays import Array
 from mobee.control import constraint_forces
-from mobee.control.forces import needs_contacts, told_terms
+from mobee.control.forces import needs_contacts, published_terms
 from mobee.errors import MobeeError
 from mobee.model.contact import KINDS, Contact, touched
 from mobee.model.kinematics import quaternion_from_matrix
@@ -101,7 +101,7 @@ class ModelNode:
             self._targets.put(re_k=tick.k, positions=self._desk.positions({reach.object for reach in self._reaches.values()}))
         self._forces.put(
             re_k=tick.k,
-            terms={name: forces[name].tolist() for name in told_terms()},
+            terms={name: forces[name].tolist() for name in published_terms()},
             part_age={part: tick.t - status.t for part, status in tick.parts.items()},
             touched=self._touching,
             contacts=[_item(contact) for contact in pose.contacts] if self._tells_contacts else None,

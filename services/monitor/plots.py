@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from bus_schema.messages import Forces, Motion, Transition
-from mobee.control.forces import told_terms
+from mobee.control.forces import published_terms
 from mobee.rendering import palette
 from mobee.robot.robot import Robot
 
@@ -30,7 +30,7 @@ class Plots:
             goals = [palette.faded(color, 0.6) for color in colors]
             widths = [1.6] * len(motors) + [0.8] * len(motors)
             self._style(f"joints/{part}", [*colors, *goals], widths, names + ["goal"] * len(motors))
-        self._strengths = dict.fromkeys(told_terms(), 0.0)  # of the forces, by name
+        self._strengths = dict.fromkeys(published_terms(), 0.0)  # of the forces, by name
         self._style_forces()
         for quantity in LEARNED:
             for part, color in parts.items():

@@ -41,7 +41,7 @@ class Switch:
     def tick(self, q: Array) -> Array | None:
         """The target (n,) rad of the reflex at the measured pose q (n,) rad; None while the clients command."""
         self.q = q
-        self.violations = self._watch.look(self._track.evaluate(q))
+        self.violations = self._watch.check(self._track.evaluate(q))
         return self.reflex.tick(q, self.violations)
 
 

@@ -87,7 +87,7 @@ class Table:
         heading = rng.uniform(0.0, 2.0 * np.pi)
         pose = self.model.evaluate(q)
         position, rotation = pose.position(MARKER), pose.rotation(MARKER)
-        if self.watch.look(pose) or position[2] > HIGHEST_START:
+        if self.watch.check(pose) or position[2] > HIGHEST_START:
             return None
         for _ in range(round((HIGHEST_START + TOP) / STEP)):
             position = position - np.array([0.0, 0.0, STEP])
@@ -95,7 +95,7 @@ class Table:
             if moved is None:
                 return None
             q = moved
-            found = self.watch.look(self.model.evaluate(q))
+            found = self.watch.check(self.model.evaluate(q))
             if found:
                 return self._edge(q, position, rotation, heading) if _is_on_table(found, HAND) else None
         return None
@@ -109,7 +109,7 @@ class Table:
             if solved is None:
                 return None
             q = solved
-            low, high = (middle[2], high) if self.watch.look(self.model.evaluate(q)) else (low, middle[2])
+            low, high = (middle[2], high) if self.watch.check(self.model.evaluate(q)) else (low, middle[2])
         direction = np.array([np.cos(heading), np.sin(heading), 0.0])
         return Spot(q, np.array([*position[:2], high]), rotation, direction)
 
@@ -122,7 +122,7 @@ class Table:
             return None
         above = spot.position - BEFORE * direction
         up = self._line(back[-1], spot, [above + np.array([0.0, 0.0, z]) for z in np.arange(STEP, LIFT + 1e-9, STEP)])
-        if up is None or self.watch.look(self.model.evaluate(up[-1])):
+        if up is None or self.watch.check(self.model.evaluate(up[-1])):
             return None
         postures = np.array([*reversed(up), *reversed(back), spot.q, *into])
         return HandPath(postures, len(up))
@@ -135,7 +135,7 @@ class Table:
             if solved is None:
                 return None
             pose = self.model.evaluate(solved)
-            if not _is_on_table(self.watch.look(pose), ("l_",)):
+            if not _is_on_table(self.watch.check(pose), ("l_",)):
                 return None
             q = solved
             found.append(q)

@@ -269,7 +269,7 @@ def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: R
     for k in range(round(SECONDS / DT)):
         body.tick("position", command)
         q = body.encoders()
-        violations = table.watch.look(track.evaluate(q))
+        violations = table.watch.check(track.evaluate(q))
         target = reflex.tick(q, violations)
         truth.update(body.q, bool(violations), reflex)
         if reflex.counts.reflexes > len(control.taken):
@@ -300,11 +300,11 @@ def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
         pose = track.evaluate(q)
         controller.attractor = client.next()
         command = controller.step(q, DT, controller.forces(pose)).velocity
-        truth.update(body.q, bool(table.watch.look(pose)), None)
+        truth.update(body.q, bool(table.watch.check(pose)), None)
         if client.is_over and test is None:
             test = SettleTest(controller.gains.settle, k * DT)
         if test is not None and verdict == "moving":
-            verdict = test.look(k * DT, controller.velocity[arm], controller.acceleration[arm])
+            verdict = test.update(k * DT, controller.velocity[arm], controller.acceleration[arm])
     return verdict == "settled"
 
 

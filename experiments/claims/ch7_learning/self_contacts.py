@@ -50,7 +50,7 @@ class SelfContactPlant:
             if trace.field[at] > deepest:
                 deepest, pose = float(trace.field[at]), trace.encoders[at]
             velocity = trace.velocity[-2:, where]
-            verdict = test.look(plant.time - plant.dt, velocity[1], (velocity[1] - velocity[0]) / plant.dt)
+            verdict = test.update(plant.time - plant.dt, velocity[1], (velocity[1] - velocity[0]) / plant.dt)
             if verdict != "moving":
                 break
             ticks = _ticks(settle.interval, plant.dt)

@@ -96,37 +96,37 @@ REST = np.zeros(3)
 
 def test_a_resting_part_is_settled_at_the_first_look_and_not_before() -> None:
     test = SettleTest(SETTLE, 5.0)
-    assert [test.look(t, REST, REST) for t in (5.0, 5.5, 5.99, 6.0)] == ["moving"] * 3 + ["settled"]
+    assert [test.update(t, REST, REST) for t in (5.0, 5.5, 5.99, 6.0)] == ["moving"] * 3 + ["settled"]
 
 
 def test_between_two_looks_nobody_looks() -> None:
     test = SettleTest(SETTLE, 0.0)
-    assert test.look(1.0, np.array([0.0, 0.03, 0.0]), REST) == "moving"
-    assert [test.look(t, REST, REST) for t in (1.1, 1.19, 1.2)] == ["moving", "moving", "settled"]
+    assert test.update(1.0, np.array([0.0, 0.03, 0.0]), REST) == "moving"
+    assert [test.update(t, REST, REST) for t in (1.1, 1.19, 1.2)] == ["moving", "moving", "settled"]
 
 
 def test_one_fast_or_accelerated_motor_keeps_the_part_moving() -> None:
     for speeds, accelerations in ((np.array([0.0, -0.021]), np.zeros(2)), (np.zeros(2), np.array([-0.91, 0.0]))):
-        assert SettleTest(SETTLE, 0.0).look(1.0, speeds, accelerations) == "moving"
-    assert SettleTest(SETTLE, 0.0).look(1.0, np.array([0.02]), np.array([0.9])) == "settled"
+        assert SettleTest(SETTLE, 0.0).update(1.0, speeds, accelerations) == "moving"
+    assert SettleTest(SETTLE, 0.0).update(1.0, np.array([0.02]), np.array([0.9])) == "settled"
 
 
 def test_a_part_that_never_rests_times_out() -> None:
     test = SettleTest(SETTLE, 1.0)
-    verdicts = [test.look(1.0 + 0.01 * k, np.ones(3), REST) for k in range(2001)]
+    verdicts = [test.update(1.0 + 0.01 * k, np.ones(3), REST) for k in range(2001)]
     assert verdicts.count("timeout") == 1 and verdicts[-1] == "timeout"
 
 
 def test_ticks_that_add_up_to_almost_a_second_count_as_one() -> None:
     test = SettleTest(SETTLE, 0.1)
-    assert test.look(sum([0.01] * 110), REST, REST) == "settled"
+    assert test.update(sum([0.01] * 110), REST, REST) == "settled"
 
 
 def test_looks_missed_by_a_late_caller_are_not_made_up_for() -> None:
     test = SettleTest(SETTLE, 0.0)
-    assert test.look(1.55, np.ones(3), REST) == "moving"
-    assert test.look(1.59, REST, REST) == "moving"
-    assert test.look(1.6, REST, REST) == "settled"
+    assert test.update(1.55, np.ones(3), REST) == "moving"
+    assert test.update(1.59, REST, REST) == "moving"
+    assert test.update(1.6, REST, REST) == "settled"
 
 
 def test_a_threshold_of_zero_is_refused() -> None:

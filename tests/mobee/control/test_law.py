@@ -17,7 +17,7 @@ def test_only_motors_that_live_and_have_weight_are_moved_and_only_those_that_liv
     alive = np.zeros(len(ICUB.motors), dtype=bool)
     alive[arm.slice] = True
     law = Law(ICUB, Gains.published_2014(), alive=alive)
-    assert (len(law.active), len(law.felt)) == (7, 16)
+    assert (len(law.active), len(law.live)) == (7, 16)
     beyond = ICUB.limits[:, 1] + 0.1
     forces = Forces(*law.forces(beyond, np.ones(len(beyond))))
     assert np.all(forces.limits[alive] < 0) and not forces.limits[~alive].any()

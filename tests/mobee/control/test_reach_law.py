@@ -121,12 +121,12 @@ def test_a_reach_goes_on_with_what_it_remembers_when_the_forces_of_clients_end()
     controller = Controller(Model(ICUB), Gains.default())
     controller.reach_toward("right_arm", "right_palm", ReachTarget((-3.0, 0.1, 0.1)))
     controller.step(ICUB.home, 0.01)
-    assert controller.still_nears("right_arm")
+    assert controller.is_approaching("right_arm")
     for _ in range(100):  # the arm does not move
         controller.force(np.zeros(len(ICUB.motors)))
         controller.clear()
         controller.step(ICUB.home, 0.01)
-    assert not controller.still_nears("right_arm")
+    assert not controller.is_approaching("right_arm")
     assert felt(controller, ICUB.home).any()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from mobee.arrays import Array
 from mobee.control import Controller, Forces, State, Term, constraint_forces
-from mobee.control.forces import told_terms
+from mobee.control.forces import published_terms
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
 from mobee.simulation import OfflinePlant
@@ -36,7 +36,7 @@ TERMS = (Term("pull", pull), Term("steady", steady))
 
 def test_the_law_has_the_terms_of_the_core_and_then_those_that_are_given() -> None:
     controller = Controller(touching(), terms=TERMS)
-    assert controller.force_names == (*told_terms(), "pull", "steady") == tuple(controller.last_forces)
+    assert controller.force_names == (*published_terms(), "pull", "steady") == tuple(controller.last_forces)
     alone, model = Controller(touching()), touching()
     controller.attractor = alone.attractor = GOAL
     controller.step(STRETCHED, DT)
@@ -141,7 +141,7 @@ def test_a_term_that_gives_no_force_is_refused_by_its_name(function: Callable[[S
 
 def test_names_are_ones_own() -> None:
     for name in ("limits", "collision", "total", "items"):
-        with pytest.raises(InvalidValue, match=f"term {name!r}: there is one of that name; taken are collision, constraints, limits"):
+        with pytest.raises(InvalidValue, match=f"term {name!r}: the name is taken; taken are collision, constraints, limits"):
             OfflinePlant(touching(), terms=[Term(name, steady)])
     with pytest.raises(InvalidValue, match="'pull'"):
         Controller(touching(), terms=[TERMS[0], TERMS[0]])
@@ -156,14 +156,14 @@ def test_names_are_ones_own() -> None:
 
 def test_forces_are_a_mapping_and_their_names_are_attributes() -> None:
     forces = constraint_forces(touching().evaluate(STRETCHED), Gains.default())
-    assert list(forces) == list(told_terms()) == ["limits", "constraints", "collision"]
+    assert list(forces) == list(published_terms()) == ["limits", "constraints", "collision"]
     assert forces["collision"] is forces.collision and forces.collision.any()
     again = pickle.loads(pickle.dumps(copy.deepcopy(forces)))
     assert {name: force.tolist() for name, force in again.items()} == {name: force.tolist() for name, force in forces.items()}
     assert forces == forces and forces != again and len({forces, again}) == 2
     with pytest.raises(AttributeError, match="there is no force 'colission'"):
         _ = forces.colission
-    with pytest.raises(InvalidValue, match="constraints, collision lacking"):
+    with pytest.raises(InvalidValue, match="constraints, collision missing; give all of limits, constraints, collision"):
         Forces(np.zeros(3))
     with pytest.raises(InvalidValue, match="the law has limits, constraints, collision"):
         Forces(*np.zeros((4, 3)))

@@ -21,12 +21,12 @@ def posture(**degrees: float) -> Pose:
 
 
 def test_nothing_is_wrong_at_home() -> None:
-    assert Watch(ROBOT).look(posture()) == ()
+    assert Watch(ROBOT).check(posture()) == ()
 
 
 def test_contacts_are_told_the_deepest_first() -> None:
     pose = posture(torso_pitch=50.0)
-    found = Watch(ROBOT).look(pose)
+    found = Watch(ROBOT).check(pose)
     assert len(found) > 1
     assert {violation.kind for violation in found} == {"contact"}
     assert [violation.depth for violation in found] == sorted((c.depth for c in pose.contacts), reverse=True)
@@ -35,14 +35,14 @@ def test_contacts_are_told_the_deepest_first() -> None:
 def test_only_the_kinds_asked_for_count() -> None:
     pose = posture(torso_pitch=50.0)
     fields = [c for c in pose.contacts if c.kind == "field"]
-    assert 0 < len(fields) == len(Watch(ROBOT, kinds=("field",)).look(pose))
+    assert 0 < len(fields) == len(Watch(ROBOT, kinds=("field",)).check(pose))
 
 
 def test_a_limit_counts_beyond_the_tolerance() -> None:
     lower, upper = np.rad2deg(ROBOT.limits[ROBOT.motor_index("neck_yaw")])
     watch = Watch(ROBOT, tolerance=np.deg2rad(1.0))
-    assert watch.look(posture(neck_yaw=upper + 0.9)) == ()
-    (found,) = watch.look(posture(neck_yaw=lower - 3.0))
+    assert watch.check(posture(neck_yaw=upper + 0.9)) == ()
+    (found,) = watch.check(posture(neck_yaw=lower - 3.0))
     assert (found.kind, found.what) == ("limit", "neck_yaw")
     assert found.depth == pytest.approx(np.deg2rad(3.0))
 
@@ -54,7 +54,7 @@ def test_a_clause_is_broken_when_none_of_its_rows_is_satisfied() -> None:
     model, watch = Model(ROBOT), Watch(ROBOT, kinds=())
 
     def clauses(beyond: float) -> list[Violation]:
-        return [v for v in watch.look(model.evaluate(boundary - normal * beyond)) if v.kind == "clause"]
+        return [v for v in watch.check(model.evaluate(boundary - normal * beyond)) if v.kind == "clause"]
 
     assert clauses(np.deg2rad(0.5)) == []
     assert clauses(np.deg2rad(3.0))[0].depth == pytest.approx(np.deg2rad(3.0))

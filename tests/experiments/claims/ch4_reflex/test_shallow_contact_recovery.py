@@ -43,7 +43,7 @@ def test_a_path_goes_straight_into_the_table_at_its_angle(table: Table, spot: Sp
 def test_contact_begins_where_the_path_says(table: Table, spot: Spot) -> None:
     path = table.path(spot, np.deg2rad(45.0))
     assert path is not None
-    touching = [bool(table.watch.look(table.model.evaluate(q))) for q in path.postures]
+    touching = [bool(table.watch.check(table.model.evaluate(q))) for q in path.postures]
     first = path.start + round(BEFORE / STEP)
     assert not any(touching[: first - 1])
     assert all(touching[first + 1 :])
