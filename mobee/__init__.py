@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
-    from mobee.learning.agent import CuriousAgent
+    from mobee.learning.agent import CuriousAgent, run
     from mobee.learning.lattice import Lattice
     from mobee.learning.learner import CuriousSettings
-    from mobee.learning.parallel import run
     from mobee.learning.planner import Plan, Planner
     from mobee.learning.reaching.learner import ReachSettings
     from mobee.learning.reaching.reach_agent import ReachAgent
@@ -40,15 +39,14 @@ if TYPE_CHECKING:
     from mobee.robot.join import join_robots
     from mobee.robot.load import load_robot
     from mobee.robot.robot import Robot
-    from mobee.simulation import MotorParameters, OfflinePlant, advance_together, run_batch, run_together
+    from mobee.simulation import MotorParameters, OfflinePlant, PlantSettings, advance_together, run_batch, run_together
 
 _MODULES = {
     "mobee.control": "Command Controller Forces Gains ReachPath Reacher Term constraint_forces reach_path",
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
-    "mobee.learning.agent": "CuriousAgent",
+    "mobee.learning.agent": "CuriousAgent run",
     "mobee.learning.lattice": "Lattice",
     "mobee.learning.learner": "CuriousSettings",
-    "mobee.learning.parallel": "run",
     "mobee.learning.planner": "Plan Planner",
     "mobee.learning.reaching.learner": "ReachSettings",
     "mobee.learning.reaching.reach_agent": "ReachAgent",
@@ -77,7 +75,7 @@ _MODULES = {
     "mobee.robot.load": "load_robot",
     "mobee.model.world_file": "load_world",
     "mobee.robot.robot": "Robot",
-    "mobee.simulation": "MotorParameters OfflinePlant advance_together run_batch run_together",
+    "mobee.simulation": "MotorParameters OfflinePlant PlantSettings advance_together run_batch run_together",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -106,6 +104,7 @@ __all__ = [
     "Plan",
     "Planner",
     "Plant",
+    "PlantSettings",
     "Pose",
     "ReachAgent",
     "ReachOutcome",

@@ -12,8 +12,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
-from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.record import load_reaches
 from mobee.learning.reaching.store import reaching_parts
 from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
 from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture

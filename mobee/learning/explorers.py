@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from types import ModuleType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class Explorable(Protocol):
 
 
 Explorer = Callable[[Explorable, int, np.random.Generator], Array]
+
+
 """Gives the score of each action of a state, shape (actions,).  The highest is chosen, ties at random.
 
 The scores follow from the agent's settings and its transitions so far alone; the generator is the transition's own.
@@ -82,6 +85,8 @@ def _normal(seed: int, part: int, episode: int, shape: tuple[int, ...]) -> Array
 
 
 EQUAL = 0.01  # of the largest gain: action values that differ by less are taken for equal, as the plan's tolerance is of that size
+
+
 HORIZONS = 2.0  # how far the plan is followed, in units of 1 / (1 - discount)
 
 
@@ -177,3 +182,43 @@ def choose(scores: Array, rng: np.random.Generator) -> int:
     least = max(listed) - TIE
     ties = [action for action, score in enumerate(listed) if score >= least]
     return ties[0] if len(ties) == 1 else ties[int(rng.random() * len(ties))]
+
+
+class Draws:
+    """One generator that is set anew for every count, which takes a tenth of the time of making one.
+
+    `name`: tells apart who draws under the same seed.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._generator = _Late(np.random.PCG64(0))
+
+    def __reduce__(self) -> tuple[type[Draws], tuple[str]]:
+        return Draws, (self._name,)
+
+    def at(self, seed: int, count: int) -> np.random.Generator:
+        """The generator at the beginning of the draws of a count; valid until the next call."""
+        self._generator.waiting = f"{self._name} {seed} {count}"
+        return self._generator
+
+
+class _Late(np.random.Generator):
+    """A generator that is set when it is first asked for anything: most who get one draw nothing, and setting takes microseconds."""
+
+    waiting: str | None = None
+    """What its next state follows from; None: it is set."""
+
+    def __getattribute__(self, name: str) -> Any:
+        own = super().__getattribute__
+        waiting = own("waiting")
+        if waiting is not None:
+            self.waiting = None
+            own("bit_generator").state = _state(waiting)
+        return own(name)
+
+
+def _state(name: str) -> dict[str, Any]:
+    drawn = hashlib.blake2b(name.encode(), digest_size=32).digest()
+    state, stream = int.from_bytes(drawn[:16], "little"), int.from_bytes(drawn[16:], "little") | 1
+    return {"bit_generator": "PCG64", "state": {"state": state, "inc": stream}, "has_uint32": 0, "uinteger": 0}

@@ -9,13 +9,12 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.draws import Draws
-from mobee.learning.explorers import EXPLORERS, Explorer, choose
+from mobee.learning.explorers import EXPLORERS, Draws, Explorer, choose
 from mobee.learning.goal import Goal, pursued
-from mobee.learning.settings import Range, Settings, named
 from mobee.learning.space import Space
 from mobee.learning.transitions import Divergence, TransitionModel
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
+from mobee.settings import Range, Settings, named
 from mobee.store import Transition
 
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import NO_ACTION
-from mobee.learning.settings import named
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, Tabled
+from mobee.settings import named
 
 if TYPE_CHECKING:
     from mobee._core import learning

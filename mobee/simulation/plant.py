@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +19,10 @@ from mobee.model.contact import links_moved, touched_in
 from mobee.model.model import engine_of
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
-from mobee.simulation.actions import Actions
+from mobee.settings import Settings, accepts
+from mobee.simulation.actions import Actions, ReachesUnderWay
 from mobee.simulation.described import described
 from mobee.simulation.motors import MotorParameters, Motors
-from mobee.simulation.reaches import ReachesUnderWay
 from mobee.simulation.rigid import living, without_pairs
 from mobee.simulation.runner import Runner, Trace, Work, finished
 
@@ -29,74 +30,102 @@ if TYPE_CHECKING:
     from mobee.model.model import Model
     from mobee.model.pose import Pose
 
-CHUNK = 1000  # ticks between two moments at which a run can be broken off
+CHUNK = 1000  # ticks between two moments at which a run can be interrupted
+_RECORDED = ("gains", "motors", "dt", "propagate", "modality", "speed_scale", "contact_forces", "command_age")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantSettings(Settings):
+    """Settings of an `OfflinePlant`.
+
+    Args:
+        gains: of the control law; None: `Gains.default()`.
+        motors: parameters of the motors; None: `MotorParameters()`, with which the published findings appear.
+        dt: s, the control tick.
+        propagate: which motors a contact force acts on: those of the whole chain, "tree", or of the touching part alone, "part".
+        modality: of the commands: "velocity", "position" or "torque".
+        speed_scale: share of the motors' speed that is used, above 0 to 1.
+        contact_forces: False: f_coll is zero.
+        active: names or patterns of parts and motors that move; the others are rigid at home, without noise, and take no time; None: all.
+        command_age: ticks between reading the encoders and moving by the command computed from them; 1 as live.
+        hashed: whether `OfflinePlant.hash` is computed.
+        terms: further forces of the law, Python functions called in every tick.
+    """
+
+    gains: Gains | None = None
+    motors: MotorParameters | None = None
+    dt: float = 0.01
+    propagate: Propagate = "tree"
+    modality: Modality = "velocity"
+    speed_scale: float = 1.0
+    contact_forces: bool = True
+    active: Sequence[str] | None = None
+    command_age: int = 1
+    hashed: bool = False
+    terms: Sequence[Term] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.command_age, bool) or not isinstance(self.command_age, int) or self.command_age < 1:
+            raise InvalidValue(f"command_age {self.command_age!r}: must be a whole number of ticks, at least 1")
+        if not isinstance(self.motors, MotorParameters | None):
+            raise InvalidValue(f"motors is {self.motors!r}; it must be MotorParameters, as MotorParameters.identified(name), or None.")
 
 
 class OfflinePlant:
-    """A Plant (see `mobee.plant`) without processes, bus and clock; the seed decides everything.
+    """A Plant (see `mobee.plant`) in one process, without bus and real time; the seed determines all noise.
 
-    A command formed from the encoders of tick k moves the motors from tick k + 1 on, as live.  Several parts may be acting
-    at once: `begin` starts an action, `advance` runs until one or more are over, `act` does both for one part.
-    Parts that are not acting stay under control, at their attractors.
+    A command computed from the encoders of tick k moves the motors from tick k + 1 on, as live.  Several parts may act at once:
+    `begin` starts an action, `advance` runs until one or more have ended, `act` does both for one part.
+    Parts that are not acting are controlled too, and stay at their attractors.
 
     Args:
         model: the robot in its world.
         seed: of the encoders' noise, a whole number, 0 or more.
-        gains: of the control law; None: the default ones.
-        motors: their parameters; None: those that bring out the published findings.
-        dt: the control tick [s].
-        propagate: how far down the body a contact is felt, "tree" or "part".
-        modality: "velocity", "position" or "torque".
-        speed_scale: share of the motors' speed that is used, above 0 to 1.
-        contact_forces: False leaves f_coll at zero.
-        active: names or patterns of parts and motors that live; the others are rigid at home, without noise, and cost nothing.
-        command_age: ticks between the encoders and the motion under their command, 1 as live.
-        hashed: whether `hash` is kept.
-        terms: further forces of the law, functions in Python, which are called in every tick.
+        gains: see `PlantSettings`; None: as in `settings`.
+        motors: likewise.
+        dt: likewise.
+        settings: None: the defaults.
+        **changes: fields of `PlantSettings` by keyword, in place of those in `settings`.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
     """
 
+    @accepts(PlantSettings)
     def __init__(
         self,
         model: Model,
         seed: int = 0,
         gains: Gains | None = None,
         motors: MotorParameters | None = None,
-        dt: float = 0.01,
-        propagate: Propagate = "tree",
-        modality: Modality = "velocity",
-        speed_scale: float = 1.0,
-        contact_forces: bool = True,
-        active: Sequence[str] | None = None,
-        command_age: int = 1,
-        hashed: bool = False,
-        terms: Sequence[Term] = (),
+        dt: float | None = None,
+        *,
+        settings: PlantSettings | None = None,
+        **changes: Any,
     ) -> None:
-        alive = living(model.robot, active)
-        self._controller = Controller(model, gains, modality, propagate, speed_scale, contact_forces, alive, terms)
+        changes |= {name: value for name, value in (("gains", gains), ("motors", motors), ("dt", dt)) if value is not None}
+        chosen = PlantSettings.made(settings, changes)
+        alive, dt = living(model.robot, chosen.active), chosen.dt
+        law = {name: getattr(chosen, name) for name in ("modality", "propagate", "speed_scale", "contact_forces", "terms")}
+        self._controller = Controller(model, chosen.gains, alive=alive, **law)
         if not 0 < dt < self.controller.max_dt:
             raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
-        if isinstance(command_age, bool) or not isinstance(command_age, int) or command_age < 1:
-            raise InvalidValue(f"command_age {command_age!r}: must be a whole number of ticks, at least 1")
-        if not isinstance(motors, MotorParameters | None):
-            raise InvalidValue(f"motors is {motors!r}; it must be MotorParameters, as MotorParameters.identified(name), or None.")
         self.model, self.robot, self.dt = model, model.robot, dt
-        parameters = motors if motors is not None else MotorParameters()
+        parameters = chosen.motors if chosen.motors is not None else MotorParameters()
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
-        self._options = {"gains": self.controller.gains, "motors": parameters, "dt": dt, "propagate": propagate, "modality": modality}
-        self._options |= {"speed_scale": speed_scale, "contact_forces": contact_forces, "command_age": command_age}
-        if terms:  # a plant without them is described as before there were any
-            self._options["terms"] = [term.name for term in terms]
+        self._options = {name: getattr(chosen, name) for name in _RECORDED}
+        self._options |= {"gains": self.controller.gains, "motors": parameters}
+        if chosen.terms:  # the record of a plant without them stays as it was before there were any
+            self._options["terms"] = [term.name for term in chosen.terms]
         self._actions = Actions(self.robot, alive)
         self._touching, self._moved = engine_of(without_pairs(self.robot)), links_moved(self.robot)
-        self._runner = Runner(self._controller, self.motors, alive, dt, command_age, self._actions.parts)
+        self._runner = Runner(self._controller, self.motors, alive, dt, chosen.command_age, self._actions.parts)
         self._alive = alive
         self._ticks = 0
         self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
-        self._digest = hashlib.sha256() if hashed else None
+        self._digest = hashlib.sha256() if chosen.hashed else None
         self._reaches = ReachesUnderWay(model, self._controller)
         self._period = 0  # ticks
         self._callback: Callable[[float], None] | None = None

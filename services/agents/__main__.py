@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from services.agents.config import Config
-from services.agents.node import AgentNode
-from services.agents.reach_node import ReachNode
+from services.agents.node import AgentNode, ReachNode
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.service import Service

@@ -16,11 +16,11 @@ from mobee.learning.learner import CuriousSettings
 from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors import PREDICTORS
 from mobee.learning.reaching.strategies import STRATEGIES
-from mobee.learning.settings import Range, Settings, hints_of, require_name
 from mobee.learning.space import MAX_STATES
 from mobee.learning.transitions import DIVERGENCES
 from mobee.reach import RADIUS
 from mobee.robot.robot import Robot
+from mobee.settings import Range, Settings, hints_of, require_name
 from services.common.config import ServiceConfig
 from services.common.hands import hand_of, moved_markers
 

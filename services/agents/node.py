@@ -1,22 +1,52 @@
-"""Runs a curious agent on the live plant."""
+"""Runs an agent on the live plant: a curious agent, or one that learns to reach."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from bus_schema.messages import Transition as TransitionMessage
-from mobee import CuriousAgent
+from mobee import ActionInterrupted, CuriousAgent, ReachTarget
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import ReachStore
+from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
-from services.agents.learned import LearnedStream
-from services.agents.work import Work, tell
+from services.agents.streams import LearnedStream, ReachStream, publish_transition
 from services.common.bus_plant import BusPlant
+from services.common.hands import hand_of
 from services.common.service import Service
 
 
+class Work:
+    """The main loop of an agent's process; counts the interruptions of the measurement under way."""
+
+    def __init__(self, service: Service, plant: BusPlant) -> None:
+        self._service, self._plant = service, plant
+        self.interrupted = 0
+
+    def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
+        """Make steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, empty if it is new."""
+        self._service.ready()
+        if resumed:
+            self._service.bus.event("info", "resumed", resumed)
+        while not enough():
+            try:
+                step()
+            except ActionInterrupted as interruption:
+                self.interrupted += 1
+                self._service.bus.event("warning", "interrupted", str(interruption))
+            self._service.spin(time.monotonic())
+        if self._service.locked:
+            self._plant.leave()
+
+
 class AgentNode:
-    """A curious agent on the live plant; every transition is on disk before the next action."""
+    """Runs a curious agent on the live plant; every transition is on disk before the next action."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
@@ -30,9 +60,9 @@ class AgentNode:
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
-        """Act until the wanted number of transitions is made."""
+        """Act until the configured number of transitions is made."""
         agent, wanted = self._agent, self._config.transitions
-        resumed = f"{self._config.part} goes on after {agent.transitions} transitions" if agent.transitions else ""
+        resumed = f"{self._config.part} continues after {agent.transitions} transitions" if agent.transitions else ""
         self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
 
     def _step(self) -> None:
@@ -46,7 +76,7 @@ class AgentNode:
         self._made += 1
         self._timeouts += not made.settled
         self._seconds += made.duration
-        tell(self._stream, self._agent.space, made.n, made, value)
+        publish_transition(self._stream, self._agent.space, made.n, made, value)
         agent = self._agent
         self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 
@@ -63,3 +93,67 @@ class AgentNode:
             "action_time_mean": self._seconds / self._made if self._made else -1.0,
         }
         return f"{self._agent.transitions} transitions, {self._made} now", numbers
+
+
+class ReachNode:
+    """Runs a reach agent on the live plant; every action is on disk before the next."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        self._config = config
+        self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
+        plant = BusPlant(service, robot, (config.part,))
+        known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
+        self._agent = ReachAgent(
+            config.space(robot) if known is None else known.space,
+            plant,
+            None if known is None else known.model.debiased(),
+            marker=config.marker or hand_of(robot, config.part),
+            settings=config.reaching(),
+            store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
+        )
+        self._stream = ReachStream(service.bus, self._agent)
+        self._work = Work(service, plant)
+        self._mark()
+        service.mark, service.describe = self._mark, self._describe
+
+    def run(self) -> None:
+        """Make problem-tries until there are as many as configured."""
+        agent, wanted = self._agent, self._config.tries
+        resumed = f"{self._config.part} continues after {agent.tries} problem-tries" if agent.steps else ""
+        self._work.run(resumed, lambda: 0 < wanted <= agent.tries, self._try)
+
+    def _try(self) -> None:
+        agent = self._agent
+        if agent.under_way is None:
+            target = agent.problems.least_tried(self._targets, agent.problem_draws())
+        else:
+            target = agent.problems.targets[agent.under_way]
+        agent.begin(target)
+        agent.plant.present(target)
+        while agent.under_way is not None:
+            plan = agent.planned()
+            self._stream.put(agent.step(), target, plan)
+        made = agent.last
+        if made is None:
+            return
+        self._made += 1
+        self._failures += made.failures
+        self._reached += made.reach_state is not None
+        self._rewards += made.reward
+        self._missing += made.missing
+
+    def _mark(self) -> None:
+        self._made = self._failures = self._reached = self._work.interrupted = 0
+        self._rewards = self._missing = 0.0
+
+    def _describe(self) -> tuple[str, dict[str, float]]:
+        numbers = {
+            "tries": self._made,
+            "tries_ever": self._agent.tries,
+            "reaches": self._reached,
+            "failures": self._failures,
+            "interrupted": self._work.interrupted,
+            "reward_mean": self._rewards / self._made if self._made else -1.0,
+            "missing_mean": self._missing / self._reached if self._reached else -1.0,
+        }
+        return f"{self._agent.tries} problem-tries, {self._made} now", numbers

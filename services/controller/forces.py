@@ -12,11 +12,11 @@ from mobee.arrays import Array
 from mobee.control import Forces
 from mobee.control.forces import LARGEST_FORCE, published_terms
 from mobee.control.terms import Term, valid_terms
-from mobee.learning.settings import imported
 from mobee.model.contact import KINDS, ContactTable
 from mobee.model.pose import Pose
 from mobee.model.snapshot import Hands, Snapshot
 from mobee.robot.robot import Robot
+from mobee.settings import imported
 
 MAX_TICKS = 3  # age of forces beyond which the robot holds, and ticks that the law catches up at most
 MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under control

@@ -11,7 +11,7 @@ import rerun as rr
 from bus_schema.messages import Learned, Transition
 from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
-from mobee.learning.flat import flat
+from mobee.learning.lattice import plane_layout
 from mobee.learning.record import space_from
 from mobee.learning.space import Space
 from mobee.rendering import palette
@@ -91,7 +91,7 @@ class Learning:
             except (MobeeError, ValueError, TypeError):  # of another robot or version: its numbers cannot be placed
                 self._drawn[part] = None
             else:
-                self._drawn[part] = Drawn(space, flat(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
+                self._drawn[part] = Drawn(space, plane_layout(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
         return self._drawn[part]
 
     def _leave_out(self, part: str, told: Learned) -> None:

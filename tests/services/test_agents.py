@@ -192,7 +192,7 @@ def test_after_each_kill_it_goes_on_where_it_was(stage: Stage, rng: np.random.Ge
     assert [row["n"] for row in both] == list(range(1, len(first) + 5))
     last = [len(first) + n for n in range(1, 5)]
     wait_for(lambda: [t.n for t in stage.transitions[count:]][-4:] == last, "the last four transitions")
-    wait_for(lambda: any(f"goes on after {len(first)} transitions" in text for text in stage.told("resumed")), "the event")
+    wait_for(lambda: any(f"continues after {len(first)} transitions" in text for text in stage.told("resumed")), "the event")
 
 
 def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from experiments.kit.reaching.arm import LEARNED, MARKER, PART
 from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.arrays import Array
-from mobee.learning.reaching.learned_reaches import load_reaches
+from mobee.learning.reaching.record import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Try
 from mobee.reach import TARGET, ReachTarget

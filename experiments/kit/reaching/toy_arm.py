@@ -25,9 +25,9 @@ from experiments.kit.learning.arm import RIGHT, arm_space
 from mobee import Lattice
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.draws import Draws
+from mobee.learning.explorers import Draws
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.table import ReachTable
+from mobee.learning.reaching.tabular import ReachTable
 from mobee.learning.tabular import ideal
 from mobee.reach import ReachOutcome, ReachTarget, reward_of
 

@@ -9,19 +9,18 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.draws import Draws
-from mobee.learning.explorers import choose
+from mobee.learning.explorers import Draws, choose
 from mobee.learning.reaching.failures import failures_of, has_failed
 from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, PredictorOf, Reaches, RewardPredictor
 from mobee.learning.reaching.reaches import SCALE
 from mobee.learning.reaching.strategies import STRATEGIES, StrategyOf
 from mobee.learning.reaching.tries import Problems, Step, Try, made_of
-from mobee.learning.settings import Range, Settings, named
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachTarget
+from mobee.settings import Range, Settings, named
 
 
 @dataclass(frozen=True, kw_only=True)

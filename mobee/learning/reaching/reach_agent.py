@@ -15,12 +15,12 @@ from mobee.learning.reaching.planning import REACH, ReachPlan, plan_reach
 from mobee.learning.reaching.reaches import Reaches, reaches_of
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Step, Try
-from mobee.learning.settings import accepts
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, reward_of
+from mobee.settings import accepts
 
 
 class ReachAgent(ReachLearner):

@@ -10,7 +10,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.learning.draws import Draws
+from mobee.learning.explorers import Draws
 from mobee.plant import Plant
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
 from mobee.roadmap.adaptive.record import MapStore

@@ -18,6 +18,7 @@ from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors.nearest import Nearest
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.transitions import TransitionModel, kl_divergence
+from mobee.simulation.plant import OfflinePlant, PlantSettings
 from services.agents.config import TASK, Config
 from services.common.config import ConfigError, read_toml
 from tests.mobee.learning.reaching.toy import HANDS, SPACE, plant
@@ -41,6 +42,16 @@ def test_keywords_and_settings_make_the_same_agent():
     assert curious(settings=settings, discount=0.5).settings == curious(discount=0.5, explorer="least_tried", seed=3).settings
     reaching = ReachSettings(predictor="gp", limit=4)
     assert reacher(settings=reaching).settings == reacher(predictor="gp", limit=4).settings
+
+
+def test_a_plant_takes_settings_and_keywords():
+    model = mobee.Model(mobee.load_robot("katana"))
+    settings = PlantSettings(dt=0.005, speed_scale=0.5)
+    assert OfflinePlant(model, settings=settings).settings == OfflinePlant(model, dt=0.005, speed_scale=0.5).settings
+    with pytest.raises(UnknownName, match="Did you mean 'speed_scale'"):
+        OfflinePlant(model, speedscale=0.5)
+    with pytest.raises(UnknownName, match="Did you mean 'velocity'"):
+        PlantSettings(modality="velocty")
 
 
 @pytest.mark.parametrize("make", [curious, reacher])
@@ -67,14 +78,14 @@ def test_values_are_checked_when_settings_are_made(make, options, message):
         make(**options)
 
 
-@BOTH
+@pytest.mark.parametrize(("agent", "settings"), [*BOTH.args[1], (OfflinePlant, PlantSettings)])
 def test_the_signature_shows_every_setting_with_its_default(agent, settings):
     shown = inspect.signature(agent).parameters
     assert {one.name: one.default for one in fields(settings)} == {one.name: shown[one.name].default for one in fields(settings)}
     assert "changes" not in shown
 
 
-@BOTH
+@pytest.mark.parametrize(("agent", "settings"), [*BOTH.args[1], (OfflinePlant, PlantSettings)])
 def test_settings_say_what_each_field_means(agent, settings):
     assert re.findall(r"^        (\w+): ", settings.__doc__, re.MULTILINE) == [one.name for one in fields(settings)]
 

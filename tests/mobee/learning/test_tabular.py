@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.learning.agent import CuriousAgent
-from mobee.learning.parallel import run
+from mobee.learning.agent import CuriousAgent, run
 from mobee.learning.tabular import TabularPlant, half_space, ideal
 from tests.mobee.learning.toys import arm, torso
 from tests.mobee.learning.worlds import deep_sea, river_swim

@@ -10,13 +10,17 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.space import Space
-from mobee.learning.transitions import TransitionModel, kl_divergence
+from mobee.learning.transitions import TransitionModel, information_gain, kl_divergence
 from mobee.learning.value_iteration import value_iteration
 from mobee.reference.learning import imagined, observe
 from tests.mobee.learning.toys import arm, torso
 
 PRINTED = 5e-5
+
+
 S, ACTION, GOAL = 0, 0, 1  # the first action of state 0 aims at state 1
+
+
 OTHERS = (5, 6, 7)
 
 
@@ -202,3 +206,112 @@ def test_the_order_of_goals_in_memory_does_not_matter():
             model.observe(S, ACTION, outcome)
     plans = [value_iteration(known, model.reward)[1] for model in models for known in (model, model.debiased())]
     assert np.array_equal(plans[0], plans[2]) and np.array_equal(plans[1], plans[3])
+
+
+observations = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3), st.integers(0, 80)), max_size=40)
+
+
+def of(beliefs, s, a):
+    """The probability of each outcome that has one."""
+    return {int(o): float(p) for o, p in zip(beliefs.outcomes[s, a], beliefs.probabilities[s, a], strict=True) if p > 0}
+
+
+def test_an_untried_action_is_expected_to_succeed():
+    beliefs = TransitionModel(arm()).debiased()
+    assert of(beliefs, 0, 0) == pytest.approx({0: 0.25, beliefs.outcomes[0, 0, 1]: 0.75})
+
+
+def test_an_action_that_never_failed_is_believed_where_the_counts_doubt_it():
+    model = TransitionModel(arm())
+    beliefs, goal = model.debiased(), model.space.goal(0, 0)
+    for _ in range(10):
+        model.observe(0, 0, goal)
+    assert of(beliefs, 0, 0)[goal] == pytest.approx(10.3 / 10.4)
+    assert of(model, 0, 0)[goal] == pytest.approx(12 / 14)
+
+
+@given(observations, observations, st.sampled_from(["50-50", "60-40"]), st.sampled_from([1.0, 0.9]))
+def test_it_is_the_real_counts_over_the_prior_whenever_it_is_asked_for(before, after, initial, forgetting):
+    model = TransitionModel(arm(neighbours="equidistant"), initial, forgetting=forgetting)
+    for one in before:
+        model.observe(*one)
+    beliefs = model.debiased(goal=0.5, stay=0.2)
+    for one in after:
+        model.observe(*one)
+    real: dict[tuple[int, int], dict[int, float]] = {}
+    for s, a, outcome in before + after:
+        counts = {k: forgetting * v for k, v in real.get((s, a), {}).items()}
+        real[s, a] = counts | {outcome: counts.get(outcome, 0.0) + 1.0}
+    for (s, a), counts in real.items():
+        goal = model.space.goal(s, a)
+        weights = counts | {goal: counts.get(goal, 0.0) + 0.5}
+        weights |= {s: weights.get(s, 0.0) + 0.2}
+        assert of(beliefs, s, a) == pytest.approx({k: v / sum(weights.values()) for k, v in weights.items()})
+    assert beliefs.probabilities.sum(axis=-1) == pytest.approx(np.where(model.space.goals == -1, 0.0, 1.0))
+    assert np.array_equal(beliefs.outcomes, model.outcomes)
+
+
+def test_the_same_prior_is_the_same_object_and_others_do_not_mix():
+    model = TransitionModel(arm())
+    one, other = model.debiased(), model.debiased(goal=1.0, stay=0.0)
+    assert model.debiased() is one is not other
+    model.observe(0, 0, 40)
+    assert of(one, 0, 0)[40] == pytest.approx(1 / 1.4)
+    assert of(other, 0, 0) == pytest.approx({40: 0.5, model.space.goal(0, 0): 0.5})
+
+
+def test_a_plan_with_it_trusts_what_always_succeeded():
+    model = TransitionModel(arm(neighbours="equidistant"))
+    beliefs, action = model.debiased(), model.space.actions(79).tolist().index(80)
+    reward = np.zeros(model.reward.shape)
+    reward[80] = 1.0
+    for _ in range(20):
+        model.observe(79, action, 80)
+    trusting, doubting = (q[79, action] / v[80] for v, q in (value_iteration(one, reward) for one in (beliefs, model)))
+    assert doubting < trusting < 0.9  # the discount
+
+
+def test_what_it_shows_cannot_be_written_to():
+    beliefs = TransitionModel(arm()).debiased()
+    for array in (beliefs.probabilities, beliefs.outcomes):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 0
+
+
+@pytest.mark.parametrize("prior", [{"goal": 0.0}, {"stay": -0.1}, {"goal": float("nan")}, {"stay": float("inf")}])
+def test_a_prior_that_is_none_is_refused(prior):
+    with pytest.raises(InvalidValue, match="give counts"):
+        TransitionModel(arm()).debiased(**prior)
+
+
+@pytest.mark.parametrize(
+    ("p", "t", "printed"),
+    [
+        ((1, 2, 1), (1, 1, 1), 0.0589),
+        ((2, 1, 1), (1, 1, 1), 0.0589),
+        ((1, 1, 2, 1, 1), (1,) * 5, 0.0487),
+        ((1, 1, 1, 2, 1, 1, 1), (1,) * 7, 0.0398),
+    ],
+    ids=["6.6", "6.7", "6.8", "6.9"],
+)
+def test_equations_6_6_to_6_9(p, t, printed):
+    assert kl_divergence(p, t) == pytest.approx(printed, abs=PRINTED)
+
+
+@given(st.lists(st.floats(0.1, 1000), min_size=1, max_size=30), st.integers(0, 29))
+def test_the_closed_form_is_the_divergence_when_one_bin_grows(counts, chosen):
+    old = np.array(counts)
+    new = old.copy()
+    new[chosen % len(old)] += 1.0
+    assert information_gain(old[chosen % len(old)], old.sum()) == pytest.approx(kl_divergence(new, old), rel=1e-9, abs=1e-13)
+
+
+@given(st.floats(1, 1e9), st.floats(0, 1e9))
+def test_a_gain_is_never_negative(count, others):
+    assert information_gain(count, count + others) >= 0.0
+
+
+@pytest.mark.parametrize(("p", "t"), [((1, 0), (1, 1)), ((1, 1), (1, 0)), ((1,), (1, 1)), ((), ()), ((1, np.nan), (1, 1))])
+def test_divergence_is_refused_where_it_is_undefined(p, t):
+    with pytest.raises(InvalidValue, match="bins"):
+        kl_divergence(p, t)

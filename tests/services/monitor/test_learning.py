@@ -12,8 +12,8 @@ import pytest
 from bus_schema import VERSION
 from bus_schema.messages import Learned, Surprise, Transition
 from mobee import Lattice, TransitionModel, load_robot
-from mobee.learning.flat import flat
-from services.agents.learned import surprises
+from mobee.learning.lattice import plane_layout
+from services.agents.streams import surprises
 from tests.services.robots import ARM as OWN
 
 rr = pytest.importorskip("rerun")
@@ -98,7 +98,7 @@ def test_a_space_that_is_too_large_is_not_drawn_and_said_so_once() -> None:
 
 
 def test_of_too_many_surprises_the_likeliest_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.agents.learned.MOST", 2)
+    monkeypatch.setattr("services.agents.streams.MAX_SURPRISES", 2)
     model = TransitionModel(SPACE)
     for s, shares in ((3, 1), (15, 2), (20, 3)):
         for outcome in [s] * shares + [SPACE.goal(s, 0)]:
@@ -120,5 +120,5 @@ def test_no_two_states_are_drawn_at_one_place() -> None:
         Lattice(ROBOT, ARM, levels=(0.2, 0.4, 0.6, 0.8)),
         Lattice(ROBOT, ["torso_yaw", "torso_roll", "torso_pitch"], neighbours=8),
     ):
-        distances = np.linalg.norm(flat(space)[:, None] - flat(space), axis=-1)
+        distances = np.linalg.norm(plane_layout(space)[:, None] - plane_layout(space), axis=-1)
         assert distances[~np.eye(len(space), dtype=bool)].min() > 0.99

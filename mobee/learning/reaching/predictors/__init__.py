@@ -9,7 +9,7 @@ from mobee.learning.reaching.predictors.nearest import Nearest
 from mobee.learning.reaching.predictors.networks import Networks
 from mobee.learning.reaching.predictors.predictor import RewardPredictor
 from mobee.learning.reaching.predictors.table import Table
-from mobee.learning.reaching.predictors.thesis import Weighted
+from mobee.learning.reaching.predictors.weighted import Weighted
 from mobee.learning.reaching.reaches import Reaches
 
 __all__ = ["PREDICTORS", "PredictorOf", "Reaches", "RewardPredictor"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 OFFSET = 0.3**2  # variance of what all rewards have in common

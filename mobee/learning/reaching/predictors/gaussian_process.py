@@ -14,7 +14,7 @@ from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import Covariance, Points, joint_squares, most_likely, points, usual
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 BLOCK = 32  # rows

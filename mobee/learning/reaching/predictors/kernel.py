@@ -8,8 +8,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.learning.reaching.predictors.covariance import joint_squares
+from mobee.learning.reaching.predictors.observed import Independent, Reached, around
 from mobee.learning.reaching.predictors.predictor import DistancePrior
-from mobee.learning.reaching.predictors.reached import Independent, Reached, around
 from mobee.learning.reaching.reaches import Reaches
 
 JOINTS = (0.05, 0.15, 0.3, 0.5, 0.8)  # scales of the poses, in units of the spread of the samples

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 GIVES = (0.0, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)  # rad/m^2

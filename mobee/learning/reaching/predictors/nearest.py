@@ -9,7 +9,7 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import joint_squares
-from mobee.learning.reaching.predictors.reached import Independent, around
+from mobee.learning.reaching.predictors.observed import Independent, around
 from mobee.learning.reaching.reaches import Reaches
 
 NEIGHBOURS = 5

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.learning.reaching.predictors.reached import Reached, around
+from mobee.learning.reaching.predictors.observed import Reached, around
 from mobee.learning.reaching.reaches import Reaches
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.learning.reaching.predictors.reached import IMAGINED, Independent, around
+from mobee.learning.reaching.predictors.observed import IMAGINED, Independent, around
 from mobee.learning.reaching.reaches import Reaches
 
 NOISE = 0.05  # standard deviation of a reward around its mean, before repeats tell

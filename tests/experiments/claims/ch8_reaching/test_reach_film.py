@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching.reach_film import episodes, learn, main, selected, table_plant
-from mobee.learning.reaching.learned_reaches import load_reaches
+from mobee.learning.reaching.record import load_reaches
 from mobee.reach import TARGET
 
 

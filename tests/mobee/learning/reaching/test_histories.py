@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.histories import Histories
+from mobee.learning.reaching.histories import Histories, forget, room_for
 
 ORIGIN = np.zeros(3)
 
@@ -52,6 +52,8 @@ def test_beyond_near_nothing_counts():
 
 
 places = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
+
+
 entries = st.lists(st.tuples(st.integers(0, 3), st.integers(0, 4), st.floats(-10.0, 1.0)), max_size=40)
 
 
@@ -80,3 +82,18 @@ def test_actions_that_there_are_not_are_refused():
     for action in (-1, 2):
         with pytest.raises(InvalidValue, match="valid are 0 to 1"):
             Histories(2, 0.01).add(action, ORIGIN, 1.0)
+
+
+def test_an_array_that_is_long_enough_is_kept_and_another_grows_twice_as_long():
+    array = np.arange(4.0)
+    assert room_for(array, 3) is array
+    grown = room_for(array, 4)
+    assert grown.tolist() == [0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]
+    assert room_for(np.zeros((2, 3), dtype=int), 2).shape == (4, 3)
+
+
+@pytest.mark.parametrize(("most", "left"), [(4, "abc"), (3, "bc"), (1, "")])
+def test_what_was_put_in_first_is_forgotten_until_there_is_room_for_one_more(most, left):
+    found = {letter.encode(): 0 for letter in "abc"}
+    forget(found, most)
+    assert list(found) == [letter.encode() for letter in left]

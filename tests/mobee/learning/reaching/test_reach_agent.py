@@ -5,7 +5,7 @@ import pytest
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.table import ReachTable
+from mobee.learning.reaching.tabular import ReachTable
 from mobee.learning.tabular import ideal
 from mobee.learning.transitions import TransitionModel
 from mobee.plant import Outcome

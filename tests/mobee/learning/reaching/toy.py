@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.table import ReachTable
+from mobee.learning.reaching.tabular import ReachTable
 from mobee.learning.tabular import ideal
 from mobee.reach import ReachTarget
 from tests.mobee.learning.toys import arm

@@ -16,8 +16,8 @@ from experiments.kit.reaching.learning import Course
 from experiments.kit.reaching.planner_peer import PlannerPeer
 from mobee import Model
 from mobee.arrays import Array
-from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.record import load_reaches
 from mobee.plant import Outcome
 from mobee.reach import ReachTarget
 

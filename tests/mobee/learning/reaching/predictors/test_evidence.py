@@ -6,7 +6,7 @@ import pytest
 from mobee.learning.reaching.predictors import covariance as evidence
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, most_likely, points, surprise, usual
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches
 
 

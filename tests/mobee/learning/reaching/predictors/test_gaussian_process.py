@@ -7,7 +7,7 @@ from mobee.learning.reaching.predictors import gaussian_process
 from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
 from mobee.learning.reaching.predictors.gaussian_process import BLOCK, GaussianProcess, thinned
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
 
 

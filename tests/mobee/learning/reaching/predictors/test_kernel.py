@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.predictors.kernel import IMAGINED, JOINTS, PLACES, Kernel
-from mobee.learning.reaching.predictors.reached import EXPECTED, Reached, around
-from mobee.learning.reaching.predictors.reached import IMAGINED as PAIRS
+from mobee.learning.reaching.predictors.observed import EXPECTED, Reached, around
+from mobee.learning.reaching.predictors.observed import IMAGINED as PAIRS
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
 TRIES = 22  # the scales were chosen just then

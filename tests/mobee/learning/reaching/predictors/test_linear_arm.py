@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mobee.learning.reaching.predictors.linear_arm import GIVES, LinearArm
-from mobee.learning.reaching.predictors.reached import Reached
+from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import places, reaches
 
 ALL = np.arange(12)

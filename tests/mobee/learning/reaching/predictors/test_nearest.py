@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.predictors.nearest import CLOSE, IMAGINED, JOINT, NEIGHBOURS, WAY, Nearest
-from mobee.learning.reaching.predictors.reached import Reached, around
+from mobee.learning.reaching.predictors.observed import Reached, around
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.reached import EXPECTED, IMAGINED, SPREAD
+from mobee.learning.reaching.predictors.observed import EXPECTED, IMAGINED, SPREAD
 from mobee.learning.reaching.predictors.table import NOISE, Table
 from tests.mobee.learning.reaching.predictors.arms import places, reaches, taught
 

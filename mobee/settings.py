@@ -1,4 +1,4 @@
-"""Settings of agents: named fields with defaults and valid values, and the functions and classes that some of them name."""
+"""Settings: named fields with defaults and valid values, and the functions and classes that some of them name."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class Range:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Base of the settings of an agent: a subclass states each field once, with its type, default and meaning.
+    """Base of the settings of an agent or a plant: a subclass states each field once, with its type, default and meaning.
 
-    The signature of the agent (`accepts`), the fields of a scenario file (`services.agents.config`) and the record of a run are made
-    from these fields. Values are checked against `Range` and `Literal` annotations; a field whose type allows a string beside another
+    The signature of the constructor (`accepts`), the fields of a scenario file (`services.agents.config`) and the record of a run are
+    made from these fields.  Values are checked against `Range` and `Literal` annotations; a field whose type allows a string beside another
     type takes a name, `module:name`, or the object itself, see `named`.
 
     Raises:

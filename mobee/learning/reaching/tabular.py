@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.draws import Draws
+from mobee.learning.explorers import Draws
 from mobee.learning.space import Space
 from mobee.learning.tabular import TabularPlant
 from mobee.plant import Outcome

@@ -4,8 +4,8 @@ import pytest
 
 from mobee.errors import MobeeError, UnknownName
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.reaching.learned_reaches import load_reaches
 from mobee.learning.reaching.predictors import PREDICTORS
+from mobee.learning.reaching.record import load_reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.transitions import TransitionModel
 from mobee.store import TransitionStore

@@ -1,0 +1,109 @@
+"""Publishes the transitions of an agent, and the rewards and values of its state-actions."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from bus_schema.messages import Learned, Surprise
+from bus_schema.messages import Transition as TransitionMessage
+from mobee import ReachTarget, TransitionModel
+from mobee.arrays import Array
+from mobee.learning.reaching.planning import REACH
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.tries import Step
+from mobee.learning.space import Space
+from mobee.store import Transition
+from services.common.bus import Bus, Publisher
+
+PERIOD = 0.5  # s of wall-clock time between two `Learned` messages: in lockstep, transitions come faster than a viewer needs them
+MAX_SURPRISES = 2000  # in a message: a picture cannot show more
+
+
+def publish_transition(stream: Publisher[TransitionMessage], space: Space, n: int, made: Transition | Step, value: float) -> None:
+    """Publish a transition, the n-th of its agent; `value`: V(s) of the plan that it was part of."""
+    stream.put(
+        agent=space.part,
+        n=n,
+        s=made.s,
+        a=made.a,
+        goal=int(space.goal(made.s, made.a)),
+        s_next=made.s_next,
+        reward=made.reward,
+        value=value,
+        settled=made.settled,
+        duration=made.duration,
+        touched=list(made.touched),
+    )
+
+
+class LearnedStream:
+    """Publishes `Learned` after a transition, at most every 0.5 s."""
+
+    def __init__(self, bus: Bus, model: TransitionModel) -> None:
+        """`model`: the transition model of the agent."""
+        self._model, self._part = model, model.space.part
+        self._space = json.dumps(model.space.settings)
+        self._stream = bus.publisher(Learned, self._part)
+        self._next = -np.inf  # s, monotonic clock
+
+    def put(self, n: int, s: int, numbers: Callable[[], tuple[Array, Array]]) -> None:
+        """Publish, if the last message is old enough.  `n`, `s`: as in `Learned`; `numbers`: returns rewards and values (S, A)."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + PERIOD
+        reward, value = numbers()
+        self._stream.put(
+            agent=self._part,
+            n=n,
+            s=s,
+            space=self._space,
+            tries=self._model.tries.astype("<u4").tobytes(),
+            reward=reward.astype("<f4").tobytes(),
+            value=value.astype("<f4").tobytes(),
+            surprises=surprises(self._model),
+        )
+
+
+def surprises(model: TransitionModel) -> list[Surprise]:
+    """Return the observed outcomes that are not the goals of their actions, with their shares of the tries; the most frequent 2000."""
+    real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
+    unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
+    share = real / np.maximum(real.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
+    found = np.argwhere(unexpected)
+    if len(found) > MAX_SURPRISES:
+        found = found[np.sort(np.argsort(-share[unexpected], kind="stable")[:MAX_SURPRISES])]
+    return [Surprise(int(s), int(a), int(model.outcomes[s, a, b]), float(share[s, a, b])) for s, a, b in found]
+
+
+class ReachStream:
+    """Publishes each transition, and `Learned` with the model of them; reaches are published by the controller (`Reach`)."""
+
+    def __init__(self, bus: Bus, agent: ReachAgent) -> None:
+        self._agent, self._seen, self._count = agent, TransitionModel(agent.space), 0
+        for step in agent.store.load() if agent.store is not None else []:
+            self._note(step)
+        self._transitions = bus.publisher(TransitionMessage, agent.part)
+        self._learned = LearnedStream(bus, self._seen)
+
+    def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
+        """Publish a step towards a target, with the values V (S,) and Q (S, A + 1) of the plan that it was part of."""
+        values, action_values = plan
+        self._note(step)
+        if step.a != REACH:
+            publish_transition(self._transitions, self._agent.space, self._count, step, float(values[step.s]))
+
+        def numbers() -> tuple[Array, Array]:
+            value = action_values[:, :-1]
+            return np.where(np.isneginf(value), value, self._agent.failures.rewards(target.position)), value
+
+        self._learned.put(self._count, step.s_next, numbers)
+
+    def _note(self, step: Step) -> None:
+        if step.a != REACH:
+            self._seen.observe(step.s, step.a, step.s_next)
+            self._count += 1
