@@ -14,7 +14,7 @@ from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.timing import some_cores
 from experiments.bench.verdicts import Requirement, judged
-from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
+from experiments.claims.ch3_roadmaps.trm import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.command_line import Progress
 from experiments.kit.roadmap_task import Example

@@ -1,4 +1,4 @@
-"""A task for a roadmap: all that a map is built from.  The helpers are for tasks of the iCub."""
+"""Tasks for roadmaps: the model, the costs and the task space from which a roadmap is built, with helpers for the iCub."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
 
 Method = Literal["nes", "least_squares", "hybrid"]
-MARGIN = float(np.deg2rad(10.0))  # the default law lets no motor rest nearer to a limit
+MARGIN = float(np.deg2rad(10.0))  # rad; the default law lets no motor rest nearer to a limit
 
 LEFT, RIGHT = "left_palm", "right_palm"
 DOWN, UP, FORWARD, TO_THE_LEFT, TO_THE_RIGHT = (0, 0, -1), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 1, 0)  # root frame
@@ -49,13 +49,12 @@ BOTH_HANDS = ("torso", *LEFT_ARM, *RIGHT_ARM)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """What a map is built from by `mobee.build_roadmap`, and a motion in it for pictures.
+    """The arguments of `mobee.build_roadmap` for one roadmap, and a motion through it for pictures.
 
-    `figure`: of the thesis.  `spacing`: in the units of the task's coordinates.  `motors`: names of those that move, or of parts.
-    `start`: (n,) rad, where the search begins and what all other motors keep; None: home.  `markers`: whose positions show the map.
-    `via`: task coordinates through which the motion of the filmstrip goes, one point after the other.  `views`: of the filmstrip.
-    `margin`: what motors keep from their limits [rad]; with MARGIN the control law lets the robot rest in every pose, so maps that
-    can do with less room have it.
+    `figure`: number in the thesis.  `spacing`: in the units of the task coordinates.  `motors`: names of the moving motors or parts.
+    `start`: (n,) rad, start of the search and posture of all other motors; None: home.  `markers`: their positions show the map.
+    `via`: task coordinates through which the motion of the filmstrip passes, in order.  `views`: of the filmstrip.
+    `margin`: distance of the motors from their limits [rad]; with MARGIN the control law lets the robot rest in every pose.
     """
 
     title: str
@@ -81,7 +80,7 @@ def build(
     neighbours: int | None = None,
     longest: float | None = MAX_TURN,
 ) -> Roadmap:
-    """The map of an example."""
+    """Build the roadmap of an example."""
     return mobee.build_roadmap(
         example.model,
         costs=list(example.costs),
@@ -97,19 +96,19 @@ def build(
 
 
 def at_table() -> Model:
-    """The iCub at its empty table."""
+    """Return the model of the iCub at its empty table."""
     world = mobee.load_world("table")
     world.remove("ball")
     return Model(mobee.load_robot("icub"), world)
 
 
 def alone() -> Model:
-    """The iCub with nothing around it."""
+    """Return the model of the iCub in an empty world."""
     return Model(mobee.load_robot("icub"), World())
 
 
 def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, along: ArrayLike = FINGERS) -> None:
-    """Show an object in a hand: its middle `ahead` [m] of the palm, its z axis along a direction in the palm's frame."""
+    """Attach an object to a hand: its centre `ahead` [m] of the palm, its z axis along a direction in the palm's frame."""
     m = model.robot.marker(marker)
     z = m.rotation @ np.asarray(along, dtype=np.float64)
     x = m.normal - (m.normal @ z) * z
@@ -121,22 +120,22 @@ def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, a
 
 
 def left_aside(robot: Robot) -> Array:
-    """Home with the left arm bent, so that its hand does not touch the table when the torso leans, (n,) rad."""
+    """Return home with the left arm bent, so that its hand does not touch the table when the torso leans, (n,) rad."""
     return changed(robot.home, robot, _ASIDE, "l")
 
 
 def elbows_out(q: Array, robot: Robot, sides: str = "lr") -> Array:
-    """A posture with the elbows at the sides, (n,) rad: about it hands can turn far without a jump."""
+    """Return a posture with the elbows at the sides, (n,) rad, around which the hands can turn far without a jump."""
     return changed(q, robot, _OUT, sides)
 
 
 def grasping(q: Array, robot: Robot, sides: str = "lr") -> Array:
-    """A posture with bent fingers, (n,) rad."""
+    """Return a posture with bent fingers, (n,) rad."""
     return changed(q, robot, _BENT, sides)
 
 
 def changed(q: Array, robot: Robot, degrees: Mapping[str, float], sides: str) -> Array:
-    """A posture with other angles of some motors of the arms, (n,) rad."""
+    """Return a posture with some arm motors set to other angles, (n,) rad."""
     new = q.copy()
     for side in sides:
         for joint, angle in degrees.items():

@@ -96,7 +96,7 @@ def test_a_failure_leaves_no_file_and_the_old_one_as_it_was(run: Path, capsys: p
     before = (run / "transitions.csv").read_bytes()
     write_cell(run, Cell("wrong", 0), {"seen": np.zeros(5)}, 1.0)
     assert main(["export", str(run)]) == 2
-    assert "seen of cells/wrong.npz is no array of transitions" in capsys.readouterr().err
+    assert "seen of cells/wrong.npz is not an array of transitions" in capsys.readouterr().err
     assert (run / "transitions.csv").read_bytes() == before
     assert not list(run.glob("*.unfinished"))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.claims.ch3_roadmaps.replanning import SOON, cross, measure
-from experiments.claims.ch3_roadmaps.replanning_scene import ABOVE, LEFT, Job
+from experiments.claims.ch3_roadmaps.replanning_live import ABOVE, LEFT, Job
 
 pytestmark = pytest.mark.system
 

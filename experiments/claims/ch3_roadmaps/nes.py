@@ -1,11 +1,11 @@
-"""NES: evaluations that natural evolution strategies need, beside CMA-ES.
+"""NES: number of evaluations that natural evolution strategies need, compared with CMA-ES.
 
 Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.
 Run time: 3 minutes on 2 cores.
 
 A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
 rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  Counted are the evaluations until f < 1e-8;
-a run that never comes there counts with 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
+a run that does not get there counts with 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
 default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
 tasks": on one of the twelve at most .95 of CMA-ES's evaluations; "comparable": at most 1.5 times as many, median of the tasks.
 """
@@ -27,7 +27,7 @@ from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array
 
 DIMENSIONS = (10, 20, 41)
-QUICK_MOST = 20_000  # evaluations
+QUICK_MAX_EVALUATIONS = 20_000  # evaluations
 COSTS = {"nes": 1.0, "cma": 6.0, "xnes": 4.0, "snes": 8.0}  # beside each other
 FEWER, COMPARABLE, REQUIRED = 0.95, 1.5, 1.05  # evaluations over those of CMA-ES
 NAMES = {"nes": "the library's default", "cma": "CMA-ES", "xnes": "xNES as published", "snes": "SNES as published"}
@@ -50,8 +50,8 @@ Runs = Mapping[tuple[str, Task], Array]  # evaluations (seeds,) of every strateg
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every strategy on every task; --quick: 10 dimensions and 20 000 evaluations."""
-    dimensions, most = (DIMENSIONS[:1], QUICK_MOST) if arguments.quick else (DIMENSIONS, MAX_EVALUATIONS)
+    """Return every strategy on every task; --quick: 10 dimensions and 20 000 evaluations."""
+    dimensions, most = (DIMENSIONS[:1], QUICK_MAX_EVALUATIONS) if arguments.quick else (DIMENSIONS, MAX_EVALUATIONS)
     return [
         Condition(
             f"{strategy}-{function.replace(' ', '-')}-{d}",
@@ -65,14 +65,14 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Search once."""
+    """Run one search."""
     most = settings["most"]
     evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)
     return {"evaluations": min(evaluations, most), "found": evaluations <= most, "us": us}
 
 
 def evaluations(found: Cells) -> dict[tuple[str, Task], Array]:
-    """Evaluations of every strategy and task, (seeds,), in the order of the seeds."""
+    """Return the evaluations of every strategy and task, (seeds,), in the order of the seeds."""
     runs: dict[tuple[str, Task], list[float]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         settings = result.cell.settings
@@ -82,7 +82,7 @@ def evaluations(found: Cells) -> dict[tuple[str, Task], Array]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row a task, and the claims."""
+    """Return a row for each task, and the measured claims."""
     runs = evaluations(found)
     return {
         "evaluations": {
@@ -95,33 +95,33 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def tasks(runs: Runs) -> list[Task]:
-    """The tasks of which there are runs, in the order of the functions."""
+    """Return the tasks that have runs, in the order of the functions."""
     return [(function, d) for function in FUNCTIONS for d in DIMENSIONS if any(task == (function, d) for _, task in runs)]
 
 
 def judged(runs: Runs) -> list[Claim]:
-    """The claims with our numbers; open unless every strategy has run on every task with as many seeds."""
+    """Return the measured claims; open unless every strategy has run on every task with equally many seeds."""
     everything = [(name, (function, d)) for name in STRATEGIES for function in FUNCTIONS for d in DIMENSIONS]
     if any(key not in runs for key in everything) or len({len(runs[key]) for key in everything}) > 1:
         return list(CLAIMS)
     medians = {name: _medians(runs, name) for name in BETTER}
-    told_medians = {name: f"{estimate(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
+    median_texts = {name: f"{estimate(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
     return [
         *(_better(runs, name, claim) for name, claim in BETTER.items()),
-        *(c.measured(told_medians[name], decides(interval(medians[name]), most=COMPARABLE)) for name, c in AS_GOOD.items()),
-        AIM.measured(told_medians["nes"], decides(interval(medians["nes"]), most=REQUIRED)),
+        *(c.measured(median_texts[name], decides(interval(medians[name]), most=COMPARABLE)) for name, c in AS_GOOD.items()),
+        AIM.measured(median_texts["nes"], decides(interval(medians["nes"]), most=REQUIRED)),
     ]
 
 
 def _medians(runs: Runs, name: str) -> Array:
-    """Evaluations over those of CMA-ES from the same start, median of the tasks, (seeds,)."""
+    """Return the evaluations over those of CMA-ES from the same start, median over the tasks, (seeds,)."""
     ratios = [runs[name, task] / runs["cma", task] for task in tasks(runs)]
     medians: Array = np.median(ratios, axis=0)
     return medians
 
 
 def _better(runs: Runs, name: str, claim: Claim) -> Claim:
-    """It holds if one task's interval lies below the bound, and does not if all lie above it."""
+    """Return the measured claim; it holds if the interval of one task lies below the bound, and fails if all lie above it."""
     pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
     spans = {task: ratio_interval(*pair) for task, pair in pairs.items()}
     fewer = [task for task, span in spans.items() if span[1] <= FEWER]
@@ -135,13 +135,13 @@ def _better(runs: Runs, name: str, claim: Claim) -> Claim:
 
 
 def _share(found: Cells, strategy: str) -> str:
-    """How many of its runs came to the target."""
+    """Return the number of runs of a strategy that found the minimum, as text."""
     mine = [result.values["found"] for result in found.values() if result.cell.settings["strategy"] == strategy]
     return f"{sum(mine)} of {len(mine)}"
 
 
 def plot(found: Cells) -> Any:
-    """Evaluations against dimensions, a panel a function: interquartile means and 95 % intervals."""
+    """Draw evaluations against dimensions, a panel for each function: interquartile means and 95 % intervals."""
     runs = evaluations(found)
     drawing = new_figure(12.0, 3.4)
     for axes, function in zip(drawing.subplots(1, len(FUNCTIONS), sharey=True), FUNCTIONS, strict=True):

@@ -1,13 +1,13 @@
-"""NGIK: evaluations of natural gradient inverse kinematics, beside the optimisers that others used.
+"""NGIK: number of evaluations of natural gradient inverse kinematics, compared with other optimisers.
 
 Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.
 Source: thesis 3.1.1.  Published: no numbers.  Run time: 3 minutes on 2 cores.
 
 The right palm goes to poses (place and rotation) of random postures among 100 boxes: 5 mm, 5 degrees, no contact; all 41 motors may
-move, or torso and arm, 10.  Same cost for all; each ends at its first good pose, restarts by its own criterion where it is stuck, and
+move, or torso and arm, 10.  All have the same cost; each ends at its first good pose, restarts by its own criterion if it is stuck, and
 gives up after 20 000 evaluations.  NES as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a
-generation at once); simulated annealing; a particle filter.  Counted are the evaluations a target, those without success with all they
-took: "outperforms" needs fewer than the rival's.  Each seed has targets of its own.  Times are processor time of one core.
+generation at once); simulated annealing; a particle filter.  Counted are the evaluations per target, including targets
+without success: "outperforms" means fewer than the rival.  Each seed has its own targets.  Times are processor time of one core.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
 from mobee.arrays import Array
 
-TARGETS, QUICK_TARGETS = 20, 2  # a seed
+TARGETS, QUICK_TARGETS = 20, 2  # per seed
 FEW, WHOLE = 10, 41  # motors
 NES, XNES = "nes", "xnes"
 RIVALS = {
@@ -50,11 +50,11 @@ OUTPERFORMS = {
 }
 CLAIMS = tuple(OUTPERFORMS.values())
 
-LEAST, TICKS = 100, (100, 300, 1000, 3000, 10_000, MAX_EVALUATIONS)  # evaluations, of the figure
+MIN_SHOWN, TICKS = 100, (100, 300, 1000, 3000, 10_000, MAX_EVALUATIONS)  # evaluations, of the figure
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every solver with either number of motors; --quick: two targets a seed."""
+    """Return every solver with either number of motors; --quick: two targets per seed."""
     count = QUICK_TARGETS if arguments.quick else TARGETS
     return [
         Condition(f"{name}-{motors}", {"solver": name, "motors": motors, "targets": count}, motors)
@@ -64,12 +64,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Solve the targets of a seed, one after another."""
+    """Solve the targets of a seed one after another."""
     model, name, count = _model(), settings["solver"], settings["targets"]
     motors = MOTORS if settings["motors"] == FEW else None
     solve: Solve = library(model, "nes", motors) if name == NES else rival(model, RIVALS[name], motors)
     aims, first = targets(model, count, seed), seed * count
-    solve(aims[0], first)  # caches and lazy set-up
+    solve(aims[0], first)  # fills caches before the timing
     reached, evaluations, ms = zip(*(timed(solve, aim, number) for number, aim in enumerate(aims, first)), strict=True)
     return {"reached": np.array(reached), "evaluations": np.array(evaluations), "ms": np.array(ms)}
 
@@ -92,7 +92,7 @@ class Solver:
 
 
 def solvers(found: Cells) -> dict[tuple[str, int], Solver]:
-    """By name and motors, the seeds in their order."""
+    """Return the results by solver and number of motors, in the order of the seeds."""
     runs: dict[tuple[str, int], list[list[float]]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         values, settings = result.values, result.cell.settings
@@ -102,14 +102,14 @@ def solvers(found: Cells) -> dict[tuple[str, int], Solver]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row a solver and number of motors, and the claims."""
+    """Return a row for each solver and number of motors, and the measured claims."""
     known = solvers(found)
     rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}
     return {"solvers": rows, "claims": [claim.record() for claim in judged(known)]}
 
 
 def judged(known: Mapping[tuple[str, int], Solver]) -> list[Claim]:
-    """The claims with our numbers; open where one of the two has not run."""
+    """Return the measured claims; open where one of the two solvers has not run."""
     return [
         _judged(claim, known[ours, WHOLE], known[theirs, WHOLE]) if {(ours, WHOLE), (theirs, WHOLE)} <= known.keys() else claim
         for (ours, theirs), claim in OUTPERFORMS.items()
@@ -123,7 +123,7 @@ def _judged(claim: Claim, ours: Solver, theirs: Solver) -> Claim:
 
 
 def plot(found: Cells) -> Any:
-    """The share of the targets of all seeds reached against evaluations, a panel a number of motors."""
+    """Draw the share of targets reached against evaluations, a panel for each number of motors."""
     drawing = new_figure(10.5, 3.6)
     for axes, motors in zip(drawing.subplots(1, 2, sharey=True), (WHOLE, FEW), strict=True):
         for number, (name, label) in enumerate({NES: OURS[NES], **RIVALS}.items()):
@@ -133,8 +133,8 @@ def plot(found: Cells) -> Any:
                 reached = np.concatenate([values["reached"] for values in mine])
                 needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
                 shares = np.arange(len(needed) + 1) / len(reached)
-                axes.stairs(shares, [LEAST, *needed, MAX_EVALUATIONS], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
-        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(LEAST, MAX_EVALUATIONS), ylim=(0.0, 1.02))
+                axes.stairs(shares, [MIN_SHOWN, *needed, MAX_EVALUATIONS], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(MIN_SHOWN, MAX_EVALUATIONS), ylim=(0.0, 1.02))
         axes.set_xticks(TICKS, [f"{tick}" for tick in TICKS])
         axes.minorticks_off()
         axes.grid(alpha=0.2)

@@ -1,4 +1,4 @@
-"""Replanning: the time to a new path when a ball turns solid before the hand that moves through it.
+"""Replanning: the time to a new path when a ball becomes solid in front of the moving hand.
 
 Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2,
 fig. 4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.
@@ -6,10 +6,10 @@ Run time: 6 minutes on 2 cores, in real time.
 
 The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
 shorter through the ball than over it.  The real processes with PyBullet, in free mode, ticks of 10 ms, the default law at full speed.
-Each crossing begins on a map as it was made; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
-simulator.  Bump: the first tick at which the model says that the arm touches the ball, fields included; the motion ends there, the edge
-is out, and the arm goes on to the next vertex of the new path at once.  Under way: the first tick in which a command is in force that was
-formed after the new goal.  Besides, when the joints come no nearer to the old goal, which depends on the law.
+Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
+simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the motion ends there, the
+edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which a command is in
+force that was formed after the new goal.  Also measured: when the joints stop approaching the old goal, which depends on the law.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from experiments.claims.ch3_roadmaps.replanning_scene import (
+from experiments.claims.ch3_roadmaps.replanning_live import (
     ABOVE,
     BALL,
     LEFT,
@@ -54,7 +54,7 @@ SOONEST, LATEST = 0.1, 1.2  # s after the start of a crossing
 PIECE = 5  # crossings of a launch
 QUICK_CROSSINGS = 2
 LONGEST = 60.0  # s for a crossing
-PERFORM = "experiments.claims.ch3_roadmaps.replanning_performer:perform"
+PERFORM = "experiments.claims.ch3_roadmaps.replanning_live:perform"
 MEASURED, POSES = "measured.json", "poses.npz"
 EVERY = 5  # ticks, of the poses that are kept for pictures
 VIEW = (20.0, 35.0)  # azimuth and elevation, degrees
@@ -72,13 +72,13 @@ DEEP = 2e-3  # m
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="how many (default: 20)")
-    parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same on any machine, however busy")
-    parser.add_argument("--quick", action="store_true", help="a short version that shows whether it works")
+    parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="number of crossings (default: 20)")
+    parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same result on any machine")
+    parser.add_argument("--quick", action="store_true", help="a short version, to check that the experiment works")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Do the crossings that are not there yet."""
+    """Make the crossings that are not in the folder yet."""
     count = QUICK_CROSSINGS if arguments.quick else arguments.crossings
     after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, count)
     pieces = [after[i : i + PIECE].tolist() for i in range(0, len(after), PIECE)]
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def cross(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[str, Any]:
-    """Launch a system that does a job; its recording is left in the folder.  Raises LaunchFailed."""
+    """Launch a system that makes the crossings of a job, recorded in the folder; returns its summary.  Raises LaunchFailed."""
     write_job(folder, job)
     worlds = {"world": str(WORLD), "simulated": str(SIMULATED)}
     seconds = LONGEST * (1 + len(job.after))
@@ -106,17 +106,17 @@ def cross(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[str
 def _crossings(folder: Path) -> list[Measured]:
     found = [one for path in sorted(folder.glob(f"launch-*/{MEASURED}")) for one in read_measured(path.parent)]
     if not found:
-        raise InvalidValue(f"{folder} has no finished launch: it was stopped before the first was over.")
+        raise InvalidValue(f"{folder} has no finished launch: the run was stopped before the first was over.")
     return found
 
 
 class Measured(Struct, frozen=True):
-    """A crossing."""
+    """Measures of a crossing."""
 
-    bumped: bool  # the ball was felt on the short path
+    bumped: bool  # the arm touched the ball on the short path
     command: float  # ms from the bump to the first command in force that was formed after the new goal
-    turn: float  # ms from the bump until the joints come no nearer to the old goal
-    on: list[int]  # its targets, vertices
+    turn: float  # ms from the bump until the joints stop approaching the old goal
+    on: list[int]  # its targets in order, vertices
     arrived: bool
     seconds: float  # from the start to the other side
     deepest: float  # m, of a solid contact with the ball, by the simulator
@@ -137,12 +137,12 @@ def measure(folder: Path) -> list[Measured]:
 
 
 def read_measured(folder: Path) -> list[Measured]:
-    """The measures that `measure` wrote."""
+    """Read the measures written by `measure`."""
     return msgspec.json.decode((folder / MEASURED).read_bytes(), type=list[Measured])
 
 
 def keep_poses(folder: Path) -> None:
-    """Of the first crossing, keep poses and times for pictures: `q` (T, n) rad, `times` (T,) s, and those of `solid` and `bump`."""
+    """Save poses of the first crossing for pictures: `q` (T, n) rad, `times` (T,) s, and the times [s] of `solid` and `bump`."""
     q, crossing = read_positions(folder, robot()), read_done(folder, Crossing)[0]
     ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)
     solid, bump = ((tick - ticks[0]) / RATE for tick in (crossing.solid, _bump(crossing)))
@@ -167,14 +167,14 @@ def _measured(crossing: Crossing, q: Array, deepest: float) -> Measured:
 
 
 def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
-    """Ticks from a bump until the arm is nearest to a vertex; row k - 2 of q (T, n) rad is of the beginning of tick k."""
+    """Return the ticks from a bump until the arm is nearest to a vertex; row k - 2 of q (T, n) rad is the beginning of tick k."""
     space = new_map().space
     arm = q[:, robot().parts[PART].slice][:, space.columns]
     return int(np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1).argmin())
 
 
 def findings(crossings: Sequence[Measured]) -> dict[str, Any]:
-    """The numbers and the claims."""
+    """Return the numbers and the measured claims."""
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
     if bumped:
@@ -213,7 +213,7 @@ def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[C
 
 
 def figure(folder: Path) -> Path:
-    """Two rows of pictures, through the ball and around it, as in thesis figure 4.7; the times are drawn into a file of their own."""
+    """Draw two rows of pictures as in thesis figure 4.7, through the ball and around it; the times go into a second file."""
     plot_times(_crossings(folder)).savefig(folder / "replanning-times.png", dpi=110)
     kept = np.load(next(path for path in sorted(folder.glob("launch-*")) if (path / POSES).exists()) / POSES)
     solid, bump = float(kept["solid"]), float(kept["bump"])
@@ -232,7 +232,7 @@ def figure(folder: Path) -> Path:
 
 
 def _through_ball() -> Array:
-    """The edge through the ball, (T, n) rad."""
+    """Return poses on the edge through the ball, (T, n) rad."""
     space = new_map().space
     q = np.repeat(robot().home[None], STEPS, axis=0)
     shares = np.linspace(0.0, 1.0, STEPS)[:, None]
@@ -241,7 +241,7 @@ def _through_ball() -> Array:
 
 
 def _motion(q: Array, times: Array, solid: float) -> Motion:
-    """Poses and times, with the ball solid from a time on."""
+    """Return the motion with these poses and times; the ball is solid from the time `solid` [s]."""
     known, poses, objects = model(), [], []
     for row, t in zip(q, times, strict=True):
         if t >= solid and known.world.objects[BALL].role == "ghost":
@@ -252,7 +252,7 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
 
 
 def plot_times(crossings: Sequence[Measured]) -> Any:
-    """The share of crossings in which the new path was under way so soon."""
+    """Draw the distribution of the times from the bump to the new path."""
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()
     for name, label in (("command", "a command of the new path is in force"), ("turn", "the joints come no nearer to the old goal")):
@@ -267,7 +267,7 @@ def plot_times(crossings: Sequence[Measured]) -> Any:
 
 EXPERIMENT = Experiment(
     name="replanning",
-    claim="when a ball turns solid on the way, the way around it is taken at once",
+    claim="when a ball on the path becomes solid, the hand takes the path around it at once",
     source="thesis 4.3.2, fig. 4.7",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

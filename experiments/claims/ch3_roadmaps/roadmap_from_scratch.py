@@ -1,45 +1,31 @@
 """Roadmap from scratch: random poses, joined without verification, and explored by the robot itself.
 
 Claim: a map of 20 random samples, each joined to its 10 nearest neighbours without verifying an edge, is explored by commands
-alone; infeasible edges are removed as they are met, until the feasible sub-graph is known.  Source: thesis 4.3.1, fig. 4.6.
+alone; infeasible edges are removed when they are found, until the feasible sub-graph is known.  Source: thesis 4.3.1, fig. 4.6.
 Published: "approximately 90 minutes" at 10 % of maximum velocity; "small, randomly generated graphs often contain unreachable
 vertices and edges".  Run time: a minute on 2 cores offline; `--live` about 15 minutes more.
 
 Seven joints of the right arm of `icub` at its table under the default law, at 10 % speed; on the offline plant with the identified
 motors, and with `--live` also by the real processes in lockstep with PyBullet.  A vertex is reached within 0.15 rad in every
-joint; where an edge failed the arm goes back.  Targets are drawn in proportion to untried edges; where no untried edge can
-be reached any more, RRT-Connect is asked for a single path to a vertex with some, up to three times a vertex.  Every edge that was tried is
-then tried once more from rest at its vertex, by another plant: whether both agree.  Solid contacts of the simulator's list of
-pairs: offline by the model, from the true joints every 0.1 s; live by PyBullet, every tick.
+joint; after a failed edge the arm goes back.  Targets are drawn in proportion to untried edges; when no untried edge can be
+reached any more, RRT-Connect plans a path to a vertex with untried edges, up to three times per vertex.  Every tried edge is then
+tried once more from rest at its vertex, by another plant, to see whether both agree.  Solid contacts of the simulator's list of
+pairs are measured offline by the model, from the true joints every 0.1 s, and live by PyBullet, every tick.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import (
-    DEEP,
-    DONE,
-    JOB,
-    MARKER,
-    PART,
-    RATE,
-    SAMPLES,
-    SPEED,
-    agreement,
-    explored,
-    explorer,
-    joints,
-    offline_plant,
-    outcome,
-    robot,
-)
 from experiments.kit.cells import load_cells
+from experiments.kit.control.plant_runs import place
+from experiments.kit.control.safety import is_listed
 from experiments.kit.experiment import Claim, Experiment, Steps
 from experiments.kit.live.launch import TABLE, launch
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_touches
@@ -47,32 +33,160 @@ from experiments.kit.plots import new_figure
 from experiments.kit.run_folder import read, write
 from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, Condition, Sweep
-from mobee import Model
+from mobee import (
+    ActionInterrupted,
+    AdaptiveRoadmap,
+    Gains,
+    MapExplorer,
+    MobeeError,
+    Model,
+    MotorParameters,
+    OfflinePlant,
+    Plant,
+    Voronoi,
+    load_robot,
+    load_world,
+)
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.roadmap.adaptive.record import MapStore
-from mobee.roadmap.ompl import require_ompl
+from mobee.roadmap.adaptive.walker import NEAR
+from mobee.roadmap.ompl import query, require_ompl
+from mobee.robot.robot import Robot
+from services.common.bus_plant import BusPlant
+from services.common.service import Service
+
+ROBOT, PART, MARKER = "icub", "right_arm", "right_palm"
+JOINTS, SAMPLES, NEIGHBOURS = 7, 20, 10  # thesis 4.3.1: 20 and 10, of the whole upper body
+RATE, SPEED = 50.0, 0.1  # Hz; share of the motors' speed, thesis 4.3.1
+MAX_EXTENSIONS = 500  # of a single query
+MAX_DEPTH = 2e-3  # m, of a solid contact
+SAMPLING = 5  # ticks, 0.1 s
+JOB, DONE = "job.json", "done.json"
+
+
+@cache
+def robot() -> Robot:
+    """Return the robot."""
+    return load_robot(ROBOT)
+
+
+def model() -> Model:
+    """Return the model of the robot at its table."""
+    return Model(robot(), load_world(str(TABLE)))
+
+
+def joints() -> tuple[str, ...]:
+    """Return the names of the joints of the map."""
+    return robot().parts[PART].motors[:JOINTS]
+
+
+def new_map(seed: int) -> AdaptiveRoadmap:
+    """Return a map of random poses joined to their nearest neighbours, not verified."""
+    return AdaptiveRoadmap(Voronoi(robot(), joints(), SAMPLES, seed, NEIGHBOURS))
+
+
+def offline_plant(seed: int) -> OfflinePlant:
+    """Return a plant of the arm with the motors that were identified on PyBullet."""
+    motors = MotorParameters.identified(ROBOT)
+    return OfflinePlant(model(), seed, Gains.named("default"), motors, 1.0 / RATE, speed_scale=SPEED, active=joints())
+
+
+def explorer(plant: Plant, seed: int, store: MapStore | None = None) -> MapExplorer:
+    """Return the explorer of the map of a seed; its single queries know the table."""
+    paths = query(model(), joints(), robot().home, seed, MAX_EXTENSIONS)
+    return MapExplorer(new_map(seed), plant, seed=seed, query=paths, store=store)
+
+
+class Depth:
+    """Records the deepest contact of listed solids, by the model, in the true postures of a plant."""
+
+    def __init__(self, plant: OfflinePlant) -> None:
+        self._plant = plant
+        self.deepest, self.pair = 0.0, ""
+        plant.every(SAMPLING, self._update)
+
+    def _update(self, time: float) -> None:
+        for contact in self._plant.model.evaluate(self._plant.motors.q).contacts:
+            if contact.kind == "solid" and contact.depth > self.deepest and is_listed(contact.first, contact.second):
+                self.deepest, self.pair = float(contact.depth), f"{contact.first} {contact.second}"
+
+
+def explored(seed: int, most: int | None = None) -> dict[str, Any]:
+    """Explore the map of a seed, at most `most` edges; returns the map and measures of the exploration."""
+    plant = offline_plant(seed)
+    depth, search = Depth(plant), explorer(plant, seed)
+    minutes: list[float] = []
+    finished, reason = False, ""
+    try:
+        while not finished and (most is None or len(minutes) < most):
+            finished = search.explore(1)
+            minutes.append(plant.time / 60.0)
+    except MobeeError as error:
+        reason = str(error)
+    found = outcome(search.roadmap, search.repairs)
+    found |= {"finished": finished, "why": reason, "minutes": np.array(minutes), "deepest": depth.deepest, "pair": depth.pair}
+    return found | {"agree": agreement(search.roadmap, seed + 1000)}
+
+
+def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
+    """Return the map and its observations as arrays."""
+    beliefs, space = roadmap.beliefs, roadmap.space
+    return {"samples": space.samples, "goals": space.goals, "tried": beliefs.tried, "feasible": roadmap.feasible, "repairs": repairs}
+
+
+def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
+    """Try each tried edge once more from rest at its vertex; returns (E,) whether the outcomes agree."""
+    plant, space = offline_plant(seed), roadmap.space
+    same = []
+    for state, action in np.argwhere(roadmap.beliefs.tried > 0).tolist():
+        whole = plant.robot.home.copy()
+        whole[plant.robot.parts[PART].slice] = space.target(state)
+        place(plant, whole)
+        goal = space.goal(state, action)
+        off = np.abs(plant.act(PART, space.target(goal)).q[space.columns] - space.samples[goal]).max()
+        same.append((off <= NEAR) == roadmap.beliefs.last[state, action])
+    return np.array(same, dtype=bool)
+
+
+def perform(service: Service, folder: Path) -> None:
+    """Explore the map of the job in the folder on the live robot."""
+    job = read(folder / JOB)
+    with MapStore(job["store"], PART) as store:
+        plant = BusPlant(service, robot(), (PART,))
+        search = explorer(plant, job["seed"], store)
+        service.ready()
+        plant.measure(PART)
+        finished, most = False, job["most"]
+        while not finished and (most is None or search.record.transitions < most):
+            try:
+                finished = search.explore(1)
+            except ActionInterrupted:
+                continue
+        write(folder / DONE, {"finished": finished, "repairs": search.repairs})
+        plant.leave()
+
 
 QUICK = 30  # edges
-STORE, LONGEST = "map.sqlite", 8 * 3600.0  # of the live run; s of robot time
-PERFORM = "experiments.claims.ch3_roadmaps.roadmap_from_scratch_performer:perform"
+STORE, MAX_SECONDS = "map.sqlite", 8 * 3600.0  # of the live run; s of robot time
+PERFORM = "experiments.claims.ch3_roadmaps.roadmap_from_scratch:perform"
 CLAIMS = (
     Claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes"),
     Claim("thesis 4.3.1", "small, randomly generated graphs often contain unreachable vertices", "often"),
     Claim("thesis 4.3.1", "rollback works robustly, so that what was found of an edge stands: tried again from rest it does the same", "-"),
     Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0"),
 )
-AGREE = 0.95
+MIN_AGREEMENT = 0.95  # share of edges
 STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not tried": ("0.75", 0.6)}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The live run."""
+    """Add the option of the live run."""
     parser.add_argument("--live", action="store_true", help="also explore the first seed's map by the real processes, in lockstep")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """A map a seed; --quick: with few edges."""
+    """Return one condition, a map for each seed; --quick: with few edges."""
     return [Condition("quick-map" if arguments.quick else "map", {"most": QUICK if arguments.quick else None})]
 
 
@@ -82,7 +196,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def explore_live(folder: Path, seed: int, most: int | None) -> None:
-    """Explore the map of a seed on the live robot, or go on: observations are in the store, each launch has a folder for its recording."""
+    """Explore the map of a seed on the live robot, or continue.
+
+    Observations are in a store; each launch has a folder for its recording.
+    """
     folder.mkdir(exist_ok=True)
     if (folder / DONE).exists():
         return
@@ -90,12 +207,12 @@ def explore_live(folder: Path, seed: int, most: int | None) -> None:
     place = folder / f"launch-{number:03}"
     place.mkdir()
     write(place / JOB, {"seed": seed, "most": most, "store": str((folder / STORE).resolve())})
-    summary = launch(place, PERFORM, title="Roadmap from scratch", world=str(TABLE), seed=seed, rate=RATE, speed=SPEED, seconds=LONGEST)
+    summary = launch(place, PERFORM, title="Roadmap from scratch", world=str(TABLE), seed=seed, rate=RATE, speed=SPEED, seconds=MAX_SECONDS)
     write(folder / DONE, {**read(place / DONE), "seed": seed, "repeatable": summary["lockstep"]["repeatable"]})
 
 
 def read_live(folder: Path) -> dict[str, Any] | None:
-    """The map and measures of the exploration, None if it was not finished."""
+    """Read the map and the measures of the live exploration; None if it is not finished."""
     if not (folder / DONE).exists():
         return None
     done = read(folder / DONE)
@@ -116,7 +233,7 @@ def read_live(folder: Path) -> dict[str, Any] | None:
 
 
 def unreached(values: Mapping[str, Any]) -> int:
-    """How many of the samples were never reached."""
+    """Return the number of samples that were never reached."""
     goals, feasible = values["goals"], values["feasible"]
     reached = np.zeros(len(goals), dtype=bool)
     reached[goals[feasible]] = True
@@ -125,7 +242,7 @@ def unreached(values: Mapping[str, Any]) -> int:
 
 
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """A row a map, and the claims."""
+    """Return a row for each map, and the measured claims."""
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
     if live is not None:
@@ -162,8 +279,8 @@ def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[
     if live is not None:
         lived = f"live {1e3 * live['deepest']:.1f} mm in {live['hours']:.1f} h and {live['touches']} touches"
         explored += f"; live {60.0 * live['hours']:.0f} minutes"
-        holds = live["deepest"] <= DEEP if live["finished"] else None
-    agrees = bool(np.mean(agree) >= AGREE)
+        holds = live["deepest"] <= MAX_DEPTH if live["finished"] else None
+    agrees = bool(np.mean(agree) >= MIN_AGREEMENT)
     return [
         CLAIMS[0].measured(explored, len(done) == len(maps)),
         CLAIMS[1].measured(f"{with_gaps} of {len(done)} maps of seven joints", 2 * with_gaps > len(done)),
@@ -173,7 +290,7 @@ def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[
 
 
 def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
-    """Three panels: the map as it was joined, the explored map, edges over time."""
+    """Draw three panels: the map before exploration, the explored map, edges over time."""
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     drawing = new_figure(15.0, 4.8)
     before, after, course = drawing.subplots(1, 3)
@@ -181,7 +298,7 @@ def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
     places = _places(values["samples"])
     exists = values["goals"] >= 0
     _edges(before, values, exists & (np.arange(len(exists)) < SAMPLES)[:, None] & (values["goals"] < SAMPLES), places, "0.4", 0.8)
-    before.set_title(f"{SAMPLES} random poses, nothing verified")
+    before.set_title(f"{SAMPLES} random poses, not verified")
     kinds = {
         "not tried": exists & (values["tried"] == 0),
         "failed": (values["tried"] > 0) & ~values["feasible"],
@@ -208,7 +325,7 @@ def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
 
 
 def _places(samples: Array) -> Array:
-    """Where the palm is in each pose, seen from the front, (V, 2) m."""
+    """Return the positions of the palm in the poses, seen from the front, (V, 2) m."""
     whole = np.repeat(robot().home[None], len(samples), axis=0)
     whole[:, [robot().motor_index(joint) for joint in joints()]] = samples
     places: Array = Model(robot()).evaluate(whole).position(MARKER)[:, 1:]
@@ -228,7 +345,7 @@ SWEEP = Sweep(conditions, trial, findings, plot, add_options=add_options, requir
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Explore the maps that the folder does not hold yet, and with --live the first also on the live robot."""
+    """Explore the maps that are not in the folder yet, and with --live the first one also on the live robot."""
     SWEEP.run(arguments, folder)
     if arguments.live:
         explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)
@@ -239,7 +356,7 @@ def figure(folder: Path) -> Path:
     """Draw the maps; raises InvalidValue if there are none."""
     found = load_cells(folder)
     if not found:
-        raise InvalidValue(f"{folder} has no finished cells: it was stopped before the first.")
+        raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
     path = folder / "figure.png"
     plot(found, read_live(folder / "live")).savefig(path, dpi=110)
     return path
@@ -247,7 +364,7 @@ def figure(folder: Path) -> Path:
 
 EXPERIMENT = Experiment(
     name="roadmap-from-scratch",
-    claim="a map that nobody verified is explored by the robot until its feasible part is known, without harm",
+    claim="the robot explores an unverified map until its feasible part is known, without harmful contacts",
     source="thesis 4.3.1, fig. 4.6",
     notes=__doc__,
     method=Steps(SWEEP.add_arguments, run, figure),

@@ -16,12 +16,15 @@ import argparse
 import importlib
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
+import mobee
 from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell, CellResult, load_cells
@@ -32,12 +35,107 @@ from experiments.kit.sweep import Cells, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.sheet import write_sheet
+from mobee.roadmap.building.lattice_builder import Patience, lattice_poses
+from mobee.roadmap.building.task_ik import TaskIK
+from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.graph import nearest_before
+from mobee.roadmap.ik.problem import Cost, Problem, solid_robot
 from mobee.roadmap.roadmap import Roadmap
 
+FINER = 2  # points of the dense lattice per spacing
+GENEROUS = Patience(starts=16, tries=24, hopeless=8, scouts=2048)
+RANDOM_POINTS, STARTS = 2000, 20  # random task points, and random starts for each
+MAX_OFFSET = 0.05  # of a pose from such a point, in spacings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """Distances of reachable task points from the vertices of a map.
+
+    `reachable`: task points (R, m).  `far`: (R,) distance of each from its nearest vertex, in spacings.
+    """
+
+    reachable: Array
+    far: Array
+
+    @property
+    def share(self) -> float:
+        """The share of the reachable task points within a spacing of a vertex."""
+        return float((self.far <= 1.0).mean())
+
+    @property
+    def largest_hole(self) -> float:
+        """The largest distance of a reachable task point from its nearest vertex, in spacings."""
+        return float(self.far.max())
+
+
+def reachable(
+    model: mobee.Model,
+    costs: Sequence[Cost],
+    task: Task,
+    spacing: Array,
+    motors: Sequence[str] | None = None,
+    start: Array | None = None,
+    margin: float = 0.0,
+    seed: int = 1,
+) -> Array:
+    """Return a dense set of reachable task points (R, m).
+
+    They are found by least squares on a lattice of half the spacing (m,) with many more starts per point than a map uses, and by
+    random starts at random points, which do not depend on neighbours.
+    """
+    rng = np.random.default_rng(seed)
+    problem = Problem(model, costs, start, motors, margin)
+    _, dense = lattice_poses(problem, task, spacing / FINER, rng, patience=GENEROUS)
+    return np.concatenate([dense, _random_reachable(problem, task, spacing, rng)])
+
+
+def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
+    """Return how vertices y (V, m) cover the reachable task points (R, m) and themselves, at a spacing (m,)."""
+    points = np.concatenate([points, y])
+    far, _ = cKDTree(y / spacing).query(points / spacing)
+    return Coverage(points, np.asarray(far))
+
+
+def valid(
+    model: mobee.Model,
+    costs: Sequence[Cost],
+    task: Task,
+    q: Array,
+    y: Array,
+    motors: Sequence[str] | None = None,
+    start: Array | None = None,
+) -> NDArray[np.bool_]:
+    """Return (V,) whether poses q (V, n) meet all tolerances, limits and the box, and are at y (V, m), by python-fcl."""
+    reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
+    pose = reference.evaluate(q)
+    low, high = model.robot.limits.T
+    good: NDArray[np.bool_] = ((q >= low) & (q <= high)).all(axis=1)
+    there = task.of(pose)
+    good &= (np.abs(there - y) <= 1e-9).all(axis=1) & ((there >= task.box[:, 0]) & (there <= task.box[:, 1])).all(axis=1)
+    problem = Problem(model, costs, start, motors)
+    good &= (np.delete(q - problem.start, problem.free, axis=1) == 0.0).all(axis=1)  # only the free motors moved
+    for one in problem.terms:
+        if one.tolerance is not None:
+            good &= one.residual(pose) <= one.tolerance
+    return good
+
+
+def _random_reachable(problem: Problem, task: Task, spacing: Array, rng: np.random.Generator) -> Array:
+    """Return the random points of the box that random starts reach, (B, m)."""
+    low, high = task.box.T
+    points = np.repeat(rng.uniform(low, high, (RANDOM_POINTS, len(low))), STARTS, axis=0)
+    ik = TaskIK(problem, task, MAX_OFFSET * spacing)
+    _, there, wrong, _ = ik.solve(points, ik.random_starts(len(points), rng))
+    met = np.flatnonzero(wrong == 0.0)
+    _, once = np.unique(met // STARTS, return_index=True)
+    found: Array = there[met[once]]
+    return found
+
+
 METHODS: tuple[Method, ...] = ("nes", "least_squares")
-COSTS = {"nes": 15.0, "least_squares": 2.0}  # beside each other
+COSTS = {"nes": 15.0, "least_squares": 2.0}  # relative durations of cells
 QUICK = ("inspect", "push-over", "unscrew")
 SHEET_COLUMNS, HEIGHT = 4, 240  # panels; pixels of one
 
@@ -67,7 +165,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """The reachable part of every task, and its maps by every method with every seed; --quick: three small ones."""
+    """Return a cell for the reachable part of every task, and for its maps by every method and seed; --quick: three small tasks."""
     tasks = arguments.tasks or (QUICK if arguments.quick else tuple(EXAMPLES))
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
     reach = [Cell(f"{task}-{REACH}", arguments.seed, {"task": task, "method": REACH}, 20.0) for task in tasks]
@@ -81,7 +179,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """One map with its measures, or the task points that can be reached."""
+    """Build one map and measure it, or find the reachable task points."""
     example, method = EXAMPLES[cell.settings["task"]](), cell.settings["method"]
     if method == REACH:
         spacing = np.broadcast_to(example.spacing, len(example.task.names)).astype(np.float64)
@@ -90,14 +188,14 @@ def work(cell: Cell) -> dict[str, Any]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Build the maps that the folder does not hold yet."""
-    importlib.import_module("mobee.model.fcl_engine")  # raises NotInstalled before anything is begun
+    """Build the maps that are not in the folder yet."""
+    importlib.import_module("mobee.model.fcl_engine")  # raises NotInstalled before anything is computed
     run_cells(work, cells(arguments), folder, arguments)
     return findings(load_cells(folder))
 
 
 def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
-    """The measures of a map, and the map itself as arrays."""
+    """Build a map; returns its measures and the map itself as arrays."""
     start, wall = time.process_time(), time.perf_counter()
     roadmap = build(example, method, seed)
     wall, processor = time.perf_counter() - wall, time.process_time() - start
@@ -121,13 +219,13 @@ def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
 
 
 def rebuilt(example: Example, values: Mapping[str, Any]) -> Roadmap:
-    """The map from the values of `built`."""
+    """Return the map from the values of `built`."""
     q, y, edges, spacing = (values[name] for name in ("q", "y", "edges", "spacing"))
     return Roadmap(example.model, q, y, edges, spacing, {"names": list(example.task.names)})
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The table, and the claims."""
+    """Return the table of the maps, and the measured claims."""
     runs = maps(found)
     table: dict[str, dict[str, dict[str, str]]] = {}
     for (task, method), columns in runs.items():
@@ -136,7 +234,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def maps(found: Cells) -> dict[Key, dict[str, Array]]:
-    """The numbers of every map, (seeds,) each, in the order of the examples and the seeds; coverage where the reach is known."""
+    """Return the numbers of every map, (seeds,) each, in the order of examples and seeds; coverage NaN if the reach is unknown."""
     reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
     built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
     runs: dict[Key, dict[str, Array]] = {}
@@ -150,7 +248,7 @@ def maps(found: Cells) -> dict[Key, dict[str, Array]]:
 
 
 def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
-    """The claims with our numbers; open unless every task was mapped by both methods."""
+    """Return the measured claims; open unless every task was mapped by both methods."""
     if any((task, method) not in runs for task in EXAMPLES for method in NAMES):
         return list(CLAIMS)
     figures = [task for task in EXAMPLES if task != PREGRASP]
@@ -161,7 +259,7 @@ def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
     most = float(runs[slowest, NES]["processor_s"].max())
     sound = sum(float((one["valid"] * one["vertices"]).sum()) for one in runs.values())
     poses = sum(float(one["vertices"].sum()) for one in runs.values())
-    return [  # of the map-making the thesis' own method decides
+    return [  # the thesis' own method decides the claim on maps
         MAPS.measured("; ".join(f"{NAMES[method]}: {_least(shares)}" for method, shares in covered.items()), holds),
         VALID.measured(f"{sound:.0f} of {poses:.0f} poses", round(sound) == round(poses)),
         GRAPH.measured("; ".join(f"{NAMES[method]}: {_least(_connected(runs, method))}" for method in NAMES), _whole(runs)),
@@ -171,7 +269,7 @@ def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
 
 
 def _points(reach: Array | None, maps: Sequence[CellResult], own: CellResult) -> Array | None:
-    """The task points that the search or any other map reached, (R, m)."""
+    """Return the task points reached by the search or by any other map, (R, m)."""
     return None if reach is None else np.concatenate([reach, *(one.values["y"] for one in maps if one is not own)])
 
 
@@ -201,14 +299,14 @@ def _digits(column: str) -> int:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the cloud of every task's first map, by evolution where there is one; raises InvalidValue if there is none."""
+    """Draw the cloud of the first map of every task, if possible one by evolution; raises InvalidValue without maps."""
     found = load_cells(folder)
     finished = [one for one in found.values() if one.cell.settings["method"] != REACH]
     finished.sort(key=lambda one: (list(NAMES).index(one.cell.settings["method"]), one.cell.seed), reverse=True)
     chosen = {one.cell.settings["task"]: one for one in finished}
     tasks = [task for task in EXAMPLES if task in chosen]
     if not tasks:
-        raise InvalidValue(f"{folder} has no finished maps: it was stopped before the first.")
+        raise InvalidValue(f"{folder} has no finished maps: the run was stopped before the first.")
     panels = []
     for task in tasks:
         example = EXAMPLES[task]()

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch4_reflex.babbling_commands import ROBOT
 from experiments.claims.ch4_reflex.babbling_trial import (
     MODES,
     RATE,
+    ROBOT,
     TITLES,
     Judged,
     Outcome,

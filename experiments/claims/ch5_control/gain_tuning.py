@@ -1,6 +1,6 @@
 """Tune: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
 
-Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `tune_criteria.py`: settling
+Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling
 time, overshoot, solids that touch while the hands press 5 to 25 cm into the table, while a client pushes and while the robot
 wanders between random postures, chatter at the table with commands one, three and four ticks old at 100 Hz, violated constraints.
 Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run time: half an
@@ -16,19 +16,196 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch5_control.gain_tuning_criteria import WANTED, Judged, evaluate, objective
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.control.plant_runs import icub
+from experiments.kit.control.arm_commands import Command, random_command, try_commands
+from experiments.kit.control.plant_runs import PUSHES, icub, icub_at_table, random_posture, run_plant
+from experiments.kit.control.safety import deepest, oscillation
+from experiments.kit.control.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Records, read_records
+from experiments.kit.records import Records, Row, read_records
 from mobee import Controller, Gains
+from mobee.arrays import Array
 from mobee.errors import InvalidValue
+from mobee.simulation import MotorParameters, OfflinePlant
+
+STEPPED = ("torso_yaw", "torso_pitch", "l_shoulder_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup", "neck_yaw")
+POSTURES, TARGETS, COMMANDS = 4, 10, 40
+AGES = (1, 3, 4)  # ticks of 10 ms; the last is one more than must be stable
+SHOVED = ("table-left-hand", "table-both-hands", "table-edge", "chest", "face", "other-hand")
+STRONG, PUSHED = 300.0, 3.0  # N/kg before the squash; s
+WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # how many; s each; s a target, in the joint box
+AT_ENDS = 0.5  # of the motors' targets are an end of the range, where the springs of many motors push together
+SPEEDS = (1.0, 0.2)  # speed scales, in turn; the thesis' robot ran at 0.1 and 0.2
+WANDERING = ("torso", "head", "left_arm", "right_arm")  # without the fingers: the 23 motors of thesis 4.1.1
+FINGERS = 7  # the first of them in an arm
+
+PRESS_SEED = 7
+PRESS, REST = 6.0, 2.0  # s, a press; its end, in which chatter is measured
+PRESSING = {"torso": 3, "left_arm": 4, "right_arm": 4}
+WITHIN = (0.1, 0.9)  # of their ranges
+BELOW_TOP = (-0.25, -0.05)  # m
+ABOVE_BLOCK = (-0.6, -0.2)  # m, along x
+TOP = -0.1  # m
+PALMS = ("left_palm", "right_palm")
+
+
+@dataclass(frozen=True, slots=True)
+class Judged(Row):
+    """The criteria, of the joints' true positions."""
+
+    settling_s: float  # median of steps of motors and postures
+    overshoot: float  # the largest of a motor's step; the deflection by a contact does not count
+    solid_mm: float  # deepest, pressing, at the ages that must be stable, and wandering
+    field_mm: float  # deepest, pressing
+    pushed_mm: float  # deepest solid while a client pushes with all that it may
+    chatter_mm: float  # pressing, mean over the postures, 1 tick of age
+    late_mm: float  # the same, 3 ticks
+    later_mm: float  # the same, 4 ticks
+    clause_deg: float  # largest violation, negative inside
+    forced_deg: float  # the same while a client pushes
+    stop_deg_s: float  # fastest arrival at a hard stop without a push
+    longest_ms: float  # the control period at which the law stops being stable
+
+
+# The value that is asked for, and the price of a unit beyond it; a second of settling time costs 1.
+WANTED: Mapping[str, tuple[float, float]] = {
+    "overshoot": (0.02, 20.0),
+    "solid_mm": (1.0, 1.0),
+    "field_mm": (45.0, 0.02),
+    "pushed_mm": (0.0, 0.5),
+    "chatter_mm": (1.0, 0.3),
+    "late_mm": (1.5, 0.3),
+    "later_mm": (3.0, 0.1),
+    "clause_deg": (-1.0, 1.0),
+    "forced_deg": (0.0, 0.5),
+    "stop_deg_s": (0.0, 0.05),
+}
+SHORTEST_LONGEST = 25.0  # ms; a period of 20 must be possible
+
+
+def objective(judged: Judged) -> float:
+    """Settling time [s] plus the prices of what is beyond the values asked for; less is better."""
+    cost = judged.settling_s + 0.2 * max(0.0, SHORTEST_LONGEST - judged.longest_ms)
+    for name, (wanted, price) in WANTED.items():
+        cost += price * max(0.0, getattr(judged, name) - wanted)
+    return cost
+
+
+def evaluate(gains: Gains) -> Judged:
+    """Judge gains; always the same seeds, so that two of them can be compared."""
+    settling, overshoot = _steps(gains)
+    pressed = {age: [press(gains, target, age) for target in _targets()] for age in AGES}
+    must_hold = [p for age in AGES[:2] for p in pressed[age]]
+    chatter = {age: 1e3 * float(np.mean([p.chatter for p in pressed[age]])) for age in AGES}
+    clause, stop = _clauses(gains, forced=False)
+    wandered = max(_wander(gains, seed) for seed in range(WANDERS))
+    return Judged(
+        settling,
+        overshoot,
+        solid_mm=1e3 * max(wandered, *(p.solid for p in must_hold)),
+        field_mm=1e3 * max(p.field for p in must_hold),
+        pushed_mm=1e3 * max(_pushed(gains, push) for push in SHOVED),
+        chatter_mm=chatter[1],
+        late_mm=chatter[3],
+        later_mm=chatter[4],
+        clause_deg=clause,
+        forced_deg=_clauses(gains, forced=True)[0],
+        stop_deg_s=stop,
+        longest_ms=1e3 * OfflinePlant(icub_at_table(), gains=gains, dt=1e-3).controller.max_dt,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Pressed:
+    """Depths and chatter of one press [m]."""
+
+    solid: float
+    field: float
+    chatter: float  # of the palms
+
+
+def press_targets(count: int) -> list[Array]:
+    """Postures, free of contacts without a table, in which a palm is 5 to 25 cm below the top that the table has."""
+    robot = icub_at_table().robot
+    rng, free = np.random.default_rng(PRESS_SEED), icub()
+    found: list[Array] = []
+    while len(found) < count:
+        q = random_posture(robot, rng, PRESSING, WITHIN)
+        pose = free.evaluate(q)
+        palms = [pose.position(marker) for marker in PALMS]
+        low_enough = any(BELOW_TOP[0] < z - TOP < BELOW_TOP[1] and ABOVE_BLOCK[0] < x < ABOVE_BLOCK[1] for x, _, z in palms)
+        if low_enough and not pose.count:
+            found.append(q)
+    return found
+
+
+def press(gains: Gains, target: Array, age: int, dt: float = 0.01) -> Pressed:
+    """Send all parts to the target at once, with commands that are `age` ticks old, and measure."""
+    late = MotorParameters(delay=float(MotorParameters().of_motors("delay", 1)[0]) + (age - 1) * dt)
+    plant = OfflinePlant(icub_at_table(), PRESS_SEED, gains, late, dt)
+    plant.controller.attractor = target
+    run = run_plant(plant, PRESS)
+    depths, rest = deepest(icub_at_table(), run.q[::2]), run.last(REST)
+    return Pressed(depths.solid, depths.field, max(oscillation(icub_at_table(), rest, palm) for palm in PALMS))
+
+
+def _steps(gains: Gains) -> tuple[float, float]:
+    robot, home = icub_at_table().robot, icub_at_table().robot.home
+    steps = [motor_step(robot.motors.index(motor)) for motor in STEPPED] + [(home, target) for target in _postures()]
+    responses = [step_response(run_step(gains, 10.0, *step, seed=i), *step) for i, step in enumerate(steps)]
+    return float(np.median([r.settling for r in responses])), max(r.overshoot for r in responses[: len(STEPPED)])
+
+
+def _wander(gains: Gains, seed: int) -> float:
+    """The deepest solid [m] between random postures, whatever lies between them."""
+    robot, rng = icub_at_table().robot, np.random.default_rng(seed)
+    plant = OfflinePlant(icub_at_table(), seed, gains, speed_scale=SPEEDS[seed % len(SPEEDS)])
+    moving = np.concatenate([np.arange(len(robot.motors))[robot.parts[part].slice][:FINGERS] for part in WANDERING])
+    found = 0.0
+    for _ in range(round(WANDER / HOLD)):
+        attractor = plant.controller.attractor
+        levels = rng.uniform(0.0, 1.0, len(moving))
+        levels = np.where(rng.random(len(moving)) < AT_ENDS, levels.round(), levels)
+        low, high = robot.limits[moving].T
+        attractor[moving] = low + levels * (high - low)
+        plant.controller.attractor = attractor
+        found = max(found, deepest(icub_at_table(), run_plant(plant, HOLD).q[::2]).solid)
+    return found
+
+
+def _pushed(gains: Gains, push: str) -> float:
+    plant = OfflinePlant(icub_at_table(), 0, gains)
+    PUSHES[push](plant.controller, STRONG)
+    return deepest(icub_at_table(), run_plant(plant, PUSHED).q[::2]).solid
+
+
+def _clauses(gains: Gains, forced: bool) -> tuple[float, float]:
+    tried = [try_commands(gains, commands, np.zeros(3), seed) for seed, commands in enumerate(_commands(forced))]
+    return float(np.rad2deg(max(t.violations.max() for t in tried))), float(np.rad2deg(max(t.stop.max() for t in tried)))
+
+
+@lru_cache(maxsize=1)
+def _targets() -> list[Array]:
+    return press_targets(TARGETS)
+
+
+@lru_cache(maxsize=1)
+def _postures() -> list[Array]:
+    return postures(POSTURES, 0)
+
+
+@lru_cache(maxsize=2)
+def _commands(forced: bool) -> list[tuple[Command, Command]]:
+    rng = np.random.default_rng(0)
+    return [(random_command(rng, forced), random_command(rng, forced)) for _ in range(COMMANDS)]
+
 
 RECORDS = "tune.csv"
 CLEARLY = 0.8  # of the default's objective: what is less is clearly better

@@ -1,4 +1,4 @@
-"""Commands of one arm, drawn at random or varied, and a run of the plant in which both arms execute one each."""
+"""Commands for one arm, drawn at random or varied, and runs of the plant in which both arms execute one each."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ MOTORS = 7  # of an arm, without the fingers: the constraints are on the first f
 PHASES = 3
 DIMENSIONS = 3  # of a push
 SIGNS = (-1.0, 0.0, 1.0)
-FAR = 50.0  # half ranges from the middle of a range, the farthest attractor
-SHORT, LONG = 0.05, 1.5  # s, a phase
-STEPS = (0.5, 0.15, 0.05)  # of a variation: half ranges of the motors, and factors e^step of the times
+FARTHEST = 50.0  # of an attractor from the middle of the range, in half ranges
+SHORT, LONG = 0.05, 1.5  # s, shortest and longest phase
+STEPS = (0.5, 0.15, 0.05)  # sizes of a variation: half ranges for motors, factors e^step for times
 PALMS = {"left_arm": "left_palm", "right_arm": "right_palm"}
 ARMS = tuple(PALMS)
-STRONG = 1e3  # rad/s^2 at a motor, N/kg at a palm: the squash lets through nearly all that it can
-MARGIN = np.deg2rad(15.0)  # of a start, along the normal; the constraints are felt nearer than 12
+STRONG = 1e3  # rad/s^2 at a motor, N/kg at a palm; saturates the squash
+MARGIN = np.deg2rad(15.0)  # rad along the normal, of a start; constraints push within 12 degrees
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """Positions are in half ranges from the middle of a motor's range: inside the joint box they are -1 to 1."""
+    """A start and three attractors with forces; positions are half ranges from the middle of a range: -1 to 1 inside the limits."""
 
     start: Array  # (7,)
     attractors: Array  # (3, 7)
     seconds: Array  # (3,)
-    forces: Array  # (3, 7): -1 to 1, of more than the squash lets through, at the motors
-    pushes: Array  # (3, 3): the same at the palm, root frame
+    forces: Array  # (3, 7) at the motors, -1 to 1, in units of STRONG
+    pushes: Array  # (3, 3) at the palm, root frame, in the same unit
 
     @property
     def is_forced(self) -> bool:
@@ -49,11 +49,11 @@ class Command:
 
 
 def random_command(rng: np.random.Generator, forced: bool) -> Command:
-    """A random command: half of them stay in the joint box, the others leave it with some of the motors."""
+    """Draw a command: half of all commands stay in the joint box, the others leave it with some of the motors."""
     shape = (PHASES, MOTORS)
     inside = rng.uniform(-1.0, 1.0, shape)
     corners = np.where(rng.random(shape) < 0.5, np.sign(inside), inside)
-    outside = np.sign(inside) * np.exp(rng.uniform(0.0, np.log(FAR), shape))
+    outside = np.sign(inside) * np.exp(rng.uniform(0.0, np.log(FARTHEST), shape))
     attractors = corners if rng.random() < 0.5 else np.where(rng.random(shape) < 0.5, outside, corners)
     start, seconds = rng.uniform(-1.0, 1.0, MOTORS), np.exp(rng.uniform(np.log(SHORT), np.log(LONG), PHASES))
     pushes = (PHASES, DIMENSIONS)
@@ -63,7 +63,7 @@ def random_command(rng: np.random.Generator, forced: bool) -> Command:
 
 
 def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
-    """One command with small changes, and in some cases with phases of another."""
+    """Return a command with small changes, and in some cases with phases of another one."""
     step = rng.choice(STEPS)
     take = rng.random(PHASES) < (0.5 if rng.random() < 0.3 else 0.0)
     attractors = np.where(take[:, None], other.attractors, one.attractors)
@@ -76,7 +76,7 @@ def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
         forces, pushes = (np.where(rng.random(f.shape) < 0.1, rng.choice(SIGNS, f.shape), f) for f in (forces, pushes))
     return Command(
         (one.start + step * rng.standard_normal(MOTORS)).clip(-1.0, 1.0),
-        np.where(touched, changed, attractors).clip(-FAR, FAR),
+        np.where(touched, changed, attractors).clip(-FARTHEST, FARTHEST),
         (np.where(take, other.seconds, one.seconds) * np.exp(step * rng.standard_normal(PHASES))).clip(SHORT, LONG),
         forces,
         pushes,
@@ -84,13 +84,13 @@ def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
 
 
 def as_numbers(command: Command) -> list[float]:
-    """For JSON: start, attractors, seconds, forces, pushes, concatenated."""
+    """Return a command as numbers for JSON: start, attractors, seconds, forces, pushes."""
     parts = (command.start, command.attractors.ravel(), command.seconds, command.forces.ravel(), command.pushes.ravel())
     return [round(float(x), 6) for x in np.concatenate(parts)]
 
 
 def from_numbers(numbers: list[float]) -> Command:
-    """The inverse of `as_numbers`."""
+    """Return the command with these numbers; inverse of `as_numbers`."""
     ends = np.cumsum([MOTORS, PHASES * MOTORS, PHASES, PHASES * MOTORS])
     start, attractors, seconds, forces, pushes = np.split(np.array(numbers), ends)
     return Command(start, attractors.reshape(PHASES, -1), seconds, forces.reshape(PHASES, -1), pushes.reshape(PHASES, -1))
@@ -101,12 +101,12 @@ class Tried:
     """Measures of a run in which both arms executed a command."""
 
     run: PlantRun
-    violations: Array  # (2, clauses of an arm) rad along the normal, the worst of each
-    stop: Array  # (2,) rad/s, the fastest arrival at a hard stop
+    violations: Array  # (2, clauses of an arm) rad along the normal, the largest of each
+    stop: Array  # (2,) rad/s, the fastest impact at a hard stop
 
 
 def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: int) -> Tried:
-    """Run a command on each arm; the torso goes to `torso` (3,), half ranges from its middle."""
+    """Run a command on each arm while the torso goes to `torso` (3,), in half ranges from its middle."""
     robot = icub_at_table().robot
     plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])
     start = robot.home.copy()
@@ -143,7 +143,7 @@ def _begin_phase(controller: Controller, part: str, command: Command, phase: int
 
 
 def _legal(robot: Robot, q: Array) -> Array:
-    """The posture nearest to q on the line from home in which all constraints are farther than MARGIN."""
+    """Return the posture nearest to q on the line from home in which all constraints are farther than MARGIN."""
     for share in np.linspace(1.0, 0.0, 21):
         found: Array = robot.home + share * (q - robot.home)
         if clause_violations(robot, found[None]).max() < -MARGIN:

@@ -15,39 +15,39 @@ from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 
 GAINS = ("default", "published_2014")
-PERIOD = {"default": 0.01, "published_2014": 0.02}  # s, the tick at which each set is used
-COLORS = {"default": "tab:blue", "published_2014": "tab:orange"}  # of the gain sets, in all figures
-CALM = 0.4  # s, for motors with a lag of 50 ms
+PERIOD = {"default": 0.01, "published_2014": 0.02}  # s, control period of each gain set
+COLORS = {"default": "tab:blue", "published_2014": "tab:orange"}  # of the gain sets in figures
+REST_TIME = 0.4  # s until motors with a lag of 50 ms are at rest
 
 
 @lru_cache(maxsize=1)
 def icub() -> Model:
-    """The iCub alone."""
+    """Return the model of the iCub in an empty world."""
     return Model(load_robot("icub"))
 
 
 @lru_cache(maxsize=1)
 def icub_at_table() -> Model:
-    """The iCub and the table in front of it."""
+    """Return the model of the iCub at its table."""
     return Model(load_robot("icub"), load_world("table"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlantRun:
-    """T ticks of a plant; row t is the end of tick t."""
+    """A recording of T ticks of a plant; row t is the end of tick t."""
 
-    q: Array  # (T, n) rad, where the joints are, not what the encoders say
+    q: Array  # (T, n) rad, true joint positions, not encoder readings
     velocity: Array  # (T, n) rad/s, commanded
     dt: float  # s
 
     @property
     def times(self) -> Array:
-        """(T,) s from the beginning of the run to the end of each tick."""
+        """The time of the end of each tick since the beginning of the run, (T,) s."""
         times: Array = self.dt * np.arange(1.0, len(self.q) + 1.0)
         return times
 
     def last(self, seconds: float) -> PlantRun:
-        """The end of the run."""
+        """Return the last `seconds` of the run."""
         count = round(seconds / self.dt)
         return PlantRun(self.q[-count:], self.velocity[-count:], self.dt)
 
@@ -55,7 +55,10 @@ class PlantRun:
 def run_plant(
     plant: OfflinePlant, seconds: float, before: Callable[[int], None] | None = None, at: Collection[int] | None = None
 ) -> PlantRun:
-    """Run the plant, at least one tick; `before` is called ahead of the ticks `at`, of each if None, with the tick's number, from 0."""
+    """Run the plant for `seconds`, at least one tick, and record it.
+
+    `before` is called with the number of a tick, counted from 0, before each of the ticks `at`; None: before each tick.
+    """
     ticks = max(1, round(seconds / plant.dt))
     calls = () if before is None else range(ticks) if at is None else at
     traces = []
@@ -67,9 +70,9 @@ def run_plant(
 
 
 def place(plant: OfflinePlant, q: Array) -> None:
-    """Put a plant at rest at q (n,) rad, its attractor there: the joints are held until the motors have calmed down."""
+    """Put a plant at rest at q (n,) rad with its attractor there; the joints are held until the motors are at rest."""
     plant.controller.reset(q)
-    for _ in range(round(CALM / plant.dt)):
+    for _ in range(round(REST_TIME / plant.dt)):
         plant.motors.adopt(q)
         plant.tick()
     plant.motors.adopt(q)
@@ -77,7 +80,7 @@ def place(plant: OfflinePlant, q: Array) -> None:
 
 
 def random_posture(robot: Robot, rng: np.random.Generator, motors: Mapping[str, int], within: tuple[float, float]) -> Array:
-    """Of the first so many `motors` of each part, uniform `within` shares of their ranges, the others at home: (n,) rad."""
+    """Draw a posture (n,) rad: the first `motors[part]` motors of each part uniform `within` shares of their range, the others at home."""
     q = robot.home.copy()
     for part, count in motors.items():
         where = slice(robot.parts[part].start, robot.parts[part].start + count)
@@ -94,7 +97,7 @@ def _marker(marker: str, direction: tuple[float, float, float]) -> Push:
 
 
 def _both(x: float, y: float, z: float) -> Push:
-    """Both hands, mirrored."""
+    """Push both palms, mirrored in y."""
 
     def push(controller: Controller, force: float) -> None:
         controller.push("left_palm", force * np.array([x, y, z]))
@@ -113,7 +116,7 @@ def _motors(part: str, sign: float) -> Push:
 
 
 def _together(*pushes: Push) -> Push:
-    """At markers and at motors at once."""
+    """Apply several pushes at the same time."""
 
     def push(controller: Controller, force: float) -> None:
         for each in pushes:

@@ -13,14 +13,14 @@ from mobee import Gains
 from mobee.arrays import Array
 from mobee.simulation import OfflinePlant
 
-STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, of the range: the smaller is the step of a motor alone
-BAND = 0.05  # of the step
-REST = 1.0  # s, the end of a run, in which nothing may move
-LEAST = np.deg2rad(5.0)  # a smaller step of a motor among others is not judged
-TIME_CONSTANTS = 24.0  # a run lasts so many of damping / stiffness
-MOTORS = {"torso": 3, "left_arm": 7, "right_arm": 7}  # that step together
-MIDDLE = (0.25, 0.75)  # of the range of a motor in a posture
-MARGIN = np.deg2rad(15.0)  # from every constraint, of a posture
+STEP, SHARE = np.deg2rad(20.0), 0.25  # rad, share of the range: a single motor steps by the smaller of the two
+BAND = 0.05  # of the step, around the end position: settling
+REST = 1.0  # s at the end of a run, in which nothing may move
+MIN_STEP = np.deg2rad(5.0)  # rad; smaller steps of a motor among others are not judged
+TIME_CONSTANTS = 24.0  # duration of a run, in units of damping / stiffness
+MOTORS = {"torso": 3, "left_arm": 7, "right_arm": 7}  # motors of each part that step together
+MIDDLE = (0.25, 0.75)  # shares of the range in which the motors of a posture are
+MARGIN = np.deg2rad(15.0)  # rad, distance of a posture from every constraint
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,14 @@ class StepResponse:
     """Measures of a step response."""
 
     settling: float  # s
-    overshoot: float  # of the step
-    error_deg: float  # between rest and attractor
+    overshoot: float  # share of the step
+    error_deg: float  # between end position and attractor
     rest_deg: float  # standard deviation at rest
     is_settled: bool
 
 
 def motor_step(motor: int) -> tuple[Array, Array]:
-    """Postures (n,) rad before and after a step of one motor: around the middle of its range, the others at home."""
+    """Return the postures (n,) rad before and after a step of one motor around the middle of its range, the others at home."""
     robot = icub().robot
     low, high = robot.limits[motor]
     size = min(STEP, SHARE * (high - low))
@@ -45,7 +45,7 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 
 
 def postures(count: int, seed: int) -> list[Array]:
-    """Random postures (n,) rad of torso and arms; on the paths from one to the next, from home on, no field is in contact."""
+    """Draw postures (n,) rad of torso and arms, with no field in contact on the paths from home to the first and from one to the next."""
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]
     while len(found) <= count:
@@ -62,7 +62,7 @@ def postures(count: int, seed: int) -> list[Array]:
 
 
 def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> PlantRun:
-    """A run that begins at rest at `start` (n,) rad, with the attractor at `end`."""
+    """Run a plant from rest at `start` (n,) rad with the attractor at `end`."""
     plant = OfflinePlant(icub(), seed, gains, dt=period_ms / 1e3)
     place(plant, start)
     plant.controller.attractor = end
@@ -70,8 +70,8 @@ def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int
 
 
 def step_response(run: PlantRun, start: Array, end: Array) -> StepResponse:
-    """Measure the joints whose step is LEAST or larger."""
-    moved = np.abs(end - start) >= LEAST
+    """Measure a step response over the joints whose step is at least MIN_STEP."""
+    moved = np.abs(end - start) >= MIN_STEP
     rest = run.last(REST).q[:, moved]
     final = rest.mean(axis=0)
     beyond = (run.q[:, moved] - final) / (end - start)[moved]

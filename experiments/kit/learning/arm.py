@@ -38,7 +38,7 @@ Neighbours = int | Literal["equidistant"]
 
 @cache
 def robot(free: bool = False) -> Robot:
-    """The published robot, the arms' other motors at home in the middle of their range; `free`: without its cable rows."""
+    """Return the published robot, with the arms' other motors at home in the middle of their range; `free`: without cable rows."""
     loaded = mobee.load_robot(ROBOT)
     motors = tuple(replace(m, home=float(m.limits.mean())) if _is_idle(m) else m for m in loaded.motor_table)
     return replace(loaded, motor_table=motors, clauses=() if free else loaded.clauses)
@@ -51,16 +51,16 @@ def _is_idle(motor: Motor) -> bool:
 def arm_plant(
     seed: int, free: bool = False, world: World | None = None, gains: Gains | None = None, motors: MotorParameters | None = None
 ) -> OfflinePlant:
-    """The four motors of the left arm; `free`: no cable rows, and contacts exert no forces.
+    """Return a plant in which the four motors of the left arm move; `free`: no cable rows, and contacts exert no forces.
 
-    `gains`, `motors`: other than the published ones, for a study of what depends on them.
+    `gains`, `motors`: replace the published ones.
     """
     law = Gains.published_2014() if gains is None else gains
     return OfflinePlant(Model(robot(free), world), seed, law, motors, DT, contact_forces=not free, active=LEFT)
 
 
 def table_world(ghost: bool = False) -> World:
-    """The table alone, 50 cm thick, top at z = -0.10 m; `ghost`: it exerts no force."""
+    """Return a world with the table alone, 50 cm thick, top at z = -0.10 m; `ghost`: it exerts no force."""
     world = mobee.load_world("table")
     world.remove("ball")
     if ghost:
@@ -69,7 +69,7 @@ def table_world(ghost: bool = False) -> World:
 
 
 def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part"] = "tree") -> OfflinePlant:
-    """Torso and both arms, eleven motors, at the table; self-contacts stay when the table is a ghost."""
+    """Return a plant of torso and both arms, eleven motors, at the table; with a ghost table, self-contacts still exert forces."""
     law, moving = Gains.published_2014(), (*TORSO, *LEFT, *RIGHT)
     return OfflinePlant(Model(robot(), table_world(ghost)), seed, law, dt=DT, propagate=propagate, active=moving)
 
@@ -77,43 +77,44 @@ def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part
 def arm_space(
     levels: Sequence[float] = RANK3, neighbours: Neighbours = "equidistant", tie_seed: int = 0, joints: Sequence[str] = LEFT
 ) -> Lattice:
-    """A lattice over the four joints of an arm."""
+    """Return a lattice over the four joints of an arm."""
     return Lattice(robot(), joints, levels, neighbours, tie_seed)
 
 
 def torso_space(tie_seed: int = 0) -> Lattice:
-    """27 states with 8 neighbours each."""
+    """Return the lattice of the torso: 27 states with 8 neighbours each."""
     return Lattice(robot(), TORSO, RANK3, TORSO_NEIGHBOURS, tie_seed)
 
 
 def table_agents(plant: OfflinePlant, explorer: str = "curious", seed: int = 0, tie_seed: int = 0, **settings: Any) -> list[CuriousAgent]:
-    """The torso's, the left and the right arm's agents; both arms have the same graph.  `settings`: more of CuriousAgent."""
+    """Return the agents of torso, left arm and right arm; both arms have the same graph.  `settings`: passed to CuriousAgent."""
     arms = [arm_space(RANK3, ARM_NEIGHBOURS, tie_seed, joints) for joints in (LEFT, RIGHT)]
     return [CuriousAgent(space, plant, explorer, seed, **settings) for space in (torso_space(tie_seed), *arms)]
 
 
 def columns() -> slice:
-    """Where the four joints of the left arm are among the robot's motors."""
+    """Return the slice of the left arm's four joints among the robot's motors."""
     first = robot().parts[PART].start
     return slice(first, first + JOINTS)
 
 
 def arm_clauses() -> list[Clause]:
-    """The clauses of the left shoulder's cables."""
+    """Return the clauses of the left shoulder's cables."""
     return [clause for clause in robot().clauses if clause.part == PART]
 
 
 @cache
-def least_margin() -> float:
-    """The least distance from a clause at which a pose counts as clear, in units of a.q + b: half the zone in which the law pushes.
+def min_margin() -> float:
+    """Return the smallest distance from a clause at which a pose counts as clear, in units of a.q + b.
 
-    There the force moves a resting arm by some three degrees, a quarter of the distance to the edge of a cell of the rank 3 lattice.
+    It is half the zone in which the law pushes: there the force moves a resting arm by about three degrees, a quarter of the distance
+    to the edge of a cell of the rank 3 lattice.
     """
     return Gains.published_2014().constraint_width / 2.0
 
 
 def whole(q: Array) -> Array:
-    """Poses of the four joints (..., 4) as poses of the robot (..., n), the other motors at home; rad."""
+    """Return poses of the four joints (..., 4) as poses of the robot (..., n), the other motors at home; rad."""
     body = robot()
     poses = np.broadcast_to(body.home, (*q.shape[:-1], len(body.home))).copy()
     poses[..., columns()] = q
@@ -121,10 +122,10 @@ def whole(q: Array) -> Array:
 
 
 def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
-    """In which poses (P, 4) rad no field is in contact and all of the clauses are farther than `least_margin`, (P,)."""
+    """Return (P,) whether in each pose (P, 4) rad no field is in contact and all clauses are farther than `min_margin`."""
     poses = whole(q)
     good = np.ones(len(poses), dtype=bool)
     good[model.evaluate(poses).table.pose] = False
     for clause in clauses:
-        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= least_margin()
+        good &= (poses @ clause.a.T + clause.b).max(axis=1) >= min_margin()
     return good

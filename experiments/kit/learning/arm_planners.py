@@ -1,4 +1,4 @@
-"""Planners that follow their plans action by action: straight, along a roadmap planned once or repaired, or by a learned MDP."""
+"""Planners that are compared with each other: straight motions, a roadmap planned once or replanned, and a learned MDP."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ ARRIVED = 0.125  # of every joint's range: half the distance of two samples of t
 
 
 class Rival(Protocol):
-    """Chooses the next pose to go to, and observes the outcome."""
+    """A planner that chooses the next pose to go to, and observes the outcome."""
 
     repairs: int
-    """How often an action did not end as planned, so far."""
+    """Number of actions so far that did not end as planned."""
 
     def begin(self, goal: int) -> None:
-        """A new query, to a state of the lattice."""
+        """Begin a new query for a goal state of the lattice."""
 
     def aim(self, q: Array) -> Array | None:
-        """The pose (4,) rad to go to from here; None: it gives up."""
+        """Return the pose (4,) rad to go to from q; None: the planner gives up."""
 
     def observe(self, start: Array, end: Array) -> None:
-        """The poses (4,) rad from which the robot was sent to the last aim, and in which it ended."""
+        """Observe the poses (4,) rad in which the last motion started and ended."""
 
 
 class Straight:
-    """Goes straight to the goal, again and again."""
+    """Goes straight to the goal, repeatedly."""
 
     repairs = 0
 
@@ -53,7 +53,7 @@ class Straight:
 
 
 class PlannedOnce:
-    """Plans a path through a roadmap and passes its vertices, wherever the robot comes to rest: plan first, act later."""
+    """Plans one path through a roadmap and sends the robot to its vertices, wherever the motions end: plan first, act later."""
 
     repairs = 0
 
@@ -80,13 +80,13 @@ class PlannedOnce:
 
 
 class Repaired:
-    """Follows the cheapest path through a roadmap; a motion that fails is taken out, and the path is planned anew (thesis 4.2).
+    """Follows the cheapest path through a roadmap; a motion that fails is removed, and the path is planned again (thesis 4.2).
 
     Args:
-        roadmap: which is not changed.
-        vertex_of: the vertex of every goal.
-        neighbours: to how many near vertices it may return when it has been pushed off the roadmap.
-        remembers: whether the motions taken out stay out when a new query begins.
+        roadmap: the roadmap, which is not changed.
+        vertex_of: the vertex of each goal state.
+        neighbours: number of near vertices to which it may return after it was pushed off the roadmap.
+        remembers: whether removed motions stay removed in the next query.
     """
 
     def __init__(self, roadmap: Roadmap, vertex_of: dict[int, int], neighbours: int, remembers: bool) -> None:
@@ -105,7 +105,7 @@ class Repaired:
     def aim(self, q: Array) -> Array | None:
         """See Rival."""
         path = self._path(q)
-        if not path:  # too much was taken out, for some motions fail but now and then
+        if not path:  # too many motions were removed: some fail only sometimes
             self._out.clear()
             path = self._path(q)
         if not path:
@@ -124,7 +124,7 @@ class Repaired:
         self.repairs += 1
 
     def _path(self, q: Array) -> list[int] | None:
-        """The vertices still to pass; the goal's own is passed again if the robot rests near it and yet not in the goal's cell."""
+        """Return the remaining vertices; the goal vertex is passed again if the robot is near it but not in the goal's cell."""
         roadmap = self._roadmap
         if self._at is not None and self._at != self._goal:
             path = roadmap.path({self._at: 0.0}, self._goal, self._out)
@@ -133,12 +133,12 @@ class Repaired:
         return roadmap.path({v: roadmap.cost(q, v) for v in starts}, self._goal, self._out)
 
     def _edge(self, q: Array, vertex: int) -> Edge:
-        """The motion from here to a vertex; beside the roadmap, from the vertex that is nearest, which has a negative number then."""
+        """Return the motion from q to a vertex; off the roadmap its start is the nearest vertex v, numbered -1 - v."""
         return edge(self._at, vertex) if self._at is not None else (-1 - self._roadmap.nearest(q, 1)[0], vertex)
 
 
 class Learned:
-    """Follows the plan of a learned transition model, made anew after every action, and goes on learning."""
+    """Follows the plan of a learned transition model, which is updated and planned with after every action."""
 
     def __init__(self, space: Lattice, model: TransitionModel) -> None:
         self._space, self._model = space, model

@@ -1,6 +1,7 @@
-"""A roadmap of the published arm by what a planner believes: sound poses and motions, shortest paths, OMPL's PRM or the lattice.
+"""Roadmaps of the published left arm, four joints, built from the model that a planner believes in.
 
-The left arm of the published robot, four joints; the planners of `experiments.kit.learning.arm_planners` follow such roadmaps.
+Vertices and edges are free poses and motions in that model; the graph is OMPL's PRM or the lattice of the learners.  The planners of
+`experiments.kit.learning.arm_planners` follow these roadmaps.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Edge = tuple[int, int]  # vertices, the smaller first
 
 
 class Belief:
-    """A robot in its world as believed; a pose of the arm is sound if it is clear of contacts and cables.
+    """A planner's model of robot and world; a pose of the arm is sound if it is clear of contacts and cable constraints.
 
     Args:
         model: the robot in the world, as believed.
@@ -43,15 +44,15 @@ class Belief:
         self.span: Array = np.ptp(limits, axis=1)
         """(4,) rad, the joints' ranges."""
         self.checked = 0
-        """How many poses were checked."""
+        """Number of poses that were checked."""
 
     def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
-        """Which of the poses (P, 4) rad are sound, (P,); `cables`: whether they count."""
+        """Return which of the poses (P, 4) rad are sound, (P,); `cables`: whether cable constraints count."""
         self.checked += len(q)
         return clear(self._model, q + self._turns, self._clauses if cables else ())
 
     def is_sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
-        """Whether the straight path between two poses (4,) rad is sound; its start does not count, for the robot is there."""
+        """Return whether the straight motion between two poses (4,) rad is sound; its start is not checked."""
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
         return bool(self.sound(start + shares * (end - start), cables).all())
@@ -60,24 +61,24 @@ class Belief:
 class Roadmap:
     """An undirected graph of V vertices, poses of the arm (V, 4) rad.
 
-    A motion costs as much as an action, 1, and its length in fractions of the joints' ranges.
+    The cost of a motion is 1, for the action, plus its length in fractions of the joints' ranges.
     """
 
     def __init__(self, vertices: Array, edges: Iterable[Edge], belief: Belief) -> None:
         self.vertices, self.belief = vertices, belief
         if not len(vertices):
-            raise InvalidValue("a roadmap without vertices: no sample was believed to be sound.")
+            raise InvalidValue("a roadmap without vertices: no sample is sound in the planner's model.")
         self._costs: list[dict[int, float]] = [{} for _ in vertices]
         for first, second in edges:
             self._join(first, second)
 
     @property
     def edges(self) -> int:
-        """How many there are."""
+        """Number of edges."""
         return sum(len(costs) for costs in self._costs) // 2
 
     def pose(self, vertex: int) -> Array:
-        """Of a vertex, (4,) rad."""
+        """Return the pose of a vertex, (4,) rad."""
         pose: Array = self.vertices[vertex]
         return pose
 
@@ -91,20 +92,20 @@ class Roadmap:
         return len(self.vertices) - 1
 
     def nearest(self, pose: Array, count: int) -> list[int]:
-        """The nearest vertices, by the distance in fractions of the ranges."""
+        """Return the `count` nearest vertices by distance in fractions of the ranges."""
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Those of the nearest vertices to which the straight motion is sound; if there are none, is free of contacts; else all."""
+        """Return those of the nearest vertices to which the straight motion is sound; without any, ignore cables; without any, all."""
         near = self.nearest(pose, neighbours)
-        for cables in (True, False):  # a pose that violates the cables' constraints may be reached all the same
+        for cables in (True, False):  # a pose that violates the cable constraints may still be reached
             found = [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v], cables)]
             if found:
                 return found
         return near
 
     def path(self, starts: dict[int, float], goal: int, blocked: Collection[Edge]) -> list[int] | None:
-        """The vertices of the cheapest path from one of the starts (with the cost to reach it) to the goal; None if there is none."""
+        """Return the vertices of the cheapest path from one of the starts (with the cost to reach it) to the goal; None without a path."""
         best, before = dict(starts), dict.fromkeys(starts, -1)
         queue = [(cost, vertex) for vertex, cost in starts.items()]
         heapq.heapify(queue)
@@ -124,7 +125,7 @@ class Roadmap:
         return None
 
     def cost(self, pose: Array, vertex: int) -> float:
-        """Of the motion from a pose to a vertex."""
+        """Return the cost of the motion from a pose to a vertex."""
         return 1.0 + float(np.linalg.norm((self.vertices[vertex] - pose) / self.belief.span))
 
     def _lengths(self, pose: Array) -> Array:
@@ -137,12 +138,12 @@ class Roadmap:
 
 
 def edge(first: int, second: int) -> Edge:
-    """The edge between two vertices, in either direction."""
+    """Return the undirected edge between two vertices."""
     return (first, second) if first < second else (second, first)
 
 
 def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
-    """A roadmap of one of the KINDS, every motion of which is believed to be sound."""
+    """Build a roadmap of one of the KINDS, all motions of which are sound in the planner's model."""
     if kind == "OMPL":
         return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
     samples = np.flatnonzero(belief.sound(lattice.samples))
@@ -153,7 +154,7 @@ def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Road
 
 
 def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
-    """Add the samples of goal states that are no vertices yet; returns the vertex of each state."""
+    """Add the samples of goal states that are not vertices yet; returns the vertex of each state."""
     found = {}
     for state in sorted({int(goal) for goal in goals}):
         sample = lattice.samples[state]
@@ -163,7 +164,7 @@ def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int
 
 
 class _Believed:
-    """A Judge by a belief, within the limits that exert no force."""
+    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.Judge`."""
 
     def __init__(self, belief: Belief) -> None:
         self.low, self.span, self.box = belief.limits[:, 0], belief.span, belief.limits
@@ -176,6 +177,6 @@ class _Believed:
 
 
 def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
-    """Grow a PRM over the arm's four joints, in fractions of their ranges; raises OmplMissing."""
+    """Build a PRM over the arm's four joints by OMPL, in fractions of their ranges; raises OmplMissing."""
     found = grown("PRM", _Believed(belief), milestones, neighbours, seed, resolution=STEP)
     return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)

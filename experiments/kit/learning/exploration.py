@@ -15,26 +15,26 @@ from mobee.store import Transition
 
 
 def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
-    """Move the part into a random state, as the published runs began; the motion is not observed."""
+    """Move the part into a random state, as at the beginning of the published runs; the motion is not observed."""
     plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
 
 
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
-    """Move the part to a random neighbour of its state, unobserved, for that action begins at no sample; returns the state."""
+    """Move the part to a random neighbour of its state and return the new state; not observed, as the motion starts at no sample."""
     state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))
     return space.state_of(plant.act(space.part, space.target(goal)).q)
 
 
 def newest(agent: CuriousAgent) -> Transition:
-    """The last transition of an agent; raises MobeeError if it has none."""
+    """Return the last transition of an agent; raises MobeeError if it has none."""
     if agent.last is None:
         raise MobeeError(f"the agent of {agent.part} has observed nothing yet: let it make a step first.")
     return agent.last
 
 
 def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], bool] = lambda agent: False) -> Ints:
-    """Make up to `most` transitions, fewer when `enough` is true of the agent; returns (T, 3): state, action, state reached."""
+    """Make up to `most` transitions, until `enough(agent)` is true; returns (T, 3): state, action, state reached."""
     seen: list[tuple[int, int, int]] = []
     while len(seen) < most and not enough(agent):
         agent.step()
@@ -44,13 +44,13 @@ def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], boo
 
 
 class LeastTries:
-    """Whether every state-action was tried at least `least` times; counts incrementally."""
+    """Stopping criterion: every state-action was tried at least `least` times; counts incrementally."""
 
     def __init__(self, least: int, state_actions: int) -> None:
         self._least, self._left = least, state_actions
 
     def __call__(self, agent: CuriousAgent) -> bool:
-        """To be called after every transition."""
+        """Return whether the criterion is met; must be called after every transition."""
         if agent.last is not None and agent.model.tries[agent.last.s, agent.last.a] == self._least:
             self._left -= 1
         return self._left == 0
@@ -58,7 +58,7 @@ class LeastTries:
 
 @dataclass(eq=False)
 class Log:
-    """The transitions of one part; `poses` are those of all motors at their ends, (n,) rad."""
+    """The transitions of one part; `poses` are the positions of all motors at the ends, (n,) rad."""
 
     seen: list[tuple[int, int, int]] = field(default_factory=list)
     settled: list[bool] = field(default_factory=list)
@@ -67,7 +67,7 @@ class Log:
     poses: list[Array] = field(default_factory=list)
 
     def arrays(self, part: str, count: int) -> dict[str, Any]:
-        """The first `count` transitions without poses, as arrays for a cell; their names end in the part's."""
+        """Return the first `count` transitions without poses as arrays for a cell; their names end in the name of the part."""
         return {
             f"seen_{part}": np.array(self.seen[:count], dtype=np.uint16),
             f"settled_{part}": np.array(self.settled[:count], dtype=bool),
@@ -77,7 +77,7 @@ class Log:
 
 
 def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transitions: int) -> dict[str, Log]:
-    """Act as `mobee.run` does until every agent has made that many transitions; the faster agents go on in the meantime."""
+    """Act as `mobee.run` does until every agent has made that many transitions; faster agents continue in the meantime."""
     logs = {agent.part: Log() for agent in agents}
     by_part, waiting = {agent.part: agent for agent in agents}, list(agents)
     while min(len(log.seen) for log in logs.values()) < transitions:

@@ -1,4 +1,4 @@
-"""The same agents offline, and on the live processes in lockstep; finished transitions stay on disk."""
+"""The same agents on the offline plant, and on the live processes in lockstep; finished transitions are kept on disk."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from mobee.plant import Plant
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 
-ROBOT, GAINS, RATE = "icub", "published_2014", 50  # of the robot that PyBullet simulates; Hz
+ROBOT, GAINS, RATE = "icub", "published_2014", 50  # RATE in Hz
 JOINTS = {
     "torso": ("torso_yaw", "torso_roll", "torso_pitch"),
     "left_arm": ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"),
     "right_arm": ("r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"),
 }
-ROBOTS = {  # settings of robot_sim; PyBullet has physics of its own, its motors are what was identified
+ROBOTS = {  # settings of robot_sim; the identified motor model was fitted to the PyBullet robot
     "pybullet": {"backend": "pybullet", "motors": "published"},
     "kinematic": {"backend": "kinematic", "motors": "identified"},
 }
-PIECE = 200  # transitions a part of one launch
-_ACTION = 7.0  # s of robot time, a little more than the torso's take on average at the table
-_TRIES = 3  # launches without a single new transition
+PIECE = 200  # transitions of each part in one launch
+_ACTION_TIME = 7.0  # s of robot time for an action, a little above the torso's mean at the table
+_MAX_IDLE = 3  # launches in a row without a new transition
 
-_SCENARIO = """# Written by the experiment `simulation-transfer`.
+_SCENARIO = """# Written by an experiment.
 title = "Learning on {robot}, to be compared with the offline plant"
 
 [shared]
@@ -61,7 +61,7 @@ transitions = {transitions}
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """The parts that learn, each with its number of actions a state, and their world."""
+    """The parts that learn, each with its number of actions per state, and their world."""
 
     world: str
     neighbours: Mapping[str, int]
@@ -80,23 +80,23 @@ TASKS = {
 
 
 def space(robot: Robot, task: Task, part: str) -> Lattice:
-    """The lattice of rank 3 of a part."""
+    """Return the lattice of rank 3 of a part."""
     return Lattice(robot, JOINTS[part], neighbours=task.neighbours[part])
 
 
 def offline_plant(task: Task, seed: int) -> OfflinePlant:
-    """The whole robot, with the motors that were identified on PyBullet."""
+    """Return a plant of the whole robot, with the motors that were identified on PyBullet."""
     model = Model(load_robot(ROBOT), load_world(task.world))
     return OfflinePlant(model, seed, Gains.named(GAINS), MotorParameters.identified(ROBOT), 1.0 / RATE)
 
 
 def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
-    """An agent for each part, as services.agents makes them."""
+    """Return an agent for each part, with the settings of services.agents."""
     return [CuriousAgent(space(plant.robot, task, part), plant, seed=seed) for part in task.parts]
 
 
 def learn_offline(cell: Cell) -> dict[str, Any]:
-    """The work of a cell with the settings `task` and `transitions`: learn offline; the transitions of each part, (T, 3)."""
+    """Learn offline in a cell with the settings `task` and `transitions`; returns the transitions of each part, (T, 3)."""
     task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
     plant = offline_plant(task, cell.seed)
     logs = explore_together(agents(task, plant, cell.seed), plant, number)
@@ -104,9 +104,10 @@ def learn_offline(cell: Cell) -> dict[str, Any]:
 
 
 def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path, report: Callable[[int], None], piece: int = PIECE) -> None:
-    """Let every part of a task make that many transitions on one of the ROBOTS; goes on where an earlier call was broken off.
+    """Let every part of a task make that many transitions on one of the ROBOTS; continues an interrupted call.
 
-    `report`: called with the number that the slowest part has, before each launch of `piece` transitions a part.  Raises LaunchFailed.
+    `report`: called before each launch of `piece` transitions per part with the number that the slowest part has made.
+    Raises LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     idle = 0
@@ -114,16 +115,16 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
         report(slowest)
         more = min(transitions - slowest, piece)
         scenario = folder / "scenario.toml"
-        # Each part makes as many more, also one that has enough: a part without work would end before the run begins, and be waited for.
+        # Each part makes the same number, even one that has enough: a part without work would end before the run begins.
         scenario.write_text(_scenario(task, robot, seed, {part: made[part] + more for part in made}, slowest, folder.resolve()))
-        summary_of(str(scenario), ticks=round(_ACTION * RATE * more), runs=folder / "launches")
+        summary_of(str(scenario), ticks=round(_ACTION_TIME * RATE * more), runs=folder / "launches")
         idle = 0 if min(_made(folder, task).values()) > slowest else idle + 1
-        if idle == _TRIES:
-            raise LaunchFailed(f"{folder}: {_TRIES} launches in a row made no transition; see their logs in {folder / 'launches'}")
+        if idle == _MAX_IDLE:
+            raise LaunchFailed(f"{folder}: {_MAX_IDLE} launches in a row made no transition; see their logs in {folder / 'launches'}")
 
 
 def _made(folder: Path, task: str) -> dict[str, int]:
-    """The number of transitions of each part in the store."""
+    """Return the number of transitions of each part in the store."""
     path = folder / STORE
     if not path.exists():
         return dict.fromkeys(TASKS[task].parts, 0)
@@ -132,7 +133,7 @@ def _made(folder: Path, task: str) -> dict[str, int]:
 
 
 def _scenario(task: str, robot: str, seed: int, goals: Mapping[str, int], slowest: int, folder: Path) -> str:
-    """The seed of robot and encoders differs from piece to piece, that of the agents, which their store holds, does not."""
+    """Return the scenario of one launch; the seed of robot and encoders differs between launches, that of the agents does not."""
     wanted = TASKS[task]
     text = _SCENARIO.format(
         robot=robot, model=ROBOT, world=wanted.world, gains=GAINS, rate=RATE, seed=1000 * seed + slowest, **ROBOTS[robot]

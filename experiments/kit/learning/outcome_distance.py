@@ -1,4 +1,4 @@
-"""Distances between records of the same agents, offline and live: total variation of the outcomes of each state-action."""
+"""Distances between the outcomes of the same agents offline and live: total variation of each state-action."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.store import STORE, TransitionStore
 
-Counts = Mapping[str, Ints]  # by part: how often each outcome was seen, (S, A, S)
+Counts = Mapping[str, Ints]  # by part: number of each outcome, (S, A, S)
 
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """Between the outcomes of the state-actions that both have tried often enough."""
+    """Distance of two records over the state-actions that both have tried often enough."""
 
     variation: float
-    """Mean total variation a state-action, 0 to 1."""
+    """Mean total variation of a state-action, 0 to 1."""
     agree: float
-    """Share of the state-actions with the same most frequent outcome."""
+    """Share of state-actions with the same most frequent outcome."""
     compared: int
-    """How many state-actions there are."""
+    """Number of compared state-actions."""
 
 
 def counts_of(seen: Ints, space: Lattice) -> Ints:
-    """The number of times of each outcome, (S, A, S), in rows (T, 3) of state, action and state reached."""
+    """Count the outcomes, (S, A, S), of transitions (T, 3): state, action, state reached."""
     counts = np.zeros((*space.goals.shape, len(space)), dtype=np.intp)
     np.add.at(counts, tuple(np.asarray(seen, dtype=np.intp).T), 1)
     return counts
 
 
 def variations(first: Ints, second: Ints, least: int) -> Array:
-    """The total variation (S, A) of two tables of counts (S, A, S); NaN where one has fewer than `least` tries."""
+    """Return the total variation (S, A) between two tables of counts (S, A, S); NaN where one has fewer than `least` tries."""
     both = (first.sum(axis=-1) >= least) & (second.sum(axis=-1) >= least)
     apart: Array = np.where(both, 0.5 * np.abs(shares(first) - shares(second)).sum(axis=-1), np.nan)
     return apart
 
 
 def shares(counts: Ints) -> Array:
-    """The share of each outcome in the tries of its state-action, (S, A, S); 0 where there are none."""
+    """Return the share of each outcome in the tries of its state-action, (S, A, S); 0 without tries."""
     found: Array = counts / np.maximum(counts.sum(axis=-1, keepdims=True), 1)
     return found
 
 
 def distance(first: Counts, second: Counts, least: int) -> Distance:
-    """Between two records of the same parts, over the state-actions of all of them."""
+    """Return the distance between two records of the same parts, over all their state-actions."""
     apart = np.concatenate([variations(first[part], second[part], least).ravel() for part in first])
     same = np.concatenate([(first[part].argmax(axis=-1) == second[part].argmax(axis=-1)).ravel() for part in first])
     both = np.isfinite(apart)
@@ -63,7 +63,7 @@ def distance(first: Counts, second: Counts, least: int) -> Distance:
 
 
 def mean(distances: Sequence[Distance]) -> Distance:
-    """Of several."""
+    """Return the mean of several distances."""
     rows = np.array([(one.variation, one.agree, one.compared) for one in distances])
     variation, agree, compared = rows.mean(axis=0)
     return Distance(float(variation), float(agree), round(float(compared)))
@@ -71,19 +71,25 @@ def mean(distances: Sequence[Distance]) -> Distance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """A task's live robots and offline seeds, each against all offline seeds but one; of a live robot the mean of that."""
+    """Distances of the live robots and the offline seeds of a task.
+
+    An offline seed is compared with all other offline seeds together; a live robot with all offline seeds but one, averaged over
+    the seed left out.
+    """
 
     live: dict[str, Distance]
     offline: tuple[Distance, ...]
     counts: dict[str, Counts]
-    """Of each live robot, and of all offline seeds together under "offline"."""
+    """The counts of each live robot, and of all offline seeds together under "offline"."""
 
 
 def compared(folder: Path, task: str, least: int) -> Compared:
-    """Read the folder of a run; raises InvalidValue if the offline seeds are not there."""
+    """Compare the records in the folder of a run; raises InvalidValue if it has fewer than two offline seeds."""
     results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
     if len(results) < 2:
-        raise InvalidValue(f"{folder}: the task {task!r} has {len(results)} finished seeds offline, two are needed: go on with --resume.")
+        raise InvalidValue(
+            f"{folder}: the task {task!r} has {len(results)} finished offline seeds, two are needed: continue with --resume."
+        )
     robot, parts = load_robot(ROBOT), TASKS[task].parts
     spaces = {part: space(robot, TASKS[task], part) for part in parts}
     seeds = [{part: counts_of(result.values[f"seen_{part}"], spaces[part]) for part in parts} for result in results]
@@ -105,7 +111,7 @@ COLORS = {"pybullet": "tab:red", "kinematic": "tab:blue"}
 
 
 def draw_distances(tasks: Mapping[str, Compared], least: int) -> Any:
-    """A figure with a row a task: how far live robots and offline seeds are from the offline seeds together, and action by action."""
+    """Draw a row for each task: the distances of live robots and offline seeds, and the success of single actions."""
     drawing = new_figure(13.0, 4.2 * len(tasks))
     panels = drawing.subplots(len(tasks), 3, squeeze=False)
     for (variation, agree, goals), (task, found) in zip(panels, tasks.items(), strict=True):
@@ -121,13 +127,13 @@ def _dots(axes: Any, found: Compared, name: str, label: str) -> None:
     for place, (robot, one) in enumerate(found.live.items(), start=1):
         axes.plot([place], [getattr(one, name)], "D", color=COLORS[robot])
         axes.axhspan(min(offline), max(offline), color="0.5", alpha=0.08, linewidth=0.0)
-    axes.set_xticks(range(1 + len(found.live)), ["offline,\na dot a seed", *found.live], fontsize=8)
+    axes.set_xticks(range(1 + len(found.live)), ["offline,\none dot per seed", *found.live], fontsize=8)
     axes.set(xlim=(-0.5, len(found.live) + 0.5), ylim=(0.0, None) if name == "variation" else (None, 1.005), ylabel=label)
     axes.grid(alpha=0.2, axis="y")
 
 
 def _goals(axes: Any, task: str, found: Compared, least: int) -> None:
-    """How often actions reach their goal, live against offline."""
+    """Draw the share of tries in which an action reaches its goal, live against offline."""
     robot = load_robot(ROBOT)
     rng = np.random.default_rng(0)
     for name in (name for name in ROBOTS if name in found.live):
@@ -139,7 +145,7 @@ def _goals(axes: Any, task: str, found: Compared, least: int) -> None:
             reach = [np.take_along_axis(shares(counts), np.maximum(goals, 0), axis=-1)[..., 0][both] for counts in (offline, live)]
             pairs.append(np.stack(reach, axis=1))
         points = np.concatenate(pairs)
-        points = points + rng.uniform(-0.02, 0.02, points.shape)  # many lie on each other
+        points = points + rng.uniform(-0.02, 0.02, points.shape)  # separates equal points
         axes.plot(*points.T, ".", color=COLORS[name], markersize=4, alpha=0.4, label=f"{name}: {len(points)} state-actions")
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.5", linewidth=0.8)
     axes.set(xlabel="share that reach their goal, offline", ylabel="live", aspect="equal")

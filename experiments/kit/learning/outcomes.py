@@ -17,75 +17,75 @@ from experiments.kit.sweep import grouped_by
 from mobee import Lattice
 from mobee.arrays import Array, Ints
 
-SOMETIMES = (0.1, 0.9)  # shares of failures between which an action neither works nor fails
+UNCERTAIN = (0.1, 0.9)  # shares of failures between which the outcome of an action is uncertain
 
 
 def goals_of(space: Lattice, seen: Ints) -> Ints:
-    """The goal state of each transition, (T,)."""
+    """Return the goal state of each transition, (T,)."""
     found: Ints = space.goals[seen[:, 0], seen[:, 1]]
     return found
 
 
 def tries_of(space: Lattice, seen: Ints) -> Ints:
-    """The number of tries of each action, (S, A)."""
+    """Return the number of tries of each action, (S, A)."""
     tries = np.zeros(space.goals.shape, dtype=np.intp)
     np.add.at(tries, (seen[:, 0], seen[:, 1]), 1)
     return tries
 
 
 def failures_of(space: Lattice, seen: Ints) -> Ints:
-    """The number of tries of each action that did not end in its goal, (S, A)."""
+    """Return the number of tries of each action that did not end in its goal, (S, A)."""
     return tries_of(space, seen[seen[:, 2] != goals_of(space, seen)])
 
 
 def failure_shares(space: Lattice, seen: Ints) -> Array:
-    """The share of the tries of each action that did not end in its goal, (S, A); NaN where there was no try."""
+    """Return the share of the tries of each action that did not end in its goal, (S, A); NaN without tries."""
     with np.errstate(invalid="ignore"):
         shares: Array = failures_of(space, seen) / tries_of(space, seen)
     return shares
 
 
 def visits_of(space: Lattice, seen: Ints) -> Ints:
-    """The number of times each state was reached, (S,)."""
+    """Return how often each state was reached, (S,)."""
     return np.bincount(seen[:, 2], minlength=len(space))
 
 
 def ends_of(space: Lattice, seen: Ints, source: int, goal: int) -> dict[int, int]:
-    """The states in which the action from `source` towards `goal` ended, and how often, the most frequent first."""
+    """Return how often the action from `source` towards `goal` ended in each state, the most frequent first."""
     tried = (seen[:, 0] == source) & (goals_of(space, seen) == goal)
     states, counts = np.unique(seen[tried, 2], return_counts=True)
     return {int(states[i]): int(counts[i]) for i in np.argsort(-counts, kind="stable")}
 
 
 def outcome_counts(space: Lattice, seen: Ints) -> Ints:
-    """The number of different states in which each action ended, (S, A)."""
+    """Return the number of different states in which each action ended, (S, A)."""
     return tries_of(space, np.unique(seen, axis=0))
 
 
 def exists_in(space: Lattice) -> NDArray[np.bool_]:
-    """The entries of (S, A) that are actions."""
+    """Return which entries of (S, A) are actions."""
     return np.asarray(space.goals >= 0)
 
 
 def first_places(values: ArrayLike) -> Ints:
-    """The places at which each value occurs for the first time, ascending."""
+    """Return the indices at which each value occurs for the first time, ascending."""
     return np.sort(np.unique(values, return_index=True)[1])
 
 
 def first_tries(space: Lattice, seen: Ints) -> Ints:
-    """The transitions, counted from 1, that tried a state-action for the first time, ascending."""
+    """Return the numbers, counted from 1, of the transitions that tried a state-action for the first time, ascending."""
     return first_places(seen[:, 0] * space.goals.shape[1] + seen[:, 1]) + 1
 
 
 def uncertain_in(space: Lattice, seen: Ints) -> int:
-    """The number of actions that failed in 10 to 90 % of their tries."""
+    """Return the number of actions that failed in 10 to 90 % of their tries."""
     shares = failure_shares(space, seen)
-    return int(((shares > SOMETIMES[0]) & (shares < SOMETIMES[1])).sum())
+    return int(((shares > UNCERTAIN[0]) & (shares < UNCERTAIN[1])).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Explored:
-    """The counts of one run: tries and failures (E,) of the state-actions, visits (S,) of the states, and all `values` of its cell."""
+    """Counts of one run: tries and failures (E,) of the state-actions, visits (S,) of the states, and all `values` of its cell."""
 
     seed: int
     tries: Ints
@@ -98,7 +98,7 @@ Groups = dict[tuple[str, str], list[Explored]]  # values of two settings
 
 
 def explored(found: Mapping[str, CellResult], space_of: Callable[[str], Lattice], where: str, how: str) -> Groups:
-    """The runs that recorded transitions as "seen", by seed, under the values of two settings; `where` decides the space."""
+    """Group the runs that recorded transitions as "seen" by two settings, sorted by seed; the setting `where` decides the space."""
     return {
         (place, method): [_explored(space_of(place), result) for result in results]
         for (place, method), results in grouped_by(found, where, how).items()
@@ -112,21 +112,21 @@ def _explored(space: Lattice, result: CellResult) -> Explored:
 
 
 def constraint_actions(runs: Sequence[Explored]) -> NDArray[np.bool_]:
-    """The actions at constraints, (E,): those that failed in more than half of the tries of all runs; all False without runs."""
+    """Return which actions are at constraints, (E,): those that failed in more than half of the tries of all runs."""
     return np.asarray(2 * sum(run.failures for run in runs) > sum(run.tries for run in runs))
 
 
 def relative_tries(tries: Ints, chosen: NDArray[np.bool_]) -> float:
-    """Mean tries of the chosen state-actions over those of the others; NaN if there are none to compare."""
+    """Return the mean tries of the chosen state-actions over those of the others; NaN if one group is empty."""
     if not chosen.any() or not tries[~chosen].any():
         return float("nan")
     return float(tries[chosen].mean() / tries[~chosen].mean())
 
 
 def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> list[float]:
-    """`relative_tries` of each judged run at the constraint actions of the other `runs`; without those that have none to compare.
+    """Return `relative_tries` of each judged run at the constraint actions of the other `runs`, without NaN.
 
-    The run that is judged is left out, so that the tries of an action that fails by chance are not counted on both sides.
+    The judged run itself is left out, so that tries of an action that failed by chance do not count on both sides.
     """
     ratios = [relative_tries(one.tries, constraint_actions([run for run in runs if run is not one])) for one in judged]
     return [ratio for ratio in ratios if np.isfinite(ratio)]

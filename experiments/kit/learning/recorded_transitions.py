@@ -1,4 +1,4 @@
-"""All transitions of a run: of the stores of its agents, and of the cells of a sweep."""
+"""Reads all transitions of a run: from the stores of its agents, and from the cells of a sweep."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from experiments.kit.cells import FOLDER, load_cells
 from mobee.errors import InvalidValue
 from mobee.store import TransitionStore
 
-SEEN = "seen"  # the array of a cell with one agent's transitions, or what comes before "_<part>" in the names of several
+SEEN = "seen"  # the array of a cell with one agent's transitions; with several agents seen_<part>
 
 
 @dataclass(frozen=True)
 class Record:
     """The transitions of one agent.
 
-    `source`: the file they are from, in the run's folder.  `settings`: the agent's, or the cell's.  `columns`: one list
-    of plain values each, all of one length; a cell has only n, s, a and s_next.
+    `source`: their file, relative to the run's folder.  `settings`: of the agent, or of the cell.  `columns`: lists of equal length of
+    plain values; a cell has only n, s, a and s_next.
     """
 
     source: str
@@ -31,9 +31,9 @@ class Record:
 
 
 def records(folder: Path) -> Iterator[Record]:
-    """Every agent's transitions in a run's folder.
+    """Yield the transitions of every agent in a run's folder.
 
-    Raises InvalidValue if there are none, or an array that holds none, MobeeError for a damaged file.
+    Raises InvalidValue if there are none or an array has the wrong shape, MobeeError for a damaged file.
     """
     found = False
     for record in (*_of_stores(folder), *_of_cells(folder)):
@@ -67,5 +67,5 @@ def _of_cells(folder: Path) -> Iterator[Record]:
 
 def _checked(array: Any, where: str) -> Any:
     if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidValue(f"{where} is no array of transitions, shape (T, 3): state, action, state reached.")
+        raise InvalidValue(f"{where} is not an array of transitions, shape (T, 3): state, action, state reached.")
     return array

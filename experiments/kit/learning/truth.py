@@ -1,8 +1,8 @@
-"""True outcomes of the actions of a plant, measured by many tries, and the error of transition models beside them.
+"""True outcomes of the actions of a plant, measured by many tries, and errors of transition models with respect to them.
 
-The end of an action depends on the pose in its cell, and the momentum, with which the part arrived.  So the tries are those of a walk
-through the states, which begins each action at the end of the last one, as an agent does: half of its steps go to a random
-neighbour, half towards actions that lack tries.
+The outcome of an action depends on the pose within the cell, and the momentum, with which the part arrived.  The tries are therefore
+those of a walk through the states, in which each action starts where the last one ended, as for an agent: half of its steps go to a
+random neighbour, half towards actions that need more tries.
 """
 
 from __future__ import annotations
@@ -32,10 +32,9 @@ CERTAIN = 0.9  # probability of the most likely outcome, below which an action i
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Frequencies of the outcomes of each action, as an OutcomeModel.
+    """Measured frequencies of the outcomes of each action; an OutcomeModel.
 
-    `outcomes`, `probabilities`: (S, A, B); no probability where there is no action or no try.  `tries`: (S, A).
-    `settings`: of the space.
+    `outcomes`, `probabilities`: (S, A, B), probability 0 where there is no action or no try.  `tries`: (S, A).  `settings`: of the space.
     """
 
     outcomes: Ints
@@ -44,23 +43,23 @@ class Truth:
     settings: dict[str, Any]
 
     def save(self, path: Path) -> None:
-        """Write it as .npz."""
+        """Write the frequencies to a .npz file."""
         np.savez_compressed(
             path, outcomes=self.outcomes, probabilities=self.probabilities, tries=self.tries, settings=json.dumps(self.settings)
         )
 
 
 def load_truth(path: Path, space: Space) -> Truth:
-    """Read what `Truth.save` wrote; raises InvalidValue if it is of another space."""
+    """Read a file written by `Truth.save`; raises InvalidValue if it belongs to another space."""
     with np.load(path) as file:
         truth = Truth(file["outcomes"], file["probabilities"], file["tries"], json.loads(str(file["settings"])))
     if truth.settings["digest"] != space.settings["digest"]:
-        raise InvalidValue(f"{path} is about another space, {truth.settings}: measure the truth of this one, {space.settings}.")
+        raise InvalidValue(f"{path} belongs to another space, {truth.settings}: measure the outcomes of this one, {space.settings}.")
     return truth
 
 
 def truth_of(space: Space, seen: Ints) -> Truth:
-    """The frequencies of outcomes in transitions, shape (T, 3): state, action, state reached."""
+    """Return the frequencies of outcomes in transitions, shape (T, 3): state, action, state reached."""
     states, actions = space.goals.shape
     keys, counts = np.unique(np.ravel_multi_index(tuple(seen.T), (states, actions, states)), return_counts=True)
     pair, reached = np.divmod(keys, states)
@@ -80,22 +79,22 @@ def truth_of(space: Space, seen: Ints) -> Truth:
 def measure_truth(
     space: Space, plant_of: Callable[[int], Plant], tries: int, seeds: Iterable[int], most: int, processes: int | None = None
 ) -> Truth:
-    """The frequencies in walks that try every action that often, one walk a seed, at the same time.
+    """Measure the frequencies of outcomes in parallel walks, one for each seed, that try every action `tries` times.
 
     Args:
         space: states and actions.
         plant_of: a function of a module that makes a plant of a seed.
-        tries: of each action in each walk.
-        seeds: of walks and plants.
-        most: actions of a walk, where some states cannot be reached.
-        processes: None: one a core.
+        tries: number of tries of each action in each walk.
+        seeds: seeds of walks and plants.
+        most: largest number of actions of a walk, for spaces with states that cannot be reached.
+        processes: number of processes; None: one per core.
     """
     seen = run_batch(partial(walk, space, plant_of, tries, most), seeds, processes)
     return truth_of(space, np.concatenate(seen))
 
 
 def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, seed: int) -> Ints:
-    """The transitions of a walk until it has tried every action that often, shape (T, 3): state, action, state reached."""
+    """Walk until every action was tried `tries` times; returns the transitions (T, 3): state, action, state reached."""
     plant, rng = plant_of(seed), np.random.default_rng(seed)
     model, values = TransitionModel(space), np.zeros(len(space))
     state = begin_nearby(space, plant, seed)
@@ -117,9 +116,9 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
 
 
 def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
-    """The sum of |p - q| over the outcomes of each state-action, 0 to 2, shape (S, A); NaN where the truth is not known.
+    """Return the sum of |p - q| over the outcomes of each state-action, 0 to 2, shape (S, A); NaN where the truth is unknown.
 
-    Bins of the two may differ in order and number, and several may be of one state.
+    The bins of the two models may differ in order and number, and several bins may stand for one state.
     """
     states, actions = truth.outcomes.shape[:2]
     pair = np.arange(states * actions)[:, None]
@@ -135,23 +134,23 @@ def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
 
 
 def most_likely(truth: OutcomeModel) -> Array:
-    """The probability of each action's most likely outcome, shape (S, A); NaN where the truth is not known."""
+    """Return the probability of the most likely outcome of each action, shape (S, A); NaN where the truth is unknown."""
     highest: Array = truth.probabilities.max(axis=-1)
     return np.where(highest > 0.0, highest, np.nan)
 
 
 def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, float]:
-    """Mean L1 over all state-actions, and over the stochastic ones: those whose most likely outcome has less than .9 (NaN: none)."""
+    """Return the mean L1 error over all state-actions, and over the stochastic ones: most likely outcome below .9 (NaN: none)."""
     error = l1(beliefs, truth)
     stochastic = most_likely(truth) < CERTAIN
     return float(np.nanmean(error)), float(error[stochastic].mean()) if stochastic.any() else float("nan")
 
 
 def sampling_error(truth: Truth) -> Array:
-    """The expected L1 distance between these frequencies and the distribution they were drawn from, shape (S, A); NaN untried.
+    """Return the expected L1 distance between the frequencies and their true distribution, shape (S, A); NaN without tries.
 
-    The sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)): no smaller error of a
-    model can be measured.
+    It is the sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)): smaller errors of
+    a model cannot be measured.
     """
     p = truth.probabilities
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -20,13 +20,13 @@ from msgspec import Struct
 
 from mobee.errors import MobeeError
 
-_STARTS, _ENDS = 120.0, 30.0  # s
-_LOOK = 0.5  # s between two calls of who watches
+_START_TIMEOUT, _END_TIMEOUT = 120.0, 30.0  # s
+_WATCH_PERIOD = 0.5  # s between two calls of `watch`
 TABLE = Path(__file__).with_name("table.xml")  # a world: the iCub's table with nothing on it
 
 
 class LaunchFailed(MobeeError):
-    """A system that did not come to its end; the message is its last word."""
+    """Raised when a system fails or does not end; the message holds the last line of its errors."""
 
 
 def summary_of(
@@ -41,8 +41,8 @@ def summary_of(
 ) -> dict[str, Any]:
     """Launch a scenario without monitor, wait for its end, and return its summary.  Raises LaunchFailed.
 
-    It ends after `duration` seconds, or in lockstep after so many `ticks`.  `runs`: where its folder stays; None: nowhere.
-    `watch` is called with the launcher's process id twice a second.
+    It ends after `duration` seconds, or in lockstep after this number of `ticks`.  `runs`: parent of its run folder; None: the folder
+    is temporary.  `watch` is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
         argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
@@ -51,41 +51,41 @@ def summary_of(
         argv += [] if ticks is None else ["--ticks", str(ticks)]
         for setting in settings:
             argv += ["--set", setting]
-        # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
+        # In a process group of its own, so that a terminal's Ctrl-C reaches only this process, which then stops it in order.
         process = subprocess.Popen(
             argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0, env={**os.environ, **(environment or {})}
         )
         try:
-            said, news = _watched(process, watch, math.inf if ticks else _STARTS + _ENDS + (duration or 0.0))
+            output, errors = _watched(process, watch, math.inf if ticks else _START_TIMEOUT + _END_TIMEOUT + (duration or 0.0))
         except subprocess.TimeoutExpired:
-            raise LaunchFailed(f"{scenario}: no end in sight") from None
+            raise LaunchFailed(f"{scenario}: it did not end in time") from None
         finally:
             stop(process)
     if process.returncode != 0:
-        raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(news.strip().splitlines() or ['it said nothing'])[-1]}")
-    return dict(json.loads(said))
+        raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(errors.strip().splitlines() or ['no message'])[-1]}")
+    return dict(json.loads(output))
 
 
 def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], seconds: float) -> tuple[str, str]:
-    """What it said on both streams until its end; raises TimeoutExpired."""
-    late = time.monotonic() + seconds
+    """Wait for the end of a process and return its output and its errors; raises TimeoutExpired."""
+    deadline = time.monotonic() + seconds
     while True:
         try:
-            said, news = process.communicate(timeout=_LOOK)
+            output, errors = process.communicate(timeout=_WATCH_PERIOD)
         except subprocess.TimeoutExpired:
-            if time.monotonic() > late:
+            if time.monotonic() > deadline:
                 raise
             watch(process.pid)
         else:
-            return said, news
+            return output, errors
 
 
 def stop(process: subprocess.Popen[Any]) -> int:
-    """End a system that leads a group of its own, in order if it can; returns its exit code."""
+    """Stop a system that leads its own process group, by SIGINT if it reacts, else by SIGKILL; returns its exit code."""
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
         try:
-            process.communicate(timeout=_ENDS)
+            process.communicate(timeout=_END_TIMEOUT)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -93,7 +93,7 @@ def stop(process: subprocess.Popen[Any]) -> int:
 
 
 def free_endpoint() -> str:
-    """An address on which nobody listens."""
+    """Return the address of a free TCP port on the loopback interface."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -104,30 +104,30 @@ JOB, DONE = "job.json", "done.jsonl"
 
 
 def write_job(folder: Path, job: Struct) -> None:
-    """Into a folder that it makes; what a launch that was broken off has left there goes."""
+    """Make the folder and write the job into it; results of an interrupted launch are removed."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / DONE).unlink(missing_ok=True)
     (folder / JOB).write_bytes(msgspec.json.encode(job))
 
 
 def read_job(folder: Path, kind: type[T]) -> T:
-    """What `write_job` wrote."""
+    """Read the job written by `write_job`."""
     return msgspec.json.decode((folder / JOB).read_bytes(), type=kind)
 
 
 def append_done(folder: Path, record: Struct) -> None:
-    """It is in the file when this returns."""
+    """Append a result to the file; it is on disk when this returns."""
     with (folder / DONE).open("ab") as file:
         file.write(msgspec.json.encode(record) + b"\n")
 
 
 def read_done(folder: Path, kind: type[T]) -> list[T]:
-    """All of a launch; none if there is no file."""
+    """Read all results of a launch; [] if there is no file."""
     path = folder / DONE
     return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()] if path.exists() else []
 
 
-PATIENCE = 60.0  # s for a tick of lockstep: the performer plans in one
+TICK_TIMEOUT = 60.0  # s for a tick of lockstep; the performer plans within one tick
 
 _SCENARIO = """# Written by an experiment.
 title = "{title}"
@@ -169,13 +169,13 @@ def launch(
     lockstep: bool = True,
     simulated: str = "",
 ) -> dict[str, Any]:
-    """Launch the system with a performer; its recording is left in the folder, and its summary returned.
+    """Launch the live robot with PyBullet and a performer; returns the summary and leaves the recording in `folder`.
 
-    `perform`: the performer's function, see `Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: of robot time,
-    after which the system ends; `simulated`: the simulator's world where it is not the model's.  Raises LaunchFailed.
+    `perform`: the performer's function, see `performer.config.Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: robot
+    time after which the system ends; `simulated`: the simulator's world if it is not the model's.  Raises LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    mode = f'mode = "lock"\npatience = {PATIENCE:g}' if lockstep else ""
+    mode = f'mode = "lock"\npatience = {TICK_TIMEOUT:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
     values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
     values |= {"rate": rate, "speed": speed, "perform": perform}

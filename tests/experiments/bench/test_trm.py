@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.bench.trm import LEAST_SQUARES, NES, Settings, measure, verdict
-from experiments.claims.ch3_roadmaps import trm_coverage as coverage
+from experiments.claims.ch3_roadmaps import trm as coverage
 from mobee.roadmap.building.lattice_builder import Patience
 
 
@@ -11,7 +11,7 @@ from mobee.roadmap.building.lattice_builder import Patience
 def result() -> dict:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(coverage, "GENEROUS", Patience(starts=4, tries=2, scouts=64))
-        patch.setattr(coverage, "BLIND", 20)
+        patch.setattr(coverage, "RANDOM_POINTS", 20)
         return measure(Settings(spacing=0.08, seeds=2, vertices=20, methods=(LEAST_SQUARES,)))
 
 

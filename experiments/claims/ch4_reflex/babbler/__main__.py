@@ -11,7 +11,7 @@ from msgspec import structs
 from bus_schema.messages import Clock, Turn
 from experiments.claims.ch4_reflex.babbler.config import Config
 from experiments.claims.ch4_reflex.babbler.movers import AtDrives, AtGoals
-from experiments.claims.ch4_reflex.babbling_commands import COMMANDS, Commanded, CommandLog, Targets
+from experiments.claims.ch4_reflex.babbling_trial import COMMANDS, Commanded, CommandLog, Targets
 from mobee import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import load_config

@@ -10,7 +10,7 @@ import numpy as np
 from bus_schema import keys
 from bus_schema.messages import Command, Message, Motion, State
 from bus_schema.rpc import Driven, Goal, Started, Take, Taken, WithEpoch
-from experiments.claims.ch4_reflex.babbling_commands import Commanded, Ending, PositionMove, Targets
+from experiments.claims.ch4_reflex.babbling_trial import Commanded, Ending, PositionMove, Targets
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed

@@ -1,1 +1,1 @@
-"""A service that performs an experiment on the live robot, and its launch; see `Config`."""
+"""A service that calls a function of an experiment on the live robot; see `Config`."""

@@ -16,7 +16,7 @@ from services.common.service import Service
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Call the function, and have the launcher end the system."""
+    """Call the configured function, then ask the launcher to shut the system down."""
     config = load_config(Config, argv, "experiments.kit.live.performer")
     module, _, function = config.perform.partition(":")
     with explained(config.perform):

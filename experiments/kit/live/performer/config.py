@@ -9,6 +9,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The performer's settings."""
 
     perform: str = ""
-    """The function that it calls with its service and the folder of its job, as "package.module:function"."""
+    """The function to call with the service and the folder of the job, as "package.module:function"."""
     run_dir: str = ""
-    """Folder of its job and its results."""
+    """Folder of the job and of the results."""

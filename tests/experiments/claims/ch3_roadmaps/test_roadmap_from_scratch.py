@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.claims.ch3_roadmaps.roadmap_from_scratch import CLAIMS, findings, plot, trial, unreached
-from experiments.claims.ch3_roadmaps.roadmap_from_scratch_explorer import SAMPLES
+from experiments.claims.ch3_roadmaps.roadmap_from_scratch import CLAIMS, SAMPLES, findings, plot, trial, unreached
 
 pytest.importorskip("ompl")
 

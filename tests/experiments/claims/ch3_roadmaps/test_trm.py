@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.claims.ch3_roadmaps import trm, trm_coverage
+from experiments.claims.ch3_roadmaps import trm
 from experiments.claims.ch3_roadmaps.trm import (
     CLAIMS,
     COLUMNS,
@@ -17,12 +17,14 @@ from experiments.claims.ch3_roadmaps.trm import (
     SOON,
     VALID,
     built,
+    coverage,
     findings,
     judged,
     maps,
+    reachable,
     rebuilt,
+    valid,
 )
-from experiments.claims.ch3_roadmaps.trm_coverage import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_pictures import caption_of, cloud_panel, planned
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell
@@ -49,9 +51,9 @@ def arm() -> mobee.Model:
 
 @pytest.fixture
 def brief(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trm_coverage, "GENEROUS", Patience(tries=4))
-    monkeypatch.setattr(trm_coverage, "BLIND", 50)
-    monkeypatch.setattr(trm_coverage, "STARTS", 4)
+    monkeypatch.setattr(trm, "GENEROUS", Patience(tries=4))
+    monkeypatch.setattr(trm, "RANDOM_POINTS", 50)
+    monkeypatch.setattr(trm, "STARTS", 4)
 
 
 @pytest.fixture(scope="module")

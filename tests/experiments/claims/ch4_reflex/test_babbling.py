@@ -12,31 +12,29 @@ from hypothesis import strategies as st
 
 from experiments.claims.ch4_reflex import babbling
 from experiments.claims.ch4_reflex.babbling import EXPERIMENT, as_table, depth_histogram, summarise, verdict
-from experiments.claims.ch4_reflex.babbling_commands import (
+from experiments.claims.ch4_reflex.babbling_trial import (
     COMMANDS,
     COUNT,
-    Commanded,
-    CommandLog,
-    PositionMove,
-    Targets,
-    moved_motors,
-    read_commands,
-)
-from experiments.claims.ch4_reflex.babbling_trial import (
     FILTERED,
     MODES,
     REACHED,
     RETURNED,
     SUMMARY,
+    Commanded,
+    CommandLog,
     Judged,
     Lockstep,
+    PositionMove,
+    Targets,
     Trial,
     TrialFailed,
     beyond_limits,
     jerk,
     judge,
     measure,
+    moved_motors,
     path_length,
+    read_commands,
     read_trial,
     scenario,
     speed,

@@ -5,8 +5,18 @@ from dataclasses import replace
 import pytest
 
 from experiments.claims.ch5_control import gain_tuning
-from experiments.claims.ch5_control.gain_tuning import EXPERIMENT, TUNED, gains_with, numbers_of, read_tried, search
-from experiments.claims.ch5_control.gain_tuning_criteria import Judged, objective, press, press_targets
+from experiments.claims.ch5_control.gain_tuning import (
+    EXPERIMENT,
+    TUNED,
+    Judged,
+    gains_with,
+    numbers_of,
+    objective,
+    press,
+    press_targets,
+    read_tried,
+    search,
+)
 from experiments.kit.control.plant_runs import icub
 from mobee import Gains
 from tests.experiments.small_run import options_of, small_run

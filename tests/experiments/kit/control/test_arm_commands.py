@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.kit.control.arm_commands import FAR, LONG, SHORT, as_numbers, from_numbers, random_command, vary
+from experiments.kit.control.arm_commands import FARTHEST, LONG, SHORT, as_numbers, from_numbers, random_command, vary
 
 
 def test_random_commands_leave_the_joint_box_and_stay_in_it() -> None:
     commands = [random_command(np.random.default_rng(seed), forced=False) for seed in range(40)]
     inside = [command for command in commands if command.is_inside]
     assert 10 <= len(inside) <= 30
-    assert max(np.abs(command.attractors).max() for command in commands) > 0.8 * FAR
+    assert max(np.abs(command.attractors).max() for command in commands) > 0.8 * FARTHEST
     assert not any(command.is_forced for command in commands)
     assert all((command.seconds >= SHORT).all() and (command.seconds <= LONG).all() for command in commands)
 
@@ -20,7 +20,7 @@ def test_a_variation_keeps_a_command_in_its_box(seed) -> None:
     rng = np.random.default_rng(seed)
     one, other = random_command(rng, forced=True), random_command(rng, forced=True)
     new = vary(rng, one, other)
-    assert np.abs(new.start).max() <= 1.0 and np.abs(new.attractors).max() <= FAR and np.abs(new.forces).max() <= 1.0
+    assert np.abs(new.start).max() <= 1.0 and np.abs(new.attractors).max() <= FARTHEST and np.abs(new.forces).max() <= 1.0
     assert np.abs(new.pushes).max() <= 1.0
     assert not np.array_equal(new.seconds, one.seconds)
 

@@ -1,20 +1,21 @@
-"""Crossings of `replanning` on the live robot, to the other side of a ball that turns solid during the motion."""
+"""The crossings of `replanning` on the live robot: the scene, a map of three poses around a ball, and a performer."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from msgspec import Struct
 
 from bus_schema import keys
 from bus_schema.messages import Clock, Commands, Forces
 from bus_schema.rpc import Done, Place, Request, SetRole
-from experiments.claims.ch3_roadmaps.replanning_scene import BALL, LEFT, PART, RATE, RIGHT, Acted, Crossing, Job, ball, new_map, robot
 from experiments.kit.live.launch import append_done, read_job
-from mobee import ActionInterrupted, MobeeError, Walker
+from mobee import ActionInterrupted, AdaptiveRoadmap, MobeeError, Model, Space, Walker, load_robot, load_world
 from mobee.arrays import Array
 from mobee.plant import Outcome
 from mobee.robot.robot import Robot
@@ -23,20 +24,84 @@ from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
-APART = 500_000_000  # ns without a force of an object before its next touch: at a field's border noise decides
-AWAY = [0.6, 0.9, 0.6]  # m, where the simulator's ball is out of reach
+ROBOT, PART, MARKER = "icub", "right_arm", "right_palm"
+BALL, RADIUS = "ball", 0.03
+RIGHT, LEFT, ABOVE = 0, 1, 2  # vertices
+POSES = (  # rad, shoulder and elbow; the wrist is straight
+    (-0.41, 1.36, 0.84, 0.68),  # at the right of the ball
+    (-1.22, 0.58, 0.94, 1.30),  # at its left
+    (-1.14, 1.38, 0.30, 0.67),  # above it
+)
+GOALS = ((LEFT, ABOVE), (RIGHT, ABOVE), (RIGHT, LEFT))
+WORLD = Path(__file__).with_name("replanning_ghost.xml")  # what the model knows
+SIMULATED = Path(__file__).with_name("replanning_away.xml")  # what the simulator has, until the ball is moved there
+RATE, SPEED = 100.0, 1.0  # Hz; share of the motors' speed
+
+
+@cache
+def robot() -> Robot:
+    """Return the iCub."""
+    return load_robot(ROBOT)
+
+
+def new_map() -> AdaptiveRoadmap:
+    """Return the map before any observation."""
+    arm = robot().parts[PART]
+    samples = np.zeros((len(POSES), 7))
+    samples[:, :4] = POSES
+    low, high = robot().limits[arm.slice].T
+    rest = np.clip((robot().home[arm.slice] - low) / (high - low), 0.0, 1.0)
+    return AdaptiveRoadmap(Space(robot(), arm.motors[:7], samples, GOALS, rest.tolist()), both_ways=True)
+
+
+def model() -> Model:
+    """Return the model, with the ball as a ghost."""
+    return Model(robot(), load_world(str(WORLD)))
+
+
+def ball() -> Array:
+    """Return the position of the ball, (3,) m."""
+    return model().world.objects[BALL].position
+
+
+class Job(Struct, frozen=True):
+    """Crossings to make: the times [s] after their start at which the ball becomes solid."""
+
+    after: list[float]
+
+
+class Acted(Struct, frozen=True):
+    """A motion; ticks are robot_sim's."""
+
+    vertex: int  # its target
+    asked: int  # tick of the request
+    commanded: int  # tick in which a command formed after the request was first in force
+    bump: int  # tick at which the model first said that the arm touches the ball, -1: never
+    ended: int  # tick at which its end was received
+    thinking: float  # s of processor time between the end of the motion before and the request
+
+
+class Crossing(Struct, frozen=True):
+    """One crossing from the right of the ball to its left."""
+
+    solid: int  # tick at which the ball was made solid
+    motions: list[Acted]
+
+
+MIN_GAP = 500_000_000  # ns without a force of an object before a new touch: noise toggles contacts at a field's border
+AWAY = [0.6, 0.9, 0.6]  # m, a place of the simulator's ball out of reach
 
 
 def perform(service: Service, folder: Path) -> None:
     """Make the crossings of the job in the folder."""
     job = read_job(folder, Job)
-    new_map().plan(RIGHT, LEFT)  # what is imported for the first plan is imported before the robot moves
+    new_map().plan(RIGHT, LEFT)  # imports what planning needs before the robot moves
     with ExitStack() as stack:
         watcher = None
         if service.config.mode == "lock":
             watcher = stack.enter_context(Service("watcher", service.config, robot(), inbox=service.inbox))
             watcher.ready()
-        hand = FeelingPlant(service, robot(), PART, {BALL}, watcher)
+        hand = ContactStopPlant(service, robot(), PART, {BALL}, watcher)
         crosser = Crosser(service, hand)
         service.ready()
         hand.measure(PART)
@@ -46,7 +111,7 @@ def perform(service: Service, folder: Path) -> None:
 
 
 def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
-    """A crossing without interruption: where the machine is too busy for real time the robot holds, and the crossing is repeated."""
+    """Make a crossing; repeat it if the robot holds in between, as on a machine too busy for real time."""
     while True:
         try:
             return crosser.cross(after)
@@ -55,9 +120,9 @@ def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
 
 
 class Crosser:
-    """The arm as a plant that records its motions, and turns the ball solid during a crossing."""
+    """The arm as a plant that records its motions and makes the ball solid during a crossing."""
 
-    def __init__(self, service: Service, hand: FeelingPlant) -> None:
+    def __init__(self, service: Service, hand: ContactStopPlant) -> None:
         self.robot, self.motions = hand.robot, list[Acted]()
         self._service, self._hand = service, hand
         self._map = new_map()
@@ -87,7 +152,7 @@ class Crosser:
         return outcome
 
     def cross(self, after: float) -> Crossing:
-        """From the right to the left on a map as it was made; the ball turns solid so many seconds after the start."""
+        """Cross from right to left on a new map; the ball becomes solid `after` seconds."""
         self.turn(solid=False)
         walker = Walker(new_map(), self, back=False)
         walker.go(RIGHT)
@@ -97,21 +162,21 @@ class Crosser:
         return Crossing(self._solid, list(self.motions))
 
     def turn(self, solid: bool) -> None:
-        """Make the ball solid, in the model and in the simulator, or a ghost; in free mode it does not wait for the answers."""
+        """Make the ball solid or a ghost, in the model and in the simulator; does not wait for the answers in free mode."""
         role, place = "obstacle" if solid else "ghost", self._place if solid else AWAY
         if self._service.locked:
             self._service.call(keys.world_rpc("role"), SetRole, Done, name=BALL, role=role)
             self._service.call(keys.sim("place"), Place, Done, name=BALL, position=place, tries=3)
         else:
-            self._service.ask(keys.world_rpc("role"), Done, self._heard, request=SetRole, name=BALL, role=role)
-            self._service.ask(keys.sim("place"), Done, self._heard, request=Place, name=BALL, position=place)
+            self._service.ask(keys.world_rpc("role"), Done, self._check_answer, request=SetRole, name=BALL, role=role)
+            self._service.ask(keys.sim("place"), Done, self._check_answer, request=Place, name=BALL, position=place)
 
-    def _heard(self, answer: Done | CallFailed) -> None:
+    def _check_answer(self, answer: Done | CallFailed) -> None:
         if isinstance(answer, CallFailed):
             raise MobeeError(f"the ball cannot be changed: {answer}")
 
     def _tick(self, k: int) -> None:
-        """The first motion of a crossing begins when its request has been answered, so the next tick is its first."""
+        """Count from the first tick after the request of the first motion was answered, and make the ball solid when it is time."""
         if self._after >= 0.0 and not self.motions:
             self._solid_at, self._after = k + round(self._after * RATE), -1.0
         if 0 <= self._solid_at <= k:
@@ -119,11 +184,11 @@ class Crosser:
             self.turn(solid=True)
 
 
-class FeelingPlant(BusPlant):
-    """A BusPlant whose actions end, not settled, as soon as the model says that the part begins to touch one of some objects.
+class ContactStopPlant(BusPlant):
+    """A BusPlant whose actions end, not settled, when the model reports that the part begins to touch one of some objects.
 
-    In lockstep a second service of the same process, the watcher, takes part in every tick, since a part in motion receives none;
-    it answers a tick when the forces of that tick have been processed, so what is decided on them falls into that tick.
+    In lockstep a part in motion receives no ticks.  A second service of the same process, the watcher, therefore takes part in every
+    tick; it answers a tick after the forces of that tick have been processed, so that decisions on them fall into the same tick.
 
     Args:
         service, robot, part: see BusPlant.
@@ -134,17 +199,17 @@ class FeelingPlant(BusPlant):
     def __init__(self, service: Service, robot: Robot, part: str, objects: Collection[str], watcher: Service | None = None) -> None:
         super().__init__(service, robot, (part,))
         self._part, self._objects = part, frozenset(objects)
-        self._last = -APART  # ns, when an object was last felt
+        self._last = -MIN_GAP  # ns, time of the last force of an object
         self.bump: int | None = None
-        """Tick at which the part began to touch an object since its last action was asked for."""
+        """Tick since the request of the last action at which the part began to touch an object; None: not yet."""
         self.asked = 0
-        """Tick at which the last action was asked for."""
+        """Tick of the request of the last action."""
         self.commanded = -1
         """Tick in which a command formed after the last request is first in force, -1: not yet."""
         self.on_forces: Callable[[int], None] = lambda k: None
-        """Called with every tick of which the forces have come."""
+        """Called with every tick whose forces have been received."""
         self.felt = -1
-        """The newest tick of which the forces have come."""
+        """The newest tick whose forces have been received."""
         self._watched = -1
         self._watcher = None if watcher is None else Participant(watcher)
         if watcher is not None:
@@ -153,7 +218,7 @@ class FeelingPlant(BusPlant):
         service.on_each(Commands, self._note_commands)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See FeelingPlant."""
+        """See ContactStopPlant."""
         self.bump = None
         return super().act(part, target)
 
@@ -176,14 +241,14 @@ class FeelingPlant(BusPlant):
 
     def _feel(self, forces: Forces) -> None:
         if not self._objects.isdisjoint(forces.touched.get(self._part, ())):
-            if forces.t - self._last > APART and self.bump is None:
+            if forces.t - self._last > MIN_GAP and self.bump is None:
                 self.bump = forces.re_k
             self._last = forces.t
         self.felt = forces.re_k
         self.on_forces(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
-        """Commands formed from later ticks than that of the request obey it; each acts a tick later."""
+        """Commands formed after the tick of the request follow it; each acts one tick later."""
         if self.commanded < 0 and commands.re_k > self.asked > 0:
             self.commanded = commands.re_k + 1
 
