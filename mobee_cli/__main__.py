@@ -1,4 +1,4 @@
-"""The command `mobee`: finds the verb, and imports that verb alone."""
+"""The command `mobee`: finds the verb, and imports only the module of that verb."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, INTERRUPTED
 
 VERBS = {
-    "launch": "start a scenario and keep it running",
-    "status": "how the running system is",
+    "launch": "start a scenario and supervise it",
+    "status": "print the state of the running system",
     "stop": "end the running system",
     "estop": "stop the robot at once; --reset releases it",
-    "topic": "what is said on the bus: list, echo, hz",
-    "router": "only the router, when each service runs by itself",
-    "robots": "robots and worlds that come with mobee",
-    "convert": "a robot from zero-position XML to URDF, or back",
-    "plan": "a way to anywhere, by what an agent has learned",
-    "reach": "put a hand on a place, on the robot that runs or offline",
-    "roadmap": "maps of whole-body motions: build, show, query, play",
-    "export": "the transitions of a run as one table",
-    "experiment": "claims of the papers, measured: list, run, figure",
-    "bench": "how fast mobee is on this machine, beside its peers",
-    "check": "what is wrong with a robot or world of your own",
-    "view": "a robot's file as a picture that moves",
+    "topic": "show what is published on the bus: list, echo, hz",
+    "router": "run only the router, for services that are started one by one",
+    "robots": "list the robots and worlds that come with mobee",
+    "convert": "convert a robot from zero-position XML to URDF, or back",
+    "plan": "plan a path by what an agent has learned",
+    "reach": "move a hand to a place, on the running robot or offline",
+    "roadmap": "build, show, query and play roadmaps of whole-body motions",
+    "export": "write the transitions of a run as one table",
+    "experiment": "measure the claims of the papers: list, run, figure",
+    "bench": "measure the speed of mobee on this machine, beside other programs",
+    "check": "report what is wrong with a robot or world file",
+    "view": "show a robot's file as a picture that moves",
 }
 
 EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "icub_models": "sim"}
 """Packages that some verbs import, and the extra of this project that installs each."""
 
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: threads only wait for each other
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: more threads would only wait
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb; returns the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
+    """Run the verb; return the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         code = _main(arguments)
         sys.stdout.flush()
-    except BrokenPipeError:  # the reader has seen enough, as `head` does
+    except BrokenPipeError:  # the reader has closed the pipe, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code
@@ -68,14 +68,14 @@ def _main(arguments: list[str]) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong."""
+    """Prints what is wrong with the arguments in one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; `{self.prog} --help` tells more\n")
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see `{self.prog} --help`\n")
 
 
 def parser_of(verb: str) -> argparse.ArgumentParser:
-    """The parser of a verb's options; imports the verb's module."""
+    """Return the parser of a verb's options; imports the verb's module."""
     parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
     importlib.import_module(f"mobee_cli.{verb}").add_arguments(parser)
     return parser
@@ -100,20 +100,20 @@ def _run(verb: str, arguments: list[str]) -> int:
             raise
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return ENVIRONMENT
-    except KeyboardInterrupt:  # a verb that is meant to end so does not let it come here
+    except KeyboardInterrupt:  # a verb that runs until Ctrl-C handles it by itself
         print(f"mobee {verb}: interrupted", file=sys.stderr)
         return INTERRUPTED
 
 
 def _is_not_installed(error: Exception) -> bool:
-    """Whether the library misses a package or its core; most verbs start without the library, and no other makes it load."""
+    """Return whether the library lacks a package or its core; does not import the library, which some verbs do not need."""
     errors = sys.modules.get("mobee.errors")
     return errors is not None and isinstance(error, errors.NotInstalled)
 
 
 def _usage() -> str:
     verbs = "\n".join(f"  {verb:<11}{text}" for verb, text in VERBS.items())
-    notes = "`mobee <verb> --help` tells more.\nExit codes: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."
+    notes = "`mobee <verb> --help` lists the options of a verb.\nExit codes: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."
     return f"usage: mobee <verb> [options]\n\n{verbs}\n\n{notes}"
 
 

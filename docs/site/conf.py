@@ -20,6 +20,8 @@ html_show_sourcelink = False
 
 myst_heading_anchors = 6  # a link to page.md#heading is checked, by the rule with which GitHub names headings
 
+toc_object_entries = False  # a page's headings are enough, and every page of the site holds the contents of all
+
 autodoc_member_order = "bysource"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Bools", "Ints")}
 autodoc_default_options = {"members": True, "show-inheritance": True}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import pkgutil
 
 TITLES = {
     "robot": "Robots",
@@ -20,7 +21,6 @@ TITLES = {
 """The page of a public name, by the folder or file of `mobee` that defines it; any other has a page of its own name."""
 
 SAME_PAGE = {"simulation": "plant"}
-BUS = ("keys", "messages", "chain", "rpc", "codec")
 
 
 def pages() -> dict[str, str]:
@@ -60,7 +60,7 @@ def _directive(name: str) -> str:
 
 def _bus_page() -> str:
     text = "# bus_schema\n\nThe messages of the bus, field by field; [the bus](../bus.md) says who publishes and reads them.\n"
-    for name in BUS:
+    for name in sorted(module.name for module in pkgutil.iter_modules(importlib.import_module("bus_schema").__path__)):
         text += f"\n## bus_schema.{name}\n\n```{{eval-rst}}\n.. automodule:: bus_schema.{name}\n   :undoc-members:\n```\n"
     return text
 
@@ -68,7 +68,7 @@ def _bus_page() -> str:
 def _index_page(groups: dict[str, list[str]]) -> str:
     """The list of all names, with the pages below it."""
     rows = [f"| [{TITLES.get(name, name)}]({name}.md) | {', '.join(f'`{one}`' for one in names)} |" for name, names in groups.items()]
-    listed = "\n".join(("```{toctree}", ":hidden:", "", *groups, "bus_schema", "```"))
+    listed = "\n".join(("```{toctree}", ":hidden:", ":titlesonly:", "", *groups, "bus_schema", "```"))
     return "\n".join(
         ("# Public names", "", "| page | names |", "|---|---|", *rows, "| [bus](bus_schema.md) | messages and keys |", "", listed, "")
     )
