@@ -29,8 +29,8 @@ EXPERIMENTS = {
     "neighbour-count": "experiments.claims.ch7_learning.neighbour_count",
     "nes": "experiments.claims.ch3_roadmaps.nes",
     "ngik": "experiments.claims.ch3_roadmaps.ngik",
-    "originals": "experiments.originals",
-    "own-robots": "experiments.own_robots",
+    "originals": "experiments.claims.robot_files.originals",
+    "own-robots": "experiments.claims.robot_files.own_robots",
     "planner-reach-ablation": "experiments.claims.ch8_reaching.planner_reach_ablation",
     "plant-sensitivity": "experiments.claims.ch7_learning.plant_sensitivity",
     "prm-vs-mdp": "experiments.claims.ch8_reaching.prm_vs_mdp",
@@ -50,7 +50,7 @@ EXPERIMENTS = {
     "table-discovery": "experiments.claims.ch7_learning.table_discovery",
     "trm": "experiments.claims.ch3_roadmaps.trm",
     "unreachable-states": "experiments.claims.ch7_learning.unreachable_states",
-    "urdf-files": "experiments.urdf_files",
+    "urdf-files": "experiments.claims.robot_files.urdf_files",
 }
 
 FORMER_NAMES = {  # still accepted, and read in the records of older runs

@@ -26,6 +26,7 @@ Work = Callable[[], Done]
 
 STRATEGIES = ("random", "greedy", "intrinsic")
 PLANTS = 64
+REACH_SCALE = 0.01  # m, of all checkouts
 TRIES = 100  # of 6400 of a run of chapter 8
 LOCKSTEP_TICKS = (100, 3100)  # of two runs: their difference is without the start
 
@@ -128,14 +129,13 @@ def _chapter_8() -> Work:
     learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
     targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")
     from mobee.learning.reaching.reach_agent import ReachAgent
-    from mobee.learning.reaching.reaches import SCALE
 
     problems = targets.targets_at(targets.grid(), arm.laws()["published"].aim)
     beliefs = arm.learned_beliefs(arm.reach_plant(0), 0, 3000)
 
     def run(strategy: str) -> float:
         plant = arm.reach_plant(0)
-        agent = ReachAgent(arm.reach_space(), plant, beliefs, marker=arm.MARKER, strategy=strategy, scale=SCALE, seed=0)
+        agent = ReachAgent(arm.reach_space(), plant, beliefs, marker=arm.MARKER, strategy=strategy, scale=REACH_SCALE, seed=0)
         learning.learn(agent, problems, (TRIES,), 1, {"few": problems[::2]})
         return float(plant.time)
 

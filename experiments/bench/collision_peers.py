@@ -5,12 +5,11 @@ python-fcl is asked only whether each pair touches, which is the cheapest of its
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
-from experiments.bench.peers import import_peer
+from experiments.bench.peers import import_peer, make_searches_precise
 from mobee.arrays import Array, Ints
 from mobee.model.fcl_engine import tested_pairs  # raises NotInstalled without python-fcl
 from mobee.model.snapshot import NO_HANDS, Snapshot
@@ -94,10 +93,6 @@ def _fcl_object(volume: Shape | WorldObject) -> Any:
     return fcl.CollisionObject(_MAKERS[volume.kind](*volume.size), fcl.Transform(volume.rotation, volume.position))
 
 
-# Of coal's iterative searches [m]: with larger tolerances it misses contacts of cylinders, and with its plain search some of micrometres.
-_TOLERANCE, _ITERATIONS, _SEARCH = 1e-12, 1000, "NesterovAcceleration"
-
-
 class CoalPeer:
     """A robot and the objects of a world as Pinocchio's models, with the same tested pairs."""
 
@@ -112,16 +107,7 @@ class CoalPeer:
         for a, b in self.pairs.tolist():
             self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
         self._data, self._found = self._model.createData(), pinocchio.GeometryData(self._geometry)
-        for request in self._found.distanceRequests:
-            request.enable_signed_distance = True
-        search = coal.GJKVariant.names[_SEARCH]
-        for request in (*self._found.distanceRequests, *self._found.collisionRequests):
-            request.gjk_variant = search
-            request.gjk_tolerance = request.epa_tolerance = _TOLERANCE
-            request.gjk_max_iterations = request.epa_max_iterations = _ITERATIONS
-            with warnings.catch_warnings():  # deprecated, but the setting that is to replace it has no effect
-                warnings.simplefilter("ignore", DeprecationWarning)
-                request.enable_cached_gjk_guess = False  # started where the last pose's search ended, coal misses a contact of 1 mm
+        make_searches_precise(self._found)
 
     def touching(self, q: Array) -> tuple[Ints, Array, Array]:
         """Return the pairs (c, 2) of volumes that touch in pose q (n,), depths (c,) m and directions (c, 3) that move the first out."""

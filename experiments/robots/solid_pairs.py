@@ -1,7 +1,7 @@
-"""Makes services/robot_sim/solid_pairs.json: which pairs of links count as solid contact in the simulator.
+"""Write services/robot_sim/solid_pairs.json: which pairs of links count as solid contact in the simulator.
 
 A pair is listed when the convex hulls of its links stay apart by 2 mm in 2000 random legal poses (joint limits and the
-robot's linear constraints): what overlaps in some of them (shoulder and chest, forearm and hand) says nothing about a
+robot's linear constraints): a pair that overlaps in some of them (shoulder and chest, forearm and hand) is no sign of a
 collision.  Hands and forearms against torso, head, table and the other arm are always listed: these are the contacts that
 the robot must avoid, and random poses hold many of them.
 
@@ -22,7 +22,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.robot_sim.bullet_scene import SOLID_PAIRS, TABLE, BulletScene, SolidPairs
 
-DISTANCE = 0.002  # m
+MIN_DISTANCE = 0.002  # m
 POSES = 2000
 SEED = 2014
 TORSO_AND_HEAD = ("root_link", "torso_1", "torso_2", "chest", "neck_1", "neck_2", "head")
@@ -30,7 +30,7 @@ ARM = ("shoulder_1", "shoulder_2", "shoulder_3", "upper_arm", "elbow_1", "forear
 
 
 def always() -> list[list[str]]:
-    """Hands and forearms against torso, head, the other arm and the table."""
+    """Return the pairs that are always listed: hands and forearms against torso, head, the other arm and the table."""
     pairs = set()
     for side, other in (("l", "r"), ("r", "l")):
         for link in (f"{side}_forearm", f"{side}_hand"):
@@ -40,7 +40,7 @@ def always() -> list[list[str]]:
 
 
 def legal_poses(robot: Robot, rng: np.random.Generator, count: int) -> list[Array]:
-    """Uniform in the limits, and every clause has a row that is satisfied."""
+    """Return poses, uniform within the limits, that satisfy every clause."""
     lower, upper = robot.limits[:, 0], robot.limits[:, 1]
     poses: list[Array] = []
     while len(poses) < count:
@@ -51,10 +51,10 @@ def legal_poses(robot: Robot, rng: np.random.Generator, count: int) -> list[Arra
 
 
 def stay_apart(scene: BulletScene, pairs: list[list[str]], poses: list[Array]) -> list[list[str]]:
-    """Those pairs whose hulls are apart in all poses."""
+    """Return the pairs whose hulls are apart in all poses."""
     for q in poses:
         scene.set_posture(q)
-        pairs = [pair for pair in pairs if scene.distance(pair[0], pair[1], DISTANCE) > DISTANCE]
+        pairs = [pair for pair in pairs if scene.distance(pair[0], pair[1], MIN_DISTANCE) > MIN_DISTANCE]
     return pairs
 
 
@@ -68,7 +68,7 @@ def main() -> None:
     poses = legal_poses(robot, np.random.default_rng(SEED), POSES)
     apart = stay_apart(scene, [pair for pair in others if sorted(pair) not in listed], poses)
     scene.close()
-    result = SolidPairs(model=MODEL, distance=DISTANCE, poses=POSES, seed=SEED, always=listed, apart=apart)
+    result = SolidPairs(model=MODEL, distance=MIN_DISTANCE, poses=POSES, seed=SEED, always=listed, apart=apart)
     SOLID_PAIRS.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
     print(f"{len(listed)} pairs always, {len(apart)} of {len(others)} stay apart; written to {SOLID_PAIRS}")
 

@@ -1,4 +1,4 @@
-"""Writes mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
+"""Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
 Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014;
 fields are ours. Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.robots.icub_carried import add_fields, add_markers, add_mass, add_shapes
-from experiments.robots.icub_fields import BESIDE
-from experiments.robots.icub_motors import EYES, declare_motors, joint_interval, motor_of
-from experiments.robots.xml_writer import element, number, vector, write
+from experiments.robots.icub_volumes import BESIDE, BOXES, HEAD, LEFT_ARM, TRUNK, Field
+from experiments.robots.xml_writer import box_turn, element, number, vector, write
 from mobee.arrays import Array
+from mobee.robot.bodies import to_six
 from mobee.robot.xml.node import VERSION
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
@@ -42,6 +41,22 @@ ANCHORS = {
     "wrist": (-0.0084698, -0.109398, -0.12656),
 }
 RIGID = {"l_upper_arm": "l_shoulder_3", "r_upper_arm": "r_shoulder_3", "l_hand_middle_0": "l_hand", "r_hand_middle_0": "r_hand"}
+HOME = {"shoulder_pitch": -26.0, "shoulder_roll": 20.0, "elbow": 60.0, "hand_finger": 10.0, "thumb_oppose": 30.0}
+GAZE = {"neck_pitch": -26.0, "eyes_tilt": -18.0, "eyes_vergence": 11.0}  # on the table in front of the body, clear of the limits' forces
+EYES = {"eyes_version": (-30.0, 30.0), "eyes_vergence": (0.0, 50.0)}  # version +- vergence / 2 just fills the URDF's pan limits
+# Limits [deg] of the spread of fingers: the motor goes from open (0) to closed (60), so its joints end at 0.
+SPREAD = {"index_0": (-20.0, 0.0), "ring_0": (20.0, 0.0), "little_0": (20.0, 0.0)}
+FINGERS = {  # joints that each motor of a hand drives
+    "hand_finger": ("index_0", "ring_0", "little_0"),
+    "thumb_oppose": ("thumb_0",),
+    "thumb_proximal": ("thumb_1",),
+    "thumb_distal": ("thumb_2", "thumb_3"),
+    "index_proximal": ("index_1",),
+    "index_distal": ("index_2", "index_3"),
+    "middle_proximal": ("middle_1",),
+    "middle_distal": ("middle_2", "middle_3"),
+    "pinky": ("ring_1", "ring_2", "ring_3", "little_1", "little_2", "little_3"),
+}
 
 
 def main(data_path: str, out: str | Path = OUT) -> None:
@@ -61,7 +76,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
 
 
 def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
-    """The joints mounted on a link, with all that they carry."""
+    """Add the joints that are mounted on a link, with their children."""
     joints = [j for j in data["models"]["icub_v2_5"]["joints"] if RIGID.get(j["parent_link"], j["parent_link"]) == link]
     parts = ["torso", "head", "left_arm", "right_arm"]
     for joint in sorted(joints, key=lambda j: parts.index(j["body_part"])):
@@ -78,7 +93,7 @@ def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array
 
 
 def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], point: Array) -> None:
-    """A joint, after the displacement that leads to it, with shapes, fields, markers and all that it carries."""
+    """Add a joint and the displacement before it, with shapes, fields, markers and children."""
     axis = np.array(joint["axis_root"])
     here = skeleton_point(joint["name"], np.array(joint["point_root"]), axis)
     link, name = joint["child_link"], joint["name"].removesuffix("_joint")
@@ -109,7 +124,7 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
 
 
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:
-    """The point on the joint's axis nearest to its cluster's anchor."""
+    """Return the point on a joint's axis that is nearest to the anchor of its group."""
     plain = name.removeprefix("l_").removeprefix("r_")
     key = next((key for key in (plain, plain.split("_")[0]) if key in ANCHORS), None)
     if key is None:
@@ -119,13 +134,124 @@ def skeleton_point(name: str, point: Array, axis: Array) -> Array:
 
 
 def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
-    """The cable and forearm clauses of an arm, as in MoBeE 2014."""
+    """Add the cable and forearm clauses of an arm, as in MoBeE 2014."""
     for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
         rows = element(parent, "constraintList")
         for row in clause:
             used = [(a, q) for a, q in zip(row["a"], row["motor_indices"], strict=True) if a]
             factors, motors = " ".join(number(a) for a, _ in used), " ".join(str(q) for _, q in used)
             element(rows, "constraint", a=factors, q=motors, b=row["b"])
+
+
+def motor_of(joint: str) -> str:
+    """Return the motor that drives a joint; it has the joint's name, except in the hands."""
+    side, _, rest = joint.partition("_hand_")
+    finger = next((motor for motor, joints in FINGERS.items() if rest in joints), None)
+    return f"{side}_{finger}" if finger else joint
+
+
+def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, float] | None:
+    """Return the joint's interval [deg], or None where it is the motor's."""
+    finger = name.partition("_hand_")[2]
+    if finger in SPREAD:
+        return SPREAD[finger]
+    if motor.endswith(("distal", "pinky")):
+        return limits[0], limits[1]
+    return None
+
+
+def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
+    """Add a part's motors in YARP order; limits are the narrower of URDF and iCub simulator."""
+    parts = data["yarp_parts"]
+    joints = {j["name"]: j for j in data["models"]["icub_v2_5"]["joints"]}
+    simulator = parts["limits_deg"]["icub_simulator"]["arm" if part.endswith("arm") else part]
+    for name, (low, high) in zip(parts["order"][part], simulator, strict=True):
+        if name in EYES:
+            low, high = EYES[name]
+        elif name in joints:
+            low, high = max(low, joints[name]["limits_deg"][0]), min(high, joints[name]["limits_deg"][1])
+        home = HOME.get(name[2:], 0.0) if part.endswith("arm") else GAZE.get(name, 0.0)
+        element(parent, "motor", name=name, minPos=low, maxPos=high, home=home)
+
+
+def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
+    """Add the mass that moves with a joint, relative to a point.
+
+    Fingers and eyes are left out: 0.01 kg and 0.001 kg m^2 each are placeholders of the source. In its other model, which is simulated,
+    hand and head weigh the same without them.
+    """
+    if "_hand_" in joint["name"] or "eye" in joint["name"]:
+        return
+    place = vector("px py pz", np.array(joint["body_com_root"]) - point)
+    inertia = " ".join(number(value, 9) for value in to_six(np.array(joint["body_inertia_com_root_axes"])))
+    element(parent, "mass", value=joint["body_mass_kg"], **place, inertia=inertia)
+
+
+def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
+    """Add the solids of a link, relative to a point."""
+    for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
+        width, height, depth = high - low
+        place = vector("px py pz", (low + high) / 2 - point)
+        element(parent, "box", name=f"{link}_{index}", width=width, height=height, depth=depth, **place)
+    for shape in model["primitives"]:
+        if shape["link"] != link or link in BOXES:
+            continue
+        place = vector("px py pz", np.array(shape["center"]) - point)
+        if shape["shape"] == "sphere":
+            element(parent, "sphere", name=shape["name"], radius=shape["radius"], **place)
+        elif shape["shape"] == "cylinder":
+            turn = vector("hx hy hz", np.array(shape["axis"]))
+            element(parent, "cylinder", name=shape["name"], radius=shape["radius"], height=shape["height"], **place, **turn)
+        else:
+            width, height, depth = shape["size"]
+            turn = box_turn(np.array(shape["R"]))
+            element(parent, "box", name=shape["name"], width=width, height=height, depth=depth, **place, **turn)
+
+
+def add_fields(parent: ET.Element, link: str, point: Array) -> None:
+    """Add the fields of a link, relative to a point."""
+    for name, host, radius, first, second in fields():
+        if host != link:
+            continue
+        ends = np.array([first, second])
+        place = vector("px py pz", ends.mean(axis=0) - point)
+        span = ends[1] - ends[0]
+        if span.any():
+            height = float(np.linalg.norm(span))
+            turn = vector("hx hy hz", span / height)
+            element(parent, "capsule", name=name, radius=radius, height=height, field="true", **place, **turn)
+        else:
+            element(parent, "sphere", name=name, radius=radius, field="true", **place)
+
+
+def fields() -> list[Field]:
+    """Return the fields of all links, with the full names of the links."""
+    mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
+    arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
+    return TRUNK + HEAD + arms
+
+
+def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
+    """Add the markers of a link, relative to a point."""
+    model = data["models"]["icub_v2_5"]
+    palms = model["end_effector_zero_root"]
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        if link == f"{side[0]}_hand":
+            rotation = np.array(palms[side]["R"])
+            add_marker(parent, f"{side}_palm", np.array(palms[side]["p"]) - point, rotation, sign * rotation[:, 2])
+        if link == f"{side[0]}_elbow_1":
+            add_marker(parent, f"{side}_elbow", np.zeros(3), np.eye(3), np.array([1.0, 0.0, 0.0]))
+        if link == f"{side[0]}_eye":
+            add_marker(parent, f"{side}_eye", np.zeros(3), np.eye(3), np.array([-1.0, 0.0, 0.0]))
+    if link == "head":
+        head = model["head_zero_root"]
+        add_marker(parent, "head", np.array(head["p"]) - point, np.array(head["R"]), np.array([-1.0, 0.0, 0.0]))
+
+
+def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
+    """Add one marker."""
+    rows = " ".join(number(value) for value in rotation.ravel())
+    element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Writes mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
+"""Write mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
 
 Source: data mobee_original (numbers of kailfrank/MoBeE, no text taken), shoulder_constraints.mobee_2014.
 Usage: python -m experiments.robots.write_icub_2014 DATA.json [OUT.xml]
@@ -26,12 +26,12 @@ Numbers from kailfrank/MoBeE (2014); names of motors, links and markers are thos
 """
 PARTS = ("torso", "head", "left_arm", "right_arm")
 MARKERS = {"head": "head", "eyeL": "left_eye", "eyeR": "right_eye", "left_hand": "left_palm", "right_hand": "right_palm"}
-BASE = (2, 4)  # joints before the first link and joint with a shape have both been passed: part of the base
-UNDRAWN = 1.0  # length of an element that the data lists without one
+BASE_JOINTS = (2, 4)  # part of the base: they come before the first link and the first joint with a shape
+LISTED_LENGTH = 1.0  # in the data, of an element that the file gives no length
 
 
 class Tree:
-    """The data of mobee_original, indexed."""
+    """Indices of the data of mobee_original."""
 
     def __init__(self, data: dict[str, Any]) -> None:
         model = data["mobee_original"]
@@ -45,12 +45,12 @@ class Tree:
         self.links = {joint["name"]: joint["child_link"] for joint in data["models"]["icub_v2_5"]["joints"]}
 
     def children(self, parent: int | None) -> list[dict[str, Any]]:
-        """The nodes carried by a node, part by part in the order of this library."""
+        """Return the children of a node, part by part in the order of this library."""
         mine = [node for node in self.nodes.values() if node["parent"] == parent]
         return sorted(mine, key=lambda node: PARTS.index(node["body_part"]))
 
     def joint_name(self, node: dict[str, Any]) -> str:
-        """The motor's name; numbered where it drives several joints, sided where they are the eyes'."""
+        """Return the motor's name, with a number where it drives several joints, and with a side where these are the eyes'."""
         motor = self.axis[node["motor"]]
         joints = self.joints[motor]
         if motor.startswith("eyes"):
@@ -64,7 +64,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName="icub_2014", adjacency="recorded_2014")
     torso = element(root, "bodypart", name="torso")
     declare_motors(torso, tree, "torso")
-    # Our one departure: the rule would let a torso bent to 47 deg feel its own pedestal, 4 mm deep.
+    # The only deviation: by the recorded rule a torso bent to 47 deg would be in contact with its own pedestal, 4 mm deep.
     element(root, "ignore", first="root_link", second="chest", role="field")
     for node in tree.children(None):
         add_node(torso, tree, node)
@@ -72,7 +72,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
 
 
 def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
-    """The motors and linear constraints of a part."""
+    """Add the motors and linear constraints of a part."""
     for motor in tree.motors[part]:
         low, high, home = motor["min_deg"], motor["max_deg"], motor["home_deg"]
         element(parent, "motor", name=motor["yarp_axis"], minPos=low, maxPos=high, home=home)
@@ -81,7 +81,7 @@ def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
 
 
 def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
-    """A link or joint with its shapes, markers and all that it carries."""
+    """Add a link or joint with its shapes, its markers and its children."""
     if node["parent"] is not None and tree.nodes[node["parent"]]["body_part"] != node["body_part"]:
         part = next((old for old in parent.findall("bodypart") if old.get("name") == node["body_part"]), None)
         if part is None:
@@ -118,7 +118,7 @@ def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
 
 
 def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Array) -> ET.Element:
-    """A joint with its axis, motor and interval; its link is called as in icub.xml where that has it."""
+    """Add a joint with its axis, motor and interval; its link has the name of icub.xml's where that has the link."""
     name, motor = tree.joint_name(node), tree.axis[node["motor"]]
     here = element(parent, "joint", name=name, moves=tree.links.get(name, f"{name}_link"), motor=motor, **vector("x y z", axis))
     low, high = node["joint_limits_deg"]
@@ -126,22 +126,22 @@ def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Ar
     here.set("maxPos", number(high))
     if node["no_self_collision_subtree"]:
         here.set("noSelfCollision", "true")
-    if node["id"] in BASE:
+    if node["id"] in BASE_JOINTS:
         here.set("base", "true")
     return here
 
 
 def end_point(tree: Tree, node: dict[str, Any]) -> Array:
-    """Where a link ends: where its children stand, so that rounding does not add up along the tree."""
+    """Return where a link ends: at its children's points, so that rounding does not add up along the tree."""
     for child in tree.nodes.values():
         if child["parent"] == node["id"]:
             return np.array(child["point_root"])
-    length = 0.0 if node["length"] == UNDRAWN else node["length"]
+    length = 0.0 if node["length"] == LISTED_LENGTH else node["length"]
     return np.array(node["point_root"]) + length * np.array(node["axis_root"])
 
 
 def add_shape(parent: ET.Element, shape: dict[str, Any], point: Array) -> None:
-    """A sphere, cylinder or box relative to a point."""
+    """Add a sphere, cylinder or box, relative to a point."""
     attributes = vector("px py pz", np.array(shape["center_root"]) - point)
     if shape["role"] == "field":
         attributes["field"] = "true"

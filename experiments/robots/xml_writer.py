@@ -1,4 +1,4 @@
-"""What both robot writers share: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
+"""Shared by both writers: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from mobee.robot.xml.volume import Y, angle_about, height_and_angle
 
 
 def number(value: float, digits: int = 7) -> str:
-    """The shortest text of a number to so many decimals."""
+    """Return the shortest text of a number with at most so many decimals."""
     text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
 def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
-    """A child element; numbers become text."""
+    """Add a child element; numbers become text."""
     texts = {name: value if isinstance(value, str) else number(value) for name, value in attributes.items()}
     return ET.SubElement(parent, tag, texts)
 
 
 def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
-    """Attributes such as px, py, pz for the components that are not zero."""
+    """Return attributes such as px, py, pz for the components that are not zero."""
     texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
     return {name: text for name, text in texts.items() if text != "0"}
 
 
 def box_turn(rotation: Array) -> dict[str, str]:
-    """The attributes hx, hy, hz and angle [deg] of a box whose orientation is `rotation` (3, 3)."""
+    """Return the attributes hx, hy, hz and angle [deg] of a box whose orientation is `rotation` (3, 3)."""
     left, _, right = np.linalg.svd(rotation)
     exact = left @ right
     axis, _ = height_and_angle(exact)
@@ -44,5 +44,5 @@ def box_turn(rotation: Array) -> dict[str, str]:
 
 
 def write(root: ET.Element, path: Path, heading: str) -> None:
-    """Write the indented file, with a comment that says where it comes from."""
+    """Write the indented file, with a comment that states its origin."""
     write_tree(root, path, heading)

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.figures.live import find_chromium
 from experiments.kit.live.launch import stop
+from experiments.live_picture import find_chromium
 
 SIZE, DRAWN = (800, 500), 85_000  # pixels; bytes: 54 000 without the scene, 75 000 with half of it, 96 000 with all
 SCENE = (slice(60, 360), slice(0, 505))  # rows and columns of the 3D panel
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.system
 
 @pytest.mark.skipif(find_chromium() is None, reason="live picture: no Chromium")
 def test_the_page_shows_a_robot_that_moves(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "experiments.figures.live", "--scenario", str(Path(__file__).with_name("picture.toml"))]
+    command = [sys.executable, "-m", "experiments.live_picture", "--scenario", str(Path(__file__).with_name("picture.toml"))]
     command += ["--size", *map(str, SIZE), "--drawn", str(DRAWN), "--shots", "2", "--gap", "5", "--warm-up", "1", "--out", str(tmp_path)]
     page = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, process_group=0)
     try:

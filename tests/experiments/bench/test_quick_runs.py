@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from experiments.bench import edges, ik, model, nes, plant, trm, vi
-from experiments.claims.ch3_roadmaps import trm_coverage
+from experiments.claims.ch3_roadmaps import trm as trm_claim
 from mobee.roadmap.building.lattice_builder import Patience
 from mobee_cli.bench import BENCHES
 
@@ -37,8 +37,8 @@ WIDTH = {"ik": 84}  # columns
 def test_a_benchmark_gives_numbers_a_verdict_and_a_report(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for package in PEERS.get(name, ()):
         pytest.importorskip(package)
-    monkeypatch.setattr(trm_coverage, "GENEROUS", Patience(starts=4, tries=2, scouts=64))
-    monkeypatch.setattr(trm_coverage, "BLIND", 20)
+    monkeypatch.setattr(trm_claim, "GENEROUS", Patience(starts=4, tries=2, scouts=64))
+    monkeypatch.setattr(trm_claim, "RANDOM_POINTS", 20)
     monkeypatch.setattr(model, "_POSES_OF_THREADS", 10)
     module = importlib.import_module(f"experiments.bench.{name}")
     result = json.loads(json.dumps(module.measure(SMALLEST[name])))

@@ -1,6 +1,6 @@
 """The picture of the running system: starts the default scenario, opens its page in headless Chromium, takes a screenshot.
 
-`python -m experiments.figures.live` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the
+`python -m experiments.live_picture` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the
 tab of what the agents know.  Chromium draws in software here and would starve the robot: it runs at the lowest priority and on
 one core (2 cores are enough for both).
 """
@@ -33,7 +33,7 @@ DRAWN = {"robot": 120_000, "learning": 50_000}  # bytes at that size: a page on 
 READY = 60.0  # s for the system to come up
 PATIENCE = 120.0  # s for the first picture
 POLL = 1.0  # s between two looks
-FIGURES = Path(__file__).parents[2] / "docs" / "figures"
+FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 
 
 def main(argv: Sequence[str] | None = None) -> int:

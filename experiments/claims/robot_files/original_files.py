@@ -1,4 +1,4 @@
-"""Finds the robot and world files of 2010 to 2014 in the histories of Git repositories, and in plain folders."""
+"""Search for robot and world files of 2010 to 2014 in the histories of Git repositories, and in plain folders."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Literal
 from mobee.errors import InvalidValue
 
 ROOTS: dict[bytes, Literal["robot", "world"]] = {b"<zeropositionkinematictree": "robot", b"<worldlist": "world"}
-OURS = b'version="2.0"'
+PRESENT_VERSION = b'version="2.0"'
 
 
 @dataclass(frozen=True)
 class Original:
-    """One distinct file: its content, and where it was first found."""
+    """One distinct file: its content, and where it was found first."""
 
     kind: Literal["robot", "world"]
     hash: str  # of Git: sha1 of "blob", length and content
@@ -28,14 +28,14 @@ class Original:
 
     @property
     def name(self) -> str:
-        """A name that says when and what, and is different for every content."""
+        """The date, name and hash of the file; different for every content."""
         return "_".join(word for word in (self.date, Path(self.path).stem, self.hash[:8]) if word)
 
 
 def find_originals(folders: list[Path]) -> list[Original]:
-    """Every distinct file below the folders and in the histories of the repositories there, robots first, the oldest first.
+    """Return every distinct file below the folders and in the histories of the repositories there, robots first, the oldest first.
 
-    Raises InvalidValue for a folder that is none, and where Git is missing.
+    Raises InvalidValue for a folder that does not exist, and if Git is not installed.
     """
     found: dict[str, Original] = {}
     for folder in folders:
@@ -50,7 +50,7 @@ def find_originals(folders: list[Path]) -> list[Original]:
 
 
 def _repositories(folder: Path) -> Iterator[Path]:
-    """Repositories at most three folders deep, with a work tree or without one."""
+    """Yield repositories at most three folders deep, with or without a work tree."""
     for depth in range(4):
         for head in folder.glob("/".join(["*"] * depth + ["HEAD"])):
             if (head.parent / "objects").is_dir():
@@ -69,7 +69,7 @@ def _git(repository: Path, *words: str) -> bytes:
 
 
 def _in_history(repository: Path) -> Iterator[Original]:
-    """Every version of every XML file that any commit holds."""
+    """Yield every version of every XML file of any commit."""
     name = repository.parent.name if repository.name in (".git", "repo") else repository.name
     log = _git(repository, "log", "--all", "-m", "--root", "--raw", "--no-abbrev", "--format=@%ad", "--date=short", "--", "*.xml", "*.XML")
     date = ""
@@ -96,4 +96,4 @@ def _in_folder(folder: Path) -> Iterator[Original]:
 
 def _kind(content: bytes) -> Literal["robot", "world"] | None:
     low = content.lower()
-    return next((kind for root, kind in ROOTS.items() if root in low and OURS not in low), None)
+    return next((kind for root, kind in ROOTS.items() if root in low and PRESENT_VERSION not in low), None)

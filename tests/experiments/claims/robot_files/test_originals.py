@@ -1,4 +1,4 @@
-"""What this library reads of files of 2011 to 2014 against a second reading of the program's source."""
+"""Files of 2011 to 2014 as this library reads them, beside a second reading of the program's source."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.originals.checkouts import find_originals
-from experiments.originals.compare import compare
+from experiments.claims.robot_files.original_comparison import compare
+from experiments.claims.robot_files.original_files import find_originals
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.robot.xml.write import write_upgraded
-from tests.experiments.originals.random_original import random_original
+from tests.experiments.claims.robot_files.random_original import random_original
 from tests.mobee.robot.same_robot import assert_same_robot
 
 
@@ -32,7 +32,7 @@ def test_random_files_of_that_time_are_read_as_the_program_of_2014_read_them(tmp
         assert_same_robot(robot, load_robot(tmp_path / "today.xml"))
 
 
-def test_a_difference_is_seen(tmp_path: Path) -> None:
+def test_a_difference_is_found(tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     path.write_text(random_original(3), encoding="utf-8")
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Compares what this library reads of an original robot file with the rules of the program of 2014, pose by pose."""
+"""Comparison of this library's reading of an original robot file with the rules of the program of 2014, pose by pose."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.originals.program_2014 import Node, Program, Volume
+from experiments.claims.robot_files.program_2014 import Node, Program, Volume
 from mobee.model.kinematics import link_transforms
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
 
 Array = NDArray[np.float64]
 _Placed = tuple[coal.ShapeBase, coal.Transform3s]
-NEAR = 1e-6  # m; a contact that is not deeper may be seen by one side only
-ALONG_Z = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # coal's cylinder stands along z, the program's along y
-SHRUNK = 1e-4  # m off a volume's sizes that end a contact of that depth
+MIN_DEPTH = 1e-6  # m; a contact that is not deeper may be found by one side only
+Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # the axis of the program's cylinder is y, of coal's z
+SHRINKAGE = 1e-4  # m; a contact that ends when the volumes are smaller by this may be found by one side only
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """How far the two readings differ; the numbers of differences are 0 where they agree."""
+    """Differences of the two readings; the counts are 0 where they agree."""
 
     poses: int
     place: float  # m, largest distance between the centres of a volume, or the places of a marker
     turn: float  # largest difference of a direction: normals of markers, height axes and faces of volumes
     pairs: int  # of volumes that one side tests and the other does not
     base: int  # volumes that only one side tests against the world
-    clauses: int  # answers
-    contacts: int  # contacts that one side sees and the other does not
-    seen: int  # contacts in all
+    clauses: int  # answers that differ
+    contacts: int  # contacts that only one side finds
+    seen: int  # all contacts
 
     @property
     def agrees(self) -> bool:
@@ -41,9 +41,10 @@ class Comparison:
 
 
 def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
-    """Compare a robot with the program's reading of its file at random motor positions within the limits."""
+    """Compare a robot with the program's reading of its file, at random motor positions within the limits."""
     program = Program.read(path)
-    drawn = np.random.default_rng(seed).uniform(*robot.limits.T, (poses, len(robot.motors)))
+    low, high = robot.limits.T
+    drawn = np.random.default_rng(seed).uniform(low, high, (poses, len(robot.motors)))
     drawn[0] = robot.home
     volumes = [(node, volume, role) for node in program.nodes for role in ("solid", "field") for volume in _of(node, role)]
     order = _matched(program, robot, volumes, drawn[-1])
@@ -55,7 +56,7 @@ def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
     base = {int(order[k]) for k, (node, _, _) in enumerate(volumes) if program.is_base(node)}
     judge = _Judge(program, robot, volumes, order, pairs)
     for q in drawn:
-        judge.look(q)
+        judge.compare(q)
     return Comparison(
         poses,
         judge.place,
@@ -77,14 +78,14 @@ def _degrees(robot: Robot, q: Array) -> dict[str, float]:
 
 
 def _placed(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> tuple[Array, Array]:
-    """Centres (v, 3) and orientations (v, 3, 3) of the program's volumes."""
+    """Return centres (v, 3) and orientations (v, 3, 3) of the program's volumes."""
     at = program.poses(_degrees(robot, q))
     centres = np.array([at[node][:3, :3] @ volume.place + at[node][:3, 3] for node, volume, _ in volumes])
     return centres.reshape(-1, 3), np.array([at[node][:3, :3] @ volume.turn for node, volume, _ in volumes]).reshape(-1, 3, 3)
 
 
 def _shapes(robot: Robot, q: Array) -> tuple[Array, Array]:
-    """Centres (v, 3) and orientations (v, 3, 3) of this library's shapes."""
+    """Return centres (v, 3) and orientations (v, 3, 3) of this library's shapes."""
     transforms = link_transforms(robot, q)
     at = [transforms[shape.link] for shape in robot.shapes]
     centres = np.array([link[:3, :3] @ shape.position + link[:3, 3] for link, shape in zip(at, robot.shapes, strict=True)])
@@ -92,9 +93,9 @@ def _shapes(robot: Robot, q: Array) -> tuple[Array, Array]:
 
 
 def _matched(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> NDArray[np.intp]:
-    """For each of the program's volumes the shape of its kind, role and size that is nearest at home and in another pose.
+    """Return for each of the program's volumes the index of the nearest shape of its kind, role and size, at home and in another pose.
 
-    Of equal volumes in one place the first in the file is the first on both sides. Raises ValueError where the volumes are not those here.
+    Equal volumes in one place are matched in the order of the file.  Raises ValueError if the volumes and shapes differ.
     """
     if len(volumes) != len(robot.shapes):
         raise ValueError(f"{len(volumes)} volumes by the program's rules, {len(robot.shapes)} shapes here")
@@ -119,7 +120,7 @@ def _matched(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, s
 
 
 def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str) -> list[tuple[int, int]]:
-    """Pairs of volumes that the program tests."""
+    """Return the pairs of volumes that the program tests."""
     ignored = program.ignored()[0 if role == "solid" else 1]
     mine = [k for k, one in enumerate(volumes) if one[2] == role]
     return [
@@ -131,7 +132,7 @@ def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str)
 
 
 class _Judge:
-    """Looks at one pose after the other."""
+    """Compares poses one by one, and keeps the largest differences and the counts."""
 
     def __init__(
         self,
@@ -144,11 +145,11 @@ class _Judge:
         self.program, self.robot, self.volumes, self.order = program, robot, volumes, order
         self.model = Model(robot)
         self.pairs = {role: np.array(found, dtype=np.intp).reshape(-1, 2) for role, found in pairs.items()}
-        self.reach = np.array([_reach(volume) for _, volume, _ in volumes])
+        self.radii = np.array([_radius(volume) for _, volume, _ in volumes])
         self.place = self.turn = 0.0
         self.clauses = self.contacts = self.seen = 0
 
-    def look(self, q: Array) -> None:
+    def compare(self, q: Array) -> None:
         """Compare one pose (n,) rad."""
         degrees = _degrees(self.robot, q)
         centres, turns = _placed(self.program, self.robot, self.volumes, q)
@@ -175,28 +176,28 @@ class _Judge:
         objects = [_object(volume, c, t) for (_, volume, _), c, t in zip(self.volumes, centres, turns, strict=True)]
         theirs = set[frozenset[str]]()
         for pairs in self.pairs.values():
-            near = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1) < self.reach[pairs].sum(axis=1)
+            near = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1) < self.radii[pairs].sum(axis=1)
             for i, j in pairs[near].tolist():
                 if _touch(objects[i], objects[j]):
                     theirs.add(frozenset((names[i], names[j])))
         self.seen += len(theirs | found.keys())
-        self.contacts += sum(found[pair] > NEAR for pair in found.keys() - theirs)
-        self.contacts += sum(self._stays(pair, names, centres, turns) for pair in theirs - found.keys())
+        self.contacts += sum(found[pair] > MIN_DEPTH for pair in found.keys() - theirs)
+        self.contacts += sum(self._remains(pair, names, centres, turns) for pair in theirs - found.keys())
 
-    def _stays(self, pair: frozenset[str], names: list[str], centres: Array, turns: Array) -> bool:
-        """Whether a contact that only fcl sees remains when both volumes are a little smaller."""
+    def _remains(self, pair: frozenset[str], names: list[str], centres: Array, turns: Array) -> bool:
+        """Whether a contact that only coal finds remains when both volumes are a little smaller."""
         i, j = (names.index(name) for name in pair)
-        small = [_object(self.volumes[k][1], centres[k], turns[k], SHRUNK) for k in (i, j)]
+        small = [_object(self.volumes[k][1], centres[k], turns[k], SHRINKAGE) for k in (i, j)]
         return _touch(*small)
 
 
 def _touch(first: _Placed, second: _Placed) -> bool:
-    """Whether two volumes overlap, by coal: fcl overlooks contacts of cylinders that are centimetres deep."""
+    """Whether two volumes overlap, by coal: fcl misses contacts of cylinders that are centimetres deep."""
     return bool(coal.collide(*first, *second, coal.CollisionRequest(), coal.CollisionResult()))
 
 
-def _reach(volume: Volume) -> float:
-    """The radius [m] of a ball about the centre of a volume that holds it."""
+def _radius(volume: Volume) -> float:
+    """Return the radius [m] of a ball around the centre of a volume that contains it."""
     if volume.kind == "sphere":
         return volume.size[0]
     half = (volume.size[0], volume.size[1] / 2) if volume.kind == "cylinder" else tuple(size / 2 for size in volume.size)
@@ -204,22 +205,22 @@ def _reach(volume: Volume) -> float:
 
 
 def _turned(volume: Volume, theirs: Array, mine: Array) -> float:
-    """How far the orientations of a volume differ, as far as they show."""
+    """Return the difference of two orientations of a volume, apart from its symmetries."""
     if volume.kind == "sphere":
         return 0.0
-    if volume.kind == "cylinder":  # the program's stands along y, ours along z
+    if volume.kind == "cylinder":  # the program's axis is y, ours z
         return float(1.0 - abs(theirs[:, 1] @ mine[:, 2]))
     return float(np.abs(np.abs(theirs.T @ mine) - np.eye(3)).max())
 
 
 def _object(volume: Volume, centre: Array, turn: Array, less: float = 0.0) -> _Placed:
-    """A volume for coal, smaller by `less` [m] at most."""
+    """Return a volume for coal, smaller by at most `less` [m]."""
     size = [max(length - less, length / 2) for length in volume.size]
     if volume.kind == "sphere":
         shape = coal.Sphere(*size)
     elif volume.kind == "cylinder":
         shape = coal.Cylinder(*size)
-        turn = turn @ ALONG_Z
+        turn = turn @ Y_TO_Z
     else:
         shape = coal.Box(*size)
     return shape, coal.Transform3s(turn, centre)

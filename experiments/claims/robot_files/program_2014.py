@@ -1,4 +1,4 @@
-"""The rules of the program of 2014, read from its source a second time: a judge that shares nothing with mobee.robot.
+"""The rules of the program of 2014, from a second reading of its source: a reference that shares nothing with mobee.robot.
 
 It reads files of 2011 to 2014 with the standard library's parser and keeps every <link> and <joint> as a node of a tree, as the
 program did (kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint). Positions in [m], angles in [deg], as in a file.
@@ -47,7 +47,7 @@ class Node:
 
 @dataclass
 class Program:
-    """What the program of 2014 makes of a file."""
+    """The contents of a file as the program of 2014 reads them."""
 
     nodes: list[Node] = field(default_factory=list)
     motors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # low, high, home
@@ -132,9 +132,9 @@ class Program:
             self.clauses.append(rows)
 
     def poses(self, q: dict[str, float]) -> dict[Node, Array]:
-        """The transform (4, 4) of every node at motor positions in [deg]."""
+        """Return the transform (4, 4) of every node at motor positions in [deg]."""
         placed: dict[Node, Array] = {}
-        for node in self.nodes:  # parents stand before their children
+        for node in self.nodes:  # parents come before their children
             carrier = node.parent
             placed[node] = np.eye(4) if carrier is None else placed[carrier] @ self._step(carrier, q)
         return placed
@@ -151,7 +151,7 @@ class Program:
         return step
 
     def ignored(self) -> tuple[set[frozenset[Node]], set[frozenset[Node]]]:
-        """Pairs of nodes whose solids, and whose fields, are never tested against each other."""
+        """Return the pairs of nodes whose solids, and those whose fields, are never tested against each other."""
         solids, fields = set[frozenset[Node]](), set[frozenset[Node]]()
         roots = [node for node in self.nodes if node.parent is None]
 
@@ -197,7 +197,7 @@ class Program:
 
 
 def special_euler(axis: Array, angle: float) -> Array:
-    """The orientation of a volume by its height axis: x about y, then y to the axis, then about the axis."""
+    """Return the orientation of a volume by its height axis: x about y, then y to the axis, then about the axis."""
     turn = np.eye(3)
     flat = np.array([axis[0], 0.0, axis[2]])
     if np.linalg.norm(flat) > 1e-6:
@@ -208,7 +208,7 @@ def special_euler(axis: Array, angle: float) -> Array:
 
 
 def axis_angle(axis: Array, angle: float) -> Array:
-    """The rotation about an axis of any length; about none it is cos(angle) times the identity, as in the program."""
+    """Return the rotation about an axis of any length; for length 0 it is cos(angle) times the identity, as in the program."""
     length = np.linalg.norm(axis)
     x, y, z = axis / length if length > 1e-6 else (0.0, 0.0, 0.0)
     c, s, v = math.cos(angle), math.sin(angle), 1 - math.cos(angle)
@@ -222,13 +222,13 @@ def axis_angle(axis: Array, angle: float) -> Array:
 
 
 def _first_attributes(text: str) -> str:
-    """The text with only the first of equal attributes in every tag, which is the one that the program saw."""
+    """Return the text with only the first of equal attributes in every tag, as the program read it."""
 
     def first(tag: re.Match[str]) -> str:
-        seen = set[str]()
-        attributes = re.findall(r"""\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*')""", tag[2])
-        kept = [one for one in attributes if not ((name := one.split("=")[0].strip()) in seen or seen.add(name))]
-        return f"<{tag[1]}{''.join(kept)}{tag[3]}>"
+        kept: dict[str, str] = {}
+        for attribute in re.findall(r"""\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*')""", tag[2]):
+            kept.setdefault(attribute.split("=")[0].strip(), attribute)
+        return f"<{tag[1]}{''.join(kept.values())}{tag[3]}>"
 
     return re.sub(r"""<(\w+)((?:\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(/?)>""", first, text)
 

@@ -1,7 +1,14 @@
-"""Our own force fields of the iCub: few spheres and capsules around the solids of each body section.
+"""Volumes of the iCub that are chosen by hand: force fields, and solids that follow its meshes closer than one primitive per link.
 
-Zero pose, root frame, [m]; the right arm mirrors the left in y. Beyond the solids the fields of hand and fingers reach 5 to 7 cm,
-forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, for an arm at rest hangs there.
+Zero pose, root frame, [m]; the right arm mirrors the left in y.
+
+The fields are few spheres and capsules around the solids of each body section. Beyond the solids the fields of hand and fingers reach
+5 to 7 cm, forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, because an arm hangs beside them
+at home.
+
+Data models.icub_v2_5 encloses pelvis, chest and head in one box, cylinder and sphere of 1.5 to 1.7 times the hull's volume, so
+that pelvis and upper arm would touch at home. BOXES are the bounds, rounded outwards to 1 mm, of the part of a mesh of icub-models
+(CC BY-SA 4.0) between horizontal cuts.
 """
 
 from __future__ import annotations
@@ -40,3 +47,28 @@ BESIDE = [
     *((f"{side}_shoulder_{k}", trunk) for side in "lr" for k in (1, 3) for trunk in ("root_link", "torso_1", "torso_2")),
     *(("head", neighbour) for neighbour in ("torso_2", "l_shoulder_1", "r_shoulder_1")),
 ]
+
+Corner = tuple[float, float, float]
+
+BOXES: dict[str, list[tuple[Corner, Corner]]] = {
+    "root_link": [
+        ((-0.028, -0.075, -0.156), (0.101, 0.075, -0.088)),
+        ((-0.042, -0.111, -0.088), (0.104, 0.111, -0.014)),
+        ((-0.032, -0.105, -0.016), (0.093, 0.105, 0.006)),
+        ((-0.032, -0.1, 0.004), (0.079, 0.1, 0.032)),
+    ],
+    "chest": [
+        ((-0.079, -0.076, 0.041), (0.166, 0.076, 0.07)),
+        ((-0.085, -0.097, 0.07), (0.191, 0.097, 0.155)),
+        ((-0.085, -0.122, 0.155), (0.194, 0.122, 0.19)),
+        ((-0.078, -0.096, 0.19), (0.193, 0.096, 0.22)),
+        ((-0.057, -0.085, 0.22), (0.183, 0.085, 0.247)),
+        ((-0.031, -0.045, 0.247), (0.029, 0.045, 0.274)),
+    ],
+    "head": [
+        ((-0.093, -0.066, 0.268), (0.089, 0.066, 0.292)),
+        ((-0.1, -0.077, 0.292), (0.111, 0.093, 0.385)),
+        ((-0.091, -0.076, 0.385), (0.107, 0.077, 0.43)),
+        ((-0.068, -0.061, 0.43), (0.079, 0.061, 0.453)),
+    ],
+}

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import urdf_files
-from experiments.urdf_files.looked_at import LookedAt, look_at
-from experiments.urdf_files.peer import PeerFailed, UrdfPeer
+from experiments.claims.robot_files import urdf_files
+from experiments.claims.robot_files.urdf_comparison import FileRecord, PeerFailed, UrdfPeer, compare_file
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from tests.mobee.robot.urdf_files import ARM, arm_with, foreign, srdf_file, urdf_file
@@ -21,7 +20,7 @@ def given(*folders: str, only: str = "") -> argparse.Namespace:
     return argparse.Namespace(folders=list(folders), poses=5, only=only, seed=0)
 
 
-def test_a_run_is_resumed_told_and_drawn(tmp_path: Path) -> None:
+def test_a_run_is_resumed_summarized_and_drawn(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     files = tmp_path / "files"
     (files / "sub").mkdir(parents=True)
@@ -44,14 +43,14 @@ def test_a_run_is_resumed_told_and_drawn(tmp_path: Path) -> None:
     assert urdf_files.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
 
 
-def test_folders_without_a_file_or_without_being_there_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidValue, match="there is no .urdf file to look at"):
+def test_empty_and_absent_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValue, match="there is no .urdf file to compare"):
         urdf_files.run(given(str(tmp_path)), tmp_path)
     with pytest.raises(InvalidValue, match="no such folder"):
         urdf_files.run(given(str(tmp_path / "none")), tmp_path)
 
 
-def test_installed_packages_are_looked_at_without_folders(tmp_path: Path) -> None:
+def test_installed_packages_are_compared_without_folders(tmp_path: Path) -> None:
     found = urdf_files.run(given(only="pybullet_data/cube"), tmp_path)["sets"]["pybullet_data"]
     assert found["load"] == 2  # cube_rotate, and cube_no_rotation, whose limits mean none
     assert found["refused"] == 0 and found["things"] > 0
@@ -59,14 +58,14 @@ def test_installed_packages_are_looked_at_without_folders(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf", "r2d2.urdf", "quadruped/minitaur.urdf"])
 def test_frames_and_contacts_of_exact_hulls_are_those_of_the_other_reading(name: str, tmp_path: Path) -> None:
-    found = look_at(name, foreign(name), 100, 3, tmp_path)
+    found = compare_file(name, foreign(name), 100, 3, tmp_path)
     assert found.outcome == "loads" and found.links > 5
     assert found.frame_error < 1e-12
     assert found.contacts > 0 and found.other == 0
 
 
-def test_a_difference_is_seen(tmp_path: Path) -> None:
-    """The peer reads the file by itself: where it says something else than the robot, links and contacts differ."""
+def test_the_peer_reads_the_file_independently(tmp_path: Path) -> None:
+    """Frames and contacts of the peer follow the joints that it is given."""
     path = foreign("kuka_iiwa/model.urdf")
     robot = load_robot(path)
     peer = UrdfPeer(path, robot)
@@ -81,18 +80,18 @@ def test_a_difference_is_seen(tmp_path: Path) -> None:
     assert all(depth > 0 for one in bent for depth in one.values())
 
 
-def test_what_the_other_reading_cannot_read_is_said(tmp_path: Path) -> None:
+def test_a_file_that_the_peer_cannot_read_is_reported(tmp_path: Path) -> None:
     path = urdf_file(tmp_path, *(line.replace('xyz="1 0 0"', 'xyz="1, 0, 0"') for line in ARM))
     robot = load_robot(path)
     with pytest.raises(PeerFailed, match="Pinocchio: "):
         UrdfPeer(path, robot)
-    found = look_at("x", path, 2, 0, tmp_path)
+    found = compare_file("x", path, 2, 0, tmp_path)
     assert (found.outcome, found.links, found.contacts) == ("loads", -1, -1)
     assert found.message.startswith("Pinocchio: ") and "toy.urdf" in found.message
     assert str(tmp_path) not in found.message
 
 
 def test_records_are_read_as_they_were_written() -> None:
-    one = LookedAt("a/b.urdf", "loads", "x", 3, 4, "s.srdf", "home", 0.25, 1e-16, 5, 0, 0.0, 1, 2)
-    assert LookedAt.of_record(one.record()) == one
-    assert LookedAt.of_record(LookedAt("a", "refused", "\u00e9").record()).message == "\\xe9"
+    one = FileRecord("a/b.urdf", "loads", "x", 3, 4, "s.srdf", "home", 0.25, 1e-16, 5, 0, 0.0, 1, 2)
+    assert FileRecord.of_record(one.record()) == one
+    assert FileRecord.of_record(FileRecord("a", "refused", "\u00e9").record()).message == "\\xe9"

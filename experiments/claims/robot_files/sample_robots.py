@@ -1,4 +1,4 @@
-"""The robots that are tried: of example-robot-data, of pybullet_data, and some that no one would build."""
+"""The robots that are measured: of example-robot-data, of pybullet_data, and some of extreme size."""
 
 from __future__ import annotations
 
@@ -40,47 +40,49 @@ BULLET = {  # of pybullet_data
     "minitaur": "quadruped/minitaur.urdf",
 }
 SEED = 28
-CHAIN, STAR = 200, 300  # joints
+CHAIN_JOINTS, STAR_JOINTS = 200, 300
 
 
 def _chain() -> str:
     rng = np.random.default_rng(SEED)
-    joints = [_joint(f"j{k}", f"l{k}", f"l{k + 1}", (0.0, 0.0, 0.1), rng.permutation([1.0, 0.0, 0.0]).tolist()) for k in range(CHAIN)]
-    return _robot("chain", [_link(f"l{k}", 0.1) for k in range(CHAIN + 1)], joints)
+    joints = [
+        _joint_text(f"j{k}", f"l{k}", f"l{k + 1}", (0.0, 0.0, 0.1), rng.permutation([1.0, 0.0, 0.0]).tolist()) for k in range(CHAIN_JOINTS)
+    ]
+    return _robot_text("chain", [_link_text(f"l{k}", 0.1) for k in range(CHAIN_JOINTS + 1)], joints)
 
 
 def _star() -> str:
-    """Arms of one joint all over a ball of 1 m."""
+    """Return a robot of one-joint arms, spread over a ball of 1 m."""
     rng = np.random.default_rng(SEED)
     joints = []
-    for k in range(STAR):
-        height, angle = 1.0 - (2 * k + 1) / STAR, k * np.pi * (3.0 - np.sqrt(5.0))
+    for k in range(STAR_JOINTS):
+        height, angle = 1.0 - (2 * k + 1) / STAR_JOINTS, k * np.pi * (3.0 - np.sqrt(5.0))
         across = np.sqrt(1.0 - height * height)
         at = (float(across * np.cos(angle)), float(across * np.sin(angle)), float(height))
         pitch = float(np.arctan2(np.hypot(at[0], at[1]), at[2]))
         joints.append(
-            _joint(f"j{k}", "hub", f"l{k}", at, [*rng.normal(size=2).tolist(), 0.0], (0.0, pitch, float(np.arctan2(at[1], at[0]))))
+            _joint_text(f"j{k}", "hub", f"l{k}", at, [*rng.normal(size=2).tolist(), 0.0], (0.0, pitch, float(np.arctan2(at[1], at[0]))))
         )
-    return _robot("star", ['<link name="hub"/>', *(_link(f"l{k}", 0.1) for k in range(STAR))], joints)
+    return _robot_text("star", ['<link name="hub"/>', *(_link_text(f"l{k}", 0.1) for k in range(STAR_JOINTS))], joints)
 
 
 def _scaled(scale: float) -> str:
     axes = ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
-    joints = [_joint(f"j{k}", f"l{k}", f"l{k + 1}", (0.0, 0.0, 0.1 * scale), axis) for k, axis in enumerate(axes)]
-    return _robot("scaled", [_link(f"l{k}", 0.1 * scale) for k in range(7)], joints)
+    joints = [_joint_text(f"j{k}", f"l{k}", f"l{k + 1}", (0.0, 0.0, 0.1 * scale), axis) for k, axis in enumerate(axes)]
+    return _robot_text("scaled", [_link_text(f"l{k}", 0.1 * scale) for k in range(7)], joints)
 
 
-MADE: dict[str, Callable[[], str]] = {
-    f"chain of {CHAIN}": _chain,
-    f"star of {STAR}": _star,
+GENERATED: dict[str, Callable[[], str]] = {
+    f"chain of {CHAIN_JOINTS}": _chain,
+    f"star of {STAR_JOINTS}": _star,
     "arm of 0.7 um": lambda: _scaled(1e-6),
     "arm of 700 m": lambda: _scaled(1e3),
 }
-ROBOTS = (*EXAMPLES, *BULLET, *MADE)
+ROBOTS = (*EXAMPLES, *BULLET, *GENERATED)
 
 
 def examples_folder() -> Path:
-    """Where example-robot-data lies if it is installed; raises InvalidValue."""
+    """Return the folder of example-robot-data; raises InvalidValue if it is not installed."""
     for place in sys.path:
         folder = Path(place) / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
         if folder.is_dir():
@@ -92,7 +94,7 @@ def examples_folder() -> Path:
 
 
 def robot_file(name: str, examples: Path, folder: Path) -> Path:
-    """The URDF of a robot; one that is made is written into the folder."""
+    """Return the URDF of a robot; a generated one is written into the folder."""
     if name in EXAMPLES:
         return examples / EXAMPLES[name]
     if name in BULLET:
@@ -103,23 +105,23 @@ def robot_file(name: str, examples: Path, folder: Path) -> Path:
             )
         return Path(spec.submodule_search_locations[0]) / BULLET[name]
     path = folder / f"{name.replace(' ', '_')}.urdf"
-    path.write_text(MADE[name](), encoding="utf-8")
+    path.write_text(GENERATED[name](), encoding="utf-8")
     return path
 
 
-def _robot(name: str, links: list[str], joints: list[str]) -> str:
+def _robot_text(name: str, links: list[str], joints: list[str]) -> str:
     return "\n".join([f'<robot name="{name}">', *links, *joints, "</robot>", ""])
 
 
-def _link(name: str, length: float) -> str:
-    """A rod along z, with a gap to the next."""
+def _link_text(name: str, length: float) -> str:
+    """Return a rod along z, with a gap to the next link."""
     return (
         f'<link name="{name}"><collision><origin xyz="0 0 {length / 2!r}"/>'
         f'<geometry><cylinder radius="{length / 8!r}" length="{0.8 * length!r}"/></geometry></collision></link>'
     )
 
 
-def _joint(
+def _joint_text(
     name: str,
     parent: str,
     child: str,
@@ -127,8 +129,8 @@ def _joint(
     axis: list[float],
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> str:
-    place, way, rpy = (" ".join(map(repr, numbers)) for numbers in (at, axis, turn))
+    place, direction, rpy = (" ".join(map(repr, numbers)) for numbers in (at, axis, turn))
     return (
         f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{place}" rpy="{rpy}"/>'
-        f'<axis xyz="{way}"/><limit lower="-1.5" upper="1.5" velocity="1" effort="10"/></joint>'
+        f'<axis xyz="{direction}"/><limit lower="-1.5" upper="1.5" velocity="1" effort="10"/></joint>'
     )

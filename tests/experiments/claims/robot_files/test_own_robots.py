@@ -1,4 +1,4 @@
-"""The robots that are made and the one of PyBullet; those of example-robot-data are not among what the tests install."""
+"""The generated robots and one of PyBullet; the tests do not install example-robot-data."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from experiments.own_robots import failures, figure, read, results, run, table
-from experiments.own_robots.measure import Measured, arm_of
-from experiments.own_robots.robots import BULLET, EXAMPLES, MADE, ROBOTS, examples_folder, robot_file
+from experiments.claims.robot_files.own_robots import Measured, arm_of, failures, figure, read, results, run, table
+from experiments.claims.robot_files.sample_robots import BULLET, EXAMPLES, GENERATED, ROBOTS, examples_folder, robot_file
 from mobee import Lattice, load_robot
 from mobee.errors import InvalidValue
 
 
 def test_there_are_28() -> None:
-    assert len(set(ROBOTS)) == len(EXAMPLES) + len(BULLET) + len(MADE) == 28
+    assert len(set(ROBOTS)) == len(EXAMPLES) + len(BULLET) + len(GENERATED) == 28
 
 
-@pytest.mark.parametrize("name", MADE)
-def test_the_robots_that_are_made_load_and_touch_nothing(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", GENERATED)
+def test_generated_robots_load(name: str, tmp_path: Path) -> None:
     robot = load_robot(robot_file(name, tmp_path, tmp_path))
     assert len(robot.motors) == {"chain of 200": 200, "star of 300": 300}.get(name, 6)
     assert len(robot.solid_pairs) > 10
@@ -38,7 +37,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_robot_is_measured_once_and_does_what_is_claimed(done: Path) -> None:
+def test_a_robot_is_measured_once_and_meets_the_claim(done: Path) -> None:
     arm, panda = read(done)
     assert (arm.robot, panda.robot) == ("arm of 700 m", "panda_bullet")
     assert (panda.touching, panda.written, panda.touching_after, panda.slides) == (2, 2, 0, 1)
@@ -48,7 +47,7 @@ def test_a_robot_is_measured_once_and_does_what_is_claimed(done: Path) -> None:
     assert (found["robots"], found["touch themselves at home"], found["and with the SRDF"]) == (2, 1, 0)
 
 
-def test_what_fails_is_named(done: Path) -> None:
+def test_failed_parts_of_the_claim_are_named(done: Path) -> None:
     good = replace(read(done)[1], actions_s=1.0, field_actions_s=1.0)
     assert failures(good) == []
     bad = replace(good, drift_mm=1.5, touching_after=1, unsettled=1, field_actions_s=16.0)
@@ -70,18 +69,18 @@ def test_the_table_has_a_line_for_each_robot(done: Path) -> None:
     assert table([])[0] == head
 
 
-def test_records_go_through_text(done: Path) -> None:
+def test_records_are_read_as_they_were_written(done: Path) -> None:
     one = read(done)[0]
     assert Measured.of_record({name: str(value) for name, value in one.record().items()}) == one
 
 
-def test_an_arm_is_the_longest_chain_of_one_part_that_turns() -> None:
+def test_an_arm_is_the_longest_revolute_chain_of_one_part() -> None:
     icub = load_robot("icub")
     Lattice(icub, arm_of(icub))
     assert arm_of(icub) == list(icub.part("left_arm").motors[:4])
 
 
-def test_without_the_package_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_package_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.path", [])
     with pytest.raises(InvalidValue, match="pip install --target erd example-robot-data==6.0.0"):
         examples_folder()

@@ -1,0 +1,1 @@
+"""Robot files of others: of 2010 to 2014, of today's robots, and URDFs in general."""

@@ -1,0 +1,275 @@
+"""Own robots: whether URDFs of others work as they are, without expert knowledge.
+
+Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home; none has contacts with itself there after
+`mobee check --write-srdf` has written the pairs that do; each prismatic joint settles within 1 mm from 5 to 95 % of its range; and 250
+curious actions of an arm, from the file on, take at most 15 s.
+Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 5 minutes.
+
+The robots are those of example-robot-data 6.0.0 and pybullet_data, and four extreme ones: a chain of 200 joints, a star of 300, and an arm
+six orders of magnitude too small and one three too large.  They have default gains and the motors of the offline plant, in an empty world,
+without fields.  Home and actions are also measured with fields of 3 cm, whose drift is printed and not judged: where fields overlap at
+home, they push.  The joints' true positions count; of a prismatic joint also the encoder's.  Times are those of this machine.  The figure
+is a table in Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.claims.robot_files.sample_robots import ROBOTS, examples_folder, robot_file
+from experiments.kit.command_line import Progress
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.records import Records, read_records
+from mobee import CuriousAgent, Lattice, Model, OfflinePlant, load_robot
+from mobee.arrays import Array
+from mobee.check.touching import leave_out_touching
+from mobee.errors import RobotFileError
+from mobee.robot.motor_units import slides
+from mobee.robot.robot import Robot
+
+RECORDS, REFUSED, TABLE = "own_robots.csv", "refused.csv", "own_robots.md"
+MAX_DEGREES, MAX_MILLIMETRES, MAX_SECONDS = 0.5, 1.0, 15.0
+HOME_SECONDS = 10.0  # s
+ACTIONS = 250
+RANGE_SHARES = (0.05, 0.275, 0.5, 0.725, 0.95, 0.5, 0.05)  # of a prismatic joint's range
+ARM_JOINTS = 4  # of an arm
+FIELD_SIZE = 0.03  # m
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=list(ROBOTS), metavar="ROBOT", help=f"of {', '.join(ROBOTS)}")
+    parser.add_argument("--data", type=Path, metavar="FOLDER", help="robots of example-robot-data (default: those of the package)")
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Measure the robots that are not in the records yet; returns the results."""
+    examples = arguments.data or examples_folder()
+    done = {row["robot"] for row in read_records(folder / RECORDS, Measured.columns())}
+    done |= {row["robot"] for row in read_records(folder / REFUSED, ("robot", "why"))}
+    OfflinePlant(Model(load_robot("katana"))).run(1)  # loads the engine
+    with (
+        Records(folder / RECORDS, Measured.columns()) as records,
+        Records(folder / REFUSED, ("robot", "why")) as refused,
+        Progress() as progress,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")  # the readers' warnings are for `mobee check`
+        for number, name in enumerate(arguments.robots):
+            if name in done:
+                continue
+            progress.show(number / len(arguments.robots), name)
+            try:
+                records.append(measure(name, robot_file(name, examples, folder), folder, arguments.seed).record())
+            except RobotFileError as error:
+                refused.append({"robot": name, "why": str(error)})
+    return results(folder)
+
+
+def read(folder: Path) -> list[Measured]:
+    """Return the measured robots of a run."""
+    return [Measured.of_record(row) for row in read_records(folder / RECORDS, Measured.columns())]
+
+
+def failures(one: Measured) -> list[str]:
+    """Return the parts of the claim that a robot does not meet."""
+    judged = {
+        "drifts": one.drift_deg > MAX_DEGREES or one.drift_mm > MAX_MILLIMETRES,
+        "touches itself at home": one.touching_after > 0,
+        "slide off": one.slide_mm > MAX_MILLIMETRES or one.unsettled > 0,
+        "slow": max(one.actions_s, one.field_actions_s) > MAX_SECONDS,
+    }
+    return [name for name, failed in judged.items() if failed]
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Return the worst value of each measure, and the robots that fail."""
+    found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
+    failed = {one.robot: failures(one) for one in found if failures(one)}
+    return {
+        "passed": not failed and not refused if found else None,
+        "robots": len(found),
+        "refused": {row["robot"]: row["why"] for row in refused},
+        "failed": failed,
+        "touch themselves at home": sum(one.touching > 0 for one in found),
+        "and with the SRDF": sum(one.touching_after > 0 for one in found),
+        "worst_drift_deg": max((one.drift_deg for one in found), default=None),
+        "worst_drift_with_fields_deg": max((one.field_drift_deg for one in found), default=None),
+        "worst_drift_mm": max((one.drift_mm for one in found), default=None),
+        "worst_slide_mm": max((one.slide_mm for one in found), default=None),
+        "longest_srdf_s": max((one.srdf_s for one in found), default=None),
+        "longest_actions_s": max((max(one.actions_s, one.field_actions_s) for one in found), default=None),
+    }
+
+
+def figure(folder: Path) -> Path:
+    """Write the table, a line per robot; returns its path."""
+    path = folder / TABLE
+    path.write_text("\n".join([*table(read(folder)), ""]), encoding="utf-8")
+    return path
+
+
+def table(found: Sequence[Measured]) -> list[str]:
+    """Return the lines of the table in Markdown."""
+    heads = "robot | motors (slides) | solids | contacts at home | pairs written (s) | contacts then | drift [deg] | drift [mm] | "
+    heads += "slides within [mm] | 250 actions [s] | touching after them | fields: drift [deg] | 250 actions [s] | touching after them"
+    lines = [f"| {heads} |", "|---" * 14 + "|"]
+    for one in found:
+        motors = f"{one.motors} ({one.slides})" if one.slides else f"{one.motors}"
+        lengths = (one.drift_deg, one.drift_mm, one.slide_mm, one.field_drift_deg)
+        degrees, *mm, with_fields = (f"{value:.2f}" if value >= 0.0 else "" for value in lengths)
+        cells = [one.robot, motors, one.shapes, one.touching, f"{one.written} ({one.srdf_s:.1f})", one.touching_after, degrees, *mm]
+        cells += [f"{one.actions_s:.1f}", one.solid, with_fields, f"{one.field_actions_s:.1f}", one.field_solid]
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """The measures of one robot; lengths in mm, angles in deg, times in s, -1 where there is nothing to measure."""
+
+    robot: str
+    motors: int
+    slides: int
+    shapes: int
+    touching: int  # solid contacts at home
+    written: int  # pairs written to the SRDF
+    touching_after: int
+    srdf_s: float
+    drift_deg: float
+    drift_mm: float
+    slide_mm: float  # the worst error of a prismatic joint over RANGE_SHARES
+    unsettled: int  # actions of prismatic joints that ended by timeout
+    actions_s: float  # from the file to the end of ACTIONS curious actions
+    solid: int  # of these actions, the number that ended with solids in contact
+    field_drift_deg: float  # the same with fields of FIELD_SIZE
+    field_actions_s: float
+    field_solid: int
+
+    @classmethod
+    def columns(cls) -> tuple[str, ...]:
+        """Return the names of the fields."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def of_record(cls, row: dict[str, str]) -> Measured:
+        """Return the measures read from the texts of a CSV file."""
+        kinds = {"str": str, "int": int, "float": float}
+        return cls(**{field.name: kinds[str(field.type)](row[field.name]) for field in fields(cls)})
+
+    def record(self) -> dict[str, Any]:
+        """Return the measures for a CSV file."""
+        return {name: round(value, 4) if isinstance(value, float) else value for name, value in asdict(self).items()}
+
+
+def measure(name: str, urdf: Path, folder: Path, seed: int) -> Measured:
+    """Measure a robot; its SRDF is written into the folder."""
+    robot = load_robot(urdf)
+    before = Model(robot).evaluate(robot.home)
+    start = time.perf_counter()
+    done = leave_out_touching(urdf, folder / f"{name.replace(' ', '_')}.srdf")
+    srdf_s = time.perf_counter() - start
+    robot = load_robot(urdf, srdf=done.path)
+    model = Model(robot)
+    drift = _drift(model, seed)
+    sliding = np.array([slides(robot, motor) for motor in robot.motor_table])
+    found = [_slide(model, int(i), seed) for i in np.flatnonzero(sliding)]
+    actions_s, solid = _explore(urdf, done.path, None, seed)
+    field_drift = _drift(Model(load_robot(urdf, srdf=done.path, field=FIELD_SIZE)), seed)
+    field_actions_s, field_solid = _explore(urdf, done.path, FIELD_SIZE, seed)
+    return Measured(
+        robot=name,
+        motors=len(robot.motors),
+        slides=int(sliding.sum()),
+        shapes=len(robot.shapes),
+        touching=int(before.count),
+        written=len(done.pairs),
+        touching_after=done.touching,
+        srdf_s=srdf_s,
+        drift_deg=_degrees(drift[~sliding]),
+        drift_mm=float(1e3 * drift[sliding].max()) if sliding.any() else -1.0,
+        slide_mm=max((1e3 * worst for worst, _ in found), default=-1.0),
+        unsettled=sum(late for _, late in found),
+        actions_s=actions_s,
+        solid=solid,
+        field_drift_deg=_degrees(field_drift[~sliding]),
+        field_actions_s=field_actions_s,
+        field_solid=field_solid,
+    )
+
+
+def _degrees(drift: Array) -> float:
+    return float(np.rad2deg(drift.max())) if len(drift) else -1.0
+
+
+def _drift(model: Model, seed: int) -> Array:
+    """Return the largest distance of each motor from home (n,), in its unit, while home is the attractor for HOME_SECONDS."""
+    plant = OfflinePlant(model, seed)
+    plant.controller.attractor = model.robot.home
+    trace = plant.run(round(HOME_SECONDS / plant.dt))
+    most: Array = np.abs(trace.q - model.robot.home).max(axis=0)
+    return most
+
+
+def _slide(model: Model, index: int, seed: int) -> tuple[float, int]:
+    """Move a prismatic joint through its range, the other motors at home; returns its worst error [m] and the number of timeouts."""
+    motor = model.robot.motor_table[index]
+    part = model.robot.part(motor.part)
+    plant, target = OfflinePlant(model, seed), model.robot.home[part.slice].copy()
+    worst, late = 0.0, 0
+    for share in RANGE_SHARES:
+        target[index - part.start] = motor.limits[0] + share * np.ptp(motor.limits)
+        outcome = plant.act(motor.part, target)
+        wrong = abs(outcome.q - target)[index - part.start], abs(plant.motors.q[part.slice] - target)[index - part.start]
+        worst, late = max(worst, *map(float, wrong)), late + (not outcome.settled)
+    return worst, late
+
+
+def arm_of(robot: Robot) -> list[str]:
+    """Return up to ARM_JOINTS revolute motors of one part: those of the longest chain from the base on, then others of the part."""
+    chains: list[list[int]] = [[]]
+    drive = {joint: k for k, motor in enumerate(robot.motor_table) for joint, _, _ in motor.joints}
+    for index, joint in enumerate(robot.joints):
+        chains.append([*chains[joint.parent], *([drive[index]] if index in drive else [])])
+    turning = [k for k, motor in enumerate(robot.motor_table) if not slides(robot, motor)]
+    best: list[int] = []
+    for chain in sorted(chains, key=len, reverse=True)[:20]:
+        for part in robot.parts.values():
+            mine = [k for k in dict.fromkeys(chain) if k in turning and part.slice.start <= k < part.slice.stop]
+            best = mine if len(mine) > len(best) else best
+    part = robot.part(robot.motor_table[best[0]].part)
+    more = [k for k in turning if part.slice.start <= k < part.slice.stop and k not in best]
+    return [robot.motors[k] for k in [*best, *more][:ARM_JOINTS]]
+
+
+def _explore(urdf: Path, srdf: Path, field: float | None, seed: int) -> tuple[float, int]:
+    """Return the seconds from the file to the end of ACTIONS curious actions, and after how many of them solids were in contact."""
+    start = time.perf_counter()
+    robot = load_robot(urdf, srdf=srdf, field=field)
+    plant = OfflinePlant(Model(robot), seed)
+    agent = CuriousAgent(Lattice(robot, arm_of(robot)), plant, seed=seed)
+    seconds, solid = 0.0, 0
+    for _ in range(ACTIONS):
+        agent.step()
+        seconds += time.perf_counter() - start
+        pose = plant.pose
+        solid += pose is not None and bool(pose.count)
+        start = time.perf_counter()
+    return seconds, solid
+
+
+EXPERIMENT = Experiment(
+    name="own-robots",
+    claim="28 URDFs of others stay at home, touch nothing there, settle within 1 mm, and explore within 15 s",
+    source="aims of this reproduction",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+)

@@ -1,1 +1,0 @@
-"""The figures of the documentation that neither `mobee experiment figure` nor `mobee bench --figure` draws."""
