@@ -14,11 +14,11 @@ from mobee.control.gains import Gains
 from mobee.control.law import stack_clauses
 from mobee.robot.robot import Clause
 
-ROUNDING = np.deg2rad(0.01)
+ROUNDING = np.deg2rad(0.01)  # rad: tolerance for the digits of a file
 
 
 def constraints(subject: Subject) -> Iterator[Finding]:
-    """All that can be said of the robot's clauses."""
+    """Yield all findings about the robot's clauses."""
     robot = subject.robot
     dead = False
     for index, clause in enumerate(robot.clauses):
@@ -38,7 +38,7 @@ def constraints(subject: Subject) -> Iterator[Finding]:
 
 
 def row_range(clause: Clause, limits: Array) -> tuple[Array, Array]:
-    """Smallest and largest a.q + b of every row within the limits (n, 2), each (rows,) rad."""
+    """Return the smallest and the largest a.q + b of every row within the limits (n, 2), each (rows,) rad."""
     ends = clause.a[:, :, None] * limits[None]
     return ends.min(axis=2).sum(axis=1) + clause.b, ends.max(axis=2).sum(axis=1) + clause.b
 
@@ -61,8 +61,8 @@ def _violated_at_home(subject: Subject, index: int) -> Finding:
         "constraint",
         subject.where("clause", str(index)),
         f"home violates {_name(subject, index)}: a.q + b is {_degrees((clause.a @ home + clause.b).max())} there",
-        "the robot is pushed away from home before anything has happened",
-        "move the home or correct the constraint (satisfied is a.q + b > 0)",
+        "the controller pushes the robot away from home from the first tick on",
+        "move the home or correct the constraint (it is satisfied where a.q + b > 0)",
     )
 
 
@@ -73,12 +73,12 @@ def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
         subject.where("clause", str(index)),
         f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_degrees(value)} there",
         f"the default gains push within {_degrees(Gains.default().constraint_width)} of it: the robot does not rest at home",
-        "nothing, if that is meant; else move the home",
+        "nothing, if that is intended; else move the home",
     )
 
 
 def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Iterator[Finding]:
-    """Rows that are true in every pose, which makes the clause useless, and rows that are true in none."""
+    """Find rows that hold in every pose, which makes the clause useless, and rows that hold in none."""
     where, name = subject.where("clause", str(index)), _name(subject, index)
     if least.max() > 0:
         yield Finding(
@@ -111,7 +111,7 @@ def _contradiction(subject: Subject, clauses: Sequence[Clause]) -> Iterator[Find
             "constraint",
             subject.where("clause", str(fighting[0])),
             f"{_name(subject, fighting[0])} contradicts {others}: no pose within the limits was found that satisfies them together",
-            "wherever the robot is, a constraint pushes it",
+            "in every pose a constraint pushes the robot",
             "check the signs: a row is satisfied when a.q + b > 0; all lists of a part must hold together",
         )
 
@@ -126,17 +126,17 @@ def _degrees(value: float) -> str:
     return f"{np.rad2deg(value):.4g} deg"
 
 
-CHOICES = 64  # ways of choosing a row of every clause that are tried, after those that are nearly satisfied
-STEPS = 400  # of correction a choice
-FIRST = 8  # poses that are corrected
+CHOICES = 64  # combinations of one row of each clause that are tried, after those that nearly hold
+STEPS = 400  # of correction for each combination
+CORRECTED_POSES = 8
 MARGIN = 1e-6  # rad
 
 
 def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
-    """Indices of a smallest set of clauses that no pose was found to satisfy together; () if all can be.
+    """Return indices of a smallest set of clauses that no pose was found to satisfy together; () if all can be.
 
-    `limits` (n, 2) rad, `poses` (k, n) rad within them to begin from.  A witness proves that clauses agree; that none is found proves
-    nothing, but the clauses named are then few, and a person sees.
+    `limits` (n, 2) rad, `poses` (k, n) rad within them to start from. A pose that is found proves that clauses agree. That none is
+    found proves nothing, but then the set is small enough for a person to judge.
     """
     for group in _connected(clauses):
         if _satisfiable([clauses[k] for k in group], limits, poses):
@@ -151,7 +151,7 @@ def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[in
 
 
 def _connected(clauses: Sequence[Clause]) -> list[list[int]]:
-    """Clauses in groups that share no motor: only within one can they contradict each other."""
+    """Return groups of clauses that share no motor: only clauses of one group can contradict each other."""
     groups: list[tuple[set[int], list[int]]] = []
     for index, clause in enumerate(clauses):
         motors, members = set(np.flatnonzero(clause.a.any(axis=0)).tolist()), [index]
@@ -167,14 +167,14 @@ def _satisfiable(clauses: Sequence[Clause], limits: Array, poses: Array) -> bool
     best = np.maximum.reduceat(poses @ rows.a.T + rows.b, rows.starts, axis=1).min(axis=1)
     if best.max() > 0:
         return True
-    nearest = poses[np.argsort(-best)[:FIRST]]
+    nearest = poses[np.argsort(-best)[:CORRECTED_POSES]]
     likely = (tuple(int((clause.a @ q + clause.b).argmax()) for clause in clauses) for q in nearest)
     every = islice(product(*(range(len(clause.b)) for clause in clauses)), CHOICES)
     return any(_corrected(clauses, choice, limits, nearest) for choice in dict.fromkeys(chain(likely, every)))
 
 
 def _corrected(clauses: Sequence[Clause], choice: tuple[int, ...], limits: Array, poses: Array) -> bool:
-    """Projects the poses onto the chosen rows in turn and back into the limits, until one of them satisfies all."""
+    """Project the poses onto the chosen rows in turn and back into the limits; return whether one of them satisfies all rows."""
     a = np.array([clause.a[row] for clause, row in zip(clauses, choice, strict=True)])
     b = np.array([clause.b[row] for clause, row in zip(clauses, choice, strict=True)])
     squares = (a**2).sum(axis=1)

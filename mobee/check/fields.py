@@ -1,4 +1,4 @@
-"""Checks fields: each must be felt before the solid inside it touches."""
+"""Checks fields: each must enclose the solids of its link, so that its force acts before they touch."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ GRID = 7  # points along an edge of a box
 
 
 def surface(shape: Shape) -> Array:
-    """Points (k, 3) m on the surface, root frame, zero pose."""
+    """Return points (k, 3) m on the surface of a shape, root frame, zero pose."""
     return np.asarray(shape.position + _local_surface(shape) @ shape.rotation.T)
 
 
 def outside(shape: Shape, points: Array) -> Array:
-    """How far points (k, 3) m, root frame, zero pose, are outside of the shape, (k,) m; zero inside."""
+    """Return the distances (k,) m of points (k, 3) m, root frame, zero pose, from a shape; 0 inside."""
     local = (points - shape.position) @ shape.rotation
     if shape.kind == "convex":  # beyond the nearest of many planes around it
         planes = _sphere(4 * BALL).T
@@ -41,7 +41,7 @@ def outside(shape: Shape, points: Array) -> Array:
 
 
 def vertices(shape: Shape) -> Array:
-    """The vertices (v, 3) m of a convex shape, in its own axes."""
+    """Return the vertices (v, 3) m of a convex shape, in its own axes; none for other shapes."""
     return np.empty((0, 3)) if shape.vertices is None else shape.vertices
 
 
@@ -63,19 +63,19 @@ def _local_surface(shape: Shape) -> Array:
 
 
 def _sphere(count: int) -> Array:
-    """Points spread evenly on the unit sphere (a golden spiral)."""
+    """Return points spread evenly on the unit sphere (a golden spiral)."""
     k = np.arange(count) + 0.5
     z, turn = 1.0 - 2.0 * k / count, math.pi * (1.0 + math.sqrt(5.0)) * k
     across = np.sqrt(1.0 - z**2)
     return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
 
 
-LEAST = 1e-3  # m: a solid that stands out less is enclosed
+MIN_EXCESS = 1e-3  # m: a solid that extends less beyond a field counts as enclosed
 Link = tuple[list[Shape], list[Shape]]  # solids, fields
 
 
 def fields(subject: Subject) -> Iterator[Finding]:
-    """Fields inside of solids, solids that stick out of all fields of their link, links with solids and no field."""
+    """Find fields inside solids, solids that extend beyond all fields of their link, and links with solids but no field."""
     links: dict[tuple[int, str], Link] = defaultdict(lambda: ([], []))  # two robots may stand on one base
     for shape in subject.robot.shapes:
         links[shape.link, shape.part][shape.role == "field"].append(shape)
@@ -85,10 +85,10 @@ def fields(subject: Subject) -> Iterator[Finding]:
             "field",
             subject.where("robot", subject.robot.name),
             "the robot has no field",
-            "it feels no force before its solids touch: the controller cannot keep it away from itself or from the world",
+            "no force acts before its solids touch: the controller cannot keep it away from itself or from the world",
             "`mobee convert IN.urdf OUT.xml --field 0.03` gives every solid a field that reaches 3 cm farther; keep those that you want"
             if subject.is_urdf
-            else 'give what shall keep away a field: field=".06" at a link, or a shape with field="true"',
+            else 'give each link that should keep its distance a field: field=".06" at a link, or a shape with field="true"',
         )
         return
     bare = [subject.robot.links[link] for (link, _), (solids, around) in sorted(links.items()) if solids and not around]
@@ -98,41 +98,41 @@ def fields(subject: Subject) -> Iterator[Finding]:
             "field",
             subject.where("link", bare[0]),
             f"{count(bare, 'link')} with solids and without a field: {some(bare)}",
-            "they touch before they feel, unless a neighbour's field always surrounds them",
-            "nothing, if it is so; else give them a field",
+            "they can touch before any force acts, unless a neighbour's field always surrounds them",
+            "nothing, if one does; else give them a field",
         )
     for _, (solids, around) in sorted(links.items()):
-        yield from _judge(subject, solids, around)
+        yield from _check_link(subject, solids, around)
 
 
-def _judge(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterator[Finding]:
+def _check_link(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterator[Finding]:
     for field in around:
-        holder = next((solid for solid in solids if outside(solid, surface(field)).max() < LEAST), None)
+        holder = next((solid for solid in solids if outside(solid, surface(field)).max() < MIN_EXCESS), None)
         if holder is not None:
-            rest = any(outside(other, surface(holder)).max() < LEAST for other in around if other is not field)
+            others = any(outside(other, surface(holder)).max() < MIN_EXCESS for other in around if other is not field)
             yield Finding(
-                "note" if rest else "warning",  # with --field a solid inside of another has a field too
+                "note" if others else "warning",  # with --field a solid inside another has a field too
                 "field",
                 subject.where("shape", field.name),
-                f"field {field.name!r} lies inside of solid {holder.name!r}",
-                "it can never be felt before the solid touches",
-                "nothing: another field surrounds that solid" if rest else "make the field larger than the solid",
+                f"field {field.name!r} lies inside solid {holder.name!r}",
+                "it can exert no force before the solid touches",
+                "nothing: another field surrounds that solid" if others else "make the field larger than the solid",
             )
     if around:
-        yield from _sticking(subject, solids, around)
+        yield from _not_enclosed(subject, solids, around)
 
 
-def _sticking(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterator[Finding]:
-    """The solids of one link that its fields do not enclose, the worst first."""
+def _not_enclosed(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterator[Finding]:
+    """Find the solids of one link that its fields do not enclose, the worst first."""
     out = {solid.name: float(np.min([outside(field, surface(solid)) for field in around], axis=0).max()) for solid in solids}
-    names = sorted((name for name in out if out[name] >= LEAST), key=lambda name: -out[name])
+    names = sorted((name for name in out if out[name] >= MIN_EXCESS), key=lambda name: -out[name])
     if names:
         yield Finding(
             "note",
             "field",
             subject.where("shape", names[0]),
             f"not enclosed by the fields of link {subject.robot.links[around[0].link]!r}: "
-            f"{some(f'{name} stands out {length(out[name])}' for name in names)}",
-            "it can touch there before a field is felt",
-            f"enlarge {some((field.name for field in around), 2)}, or add a field, unless what is there needs no keeping away",
+            f"{some(f'{name} by {length(out[name])}' for name in names)}",
+            "it can touch there before any force acts",
+            f"enlarge {some((field.name for field in around), 2)}, or add a field, unless that place may come near other things",
         )

@@ -1,4 +1,4 @@
-"""Checks a file: warnings of its reader, how an older version was understood, then the robot or world in it."""
+"""Checks a file: warnings of its reader, elements of older versions, then the robot or world in it."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from mobee.robot.xml.versions import CONVERT, WORLD_TAGS, upgrade_robot, upgrade
 
 
 def source(root: Node) -> Iterator[Finding]:
-    """Findings in the elements of a zero-position XML file or of a world, which are rewritten into today's grammar on the way."""
+    """Yield findings about the elements of a zero-position XML file or of a world; rewrites them into today's grammar."""
     where = f"{root.file}:{root.line}"
     yield from _empty_names(root)
     remarks = upgrade_world(root) if root.tag in WORLD_TAGS else upgrade_robot(root)
     for remark in remarks:
-        if remark.severity == "note":  # of the others its reader has warned
+        if remark.severity == "note":  # the reader has warned of the others
             yield Finding(
                 "note",
                 "older-version",
@@ -46,7 +46,7 @@ def source(root: Node) -> Iterator[Finding]:
             "robot-name",
             where,
             f"the robot has no robotName: it is called {root.file.stem!r}, after its file",
-            "its name is how services find each other: copied under another name the file is another robot",
+            "services find each other by this name, and a copy of the file under another name would be another robot",
             f'add robotName="{root.file.stem}"',
         )
 
@@ -59,14 +59,14 @@ def _empty_names(root: Node) -> Iterator[Finding]:
                 "empty-name",
                 f"{node.file}:{node.line}",
                 f"<{shown(node.tag)}> has an empty name",
-                "it gets a name that counts what came before it, which changes when the file does",
+                "it is named by a number, which changes when elements are added before it",
                 "write a name, or leave the attribute out",
             )
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What a file holds, and what is wrong with it."""
+    """The content of a file, and the findings about it."""
 
     content: Robot | World
     findings: tuple[Finding, ...]
@@ -82,40 +82,40 @@ def check_file(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Checked:
-    """Everything that is wrong with a shipped robot or world, or with a file of one; errors first.
+    """Check a shipped robot or world, or a file of one; return its content and all findings, errors first.
 
-    `world`: what a robot is also checked against, at home; the others: of a URDF, as in load_robot.
-    Raises RobotFileError, UnknownName or InvalidValue when it cannot be read at all, or not with these options.
+    `world`: a world in which the robot is also checked, at home; the other options: for a URDF, as of `load_robot`.
+    Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read, or not with these options.
     """
-    _refuse(name_or_path)
+    _require_known(name_or_path)
     path = world_file(name_or_path)
-    said: list[Finding] = []
+    warned: list[Finding] = []
     content: Robot | World
     if path is None:
-        with _listening(said):
+        with _collected_warnings(warned):
             content = load_robot(name_or_path, field=field, meshes=meshes, corners=corners, srdf=srdf, home=home)
         found = check_robot(content, world)
         file = find_file(name_or_path, ROBOTS, "robot")
         if file.suffix.lower() != ".urdf":
             found += source(read_xml(file, repair=True))
         elif corners != "all" and any(shape.vertices is not None for shape in content.shapes):
-            with _listening([]):
+            with _collected_warnings([]):
                 exact = load_robot(name_or_path, field=field, meshes=meshes, corners="all", srdf=srdf, home=home)
             found += hulls(content, exact)
     elif world is not None or any(option is not None for option in (field, meshes, corners, srdf, home)):
-        raise InvalidValue(f"{path} is a world: it is checked by itself, without a world around it and options of a URDF.")
+        raise InvalidValue(f"{path} is a world: it is checked alone, without another world and without options of a URDF.")
     else:
-        with _listening(said):
+        with _collected_warnings(warned):
             content = load_world(path)
         root = read_xml(path, repair=True)
-        said_of_form = list(source(root))
+        source_findings = list(source(root))
         lines = {node.attributes.get("name", "").strip(): f"{node.file}:{node.line}" for node in root}
-        found = check_world(content, lines) + said_of_form
-    return Checked(content, tuple(sorted(said + found, key=lambda finding: SEVERITIES.index(finding.severity))))
+        found = check_world(content, lines) + source_findings
+    return Checked(content, tuple(sorted(warned + found, key=lambda finding: SEVERITIES.index(finding.severity))))
 
 
-def _refuse(name_or_path: str | Path) -> None:
-    """Raise for a folder, and for a name that neither a robot nor a world has."""
+def _require_known(name_or_path: str | Path) -> None:
+    """Raise RobotFileError for a folder, and UnknownName for a name of neither a robot nor a world."""
     given, path = str(name_or_path), Path(name_or_path)
     known = {*shipped_robots(), *shipped_worlds()}
     if given in known:
@@ -127,7 +127,7 @@ def _refuse(name_or_path: str | Path) -> None:
 
 
 def world_file(name_or_path: str | Path) -> Path | None:
-    """The file of a world; None when it is a robot's, or is none at all."""
+    """Return the file of a world; None for a robot, and where there is no file."""
     given, path = str(name_or_path), Path(name_or_path)
     if given in shipped_worlds() and given not in shipped_robots():
         return WORLDS / f"{given}.xml"
@@ -137,12 +137,12 @@ def world_file(name_or_path: str | Path) -> Path | None:
 
 
 @contextmanager
-def _listening(said: list[Finding]) -> Iterator[None]:
-    """What a reader warns of meanwhile, as findings."""
+def _collected_warnings(warned: list[Finding]) -> Iterator[None]:
+    """Collect the warnings of a reader as findings."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
     for warning in caught:
         found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
         where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
-        said.append(Finding("warning", "reader", where, what, "the robot is not all that the file says", remedy))
+        warned.append(Finding("warning", "reader", where, what, "the robot differs from what the file says", remedy))

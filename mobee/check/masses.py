@@ -14,12 +14,12 @@ from mobee.model.masses import gravity_torque
 from mobee.robot.bodies import can_be
 from mobee.robot.robot import Body
 
-HEAVIEST, LIGHTEST = 1000.0, 0.01  # kg: robots are between
-NEAR = 0.1  # m, by which a centre of mass may lie outside of its link's solids, however small they are
+HEAVIEST, LIGHTEST = 1000.0, 0.01  # kg: the range of plausible robots
+MAX_OUTSIDE = 0.1  # m: how far a centre of mass may always lie outside its link's solids
 
 
 def masses(subject: Subject) -> Iterator[Finding]:
-    """All that can be said of the robot's masses; nothing of a robot without any."""
+    """Yield all findings about the robot's masses; none for a robot without masses."""
     if not subject.robot.bodies:
         return
     yield from _total(subject)
@@ -49,7 +49,7 @@ def _total(subject: Subject) -> Iterator[Finding]:
 
 
 def _without(subject: Subject) -> Iterator[Finding]:
-    """Moving links that are drawn and weigh nothing."""
+    """Find moving links with solids but without a mass."""
     robot = subject.robot
     solid = {shape.link for shape in robot.shapes if shape.role == "solid"}
     idle = sorted((solid & subject.moved) - {body.link for body in robot.bodies})
@@ -59,13 +59,13 @@ def _without(subject: Subject) -> Iterator[Finding]:
             "mass",
             subject.where("link", robot.links[idle[0]]),
             f"{count(idle, 'moving link')} with solids and without a mass: {some(robot.links[link] for link in idle)}",
-            "gravity compensation takes them for weightless",
-            f"nothing, if the mass of what carries them includes theirs; else add {'<inertial>' if subject.is_urdf else '<mass>'}",
+            "gravity compensation ignores their weight",
+            f"nothing, if the mass of the link that carries them includes theirs; else add {'<inertial>' if subject.is_urdf else '<mass>'}",
         )
 
 
 def _impossible(subject: Subject) -> Iterator[Finding]:
-    """Moments of inertia that no solid thing has; one note of all."""
+    """Find moments of inertia that no rigid body can have; one note for all."""
     wrong = [body.link for body in subject.robot.bodies if body.inertia is not None and not can_be(body.inertia)]
     if wrong:
         names = [subject.robot.links[link] for link in wrong]
@@ -73,7 +73,7 @@ def _impossible(subject: Subject) -> Iterator[Finding]:
             "note",
             "mass",
             subject.where("link", names[0]),
-            f"no solid thing has the moments of inertia of {some(names)}",
+            f"no rigid body can have the moments of inertia of {some(names)}",
             "this library does not use them; simulators to which the robot is exported do, and may become unstable",
             "no principal moment is negative, or larger than the two others together",
         )
@@ -86,7 +86,7 @@ def _astray(subject: Subject, body: Body) -> Iterator[Finding]:
     low = np.min([shape.position - half_extent(shape) for shape in solids], axis=0)
     high = np.max([shape.position + half_extent(shape) for shape in solids], axis=0)
     off = float(np.linalg.norm(np.maximum(0.0, np.maximum(low - body.centre, body.centre - high))))
-    if off > max(NEAR, float(np.linalg.norm(high - low))):
+    if off > max(MAX_OUTSIDE, float(np.linalg.norm(high - low))):
         name = subject.robot.links[body.link]
         yield Finding(
             "warning",
@@ -94,12 +94,12 @@ def _astray(subject: Subject, body: Body) -> Iterator[Finding]:
             subject.where("link", name),
             f"the centre of mass of link {name!r} lies {length(off)} away from its solids",
             "gravity compensation is computed with that lever",
-            "check its place: it is in metres, and relative to where its tag stands",
+            "check its position: it is in metres, relative to the element around its tag",
         )
 
 
 def _too_heavy(subject: Subject) -> Iterator[Finding]:
-    """Motors that cannot hold the robot, a warning where it is at home."""
+    """Find motors that cannot hold the robot against its weight; a warning if that is at home."""
     robot = subject.limited
     limits = np.array([motor.max_torque for motor in robot.motor_table])
     at_home = np.abs(gravity_torque(robot, subject.home))

@@ -12,12 +12,12 @@ from mobee.control.gains import Gains
 from mobee.robot.motor_units import motor_units, outside_zones
 from mobee.robot.robot import Motor
 
-TURN = 2 * np.pi + 1e-6
-SLACK = 1e-6  # rad or m: what a file's digits leave open
+TURN = 2 * np.pi + 1e-6  # rad
+SLACK = 1e-6  # rad or m: tolerance for the digits of a file
 
 
 def joint_limits(subject: Subject) -> Iterator[Finding]:
-    """Joints without limits, with an empty interval, or one of more than a turn to a side."""
+    """Find joints without limits, with an empty range, or with one of more than a turn to a side."""
     for joint in subject.robot.joints:
         where, said = subject.where("joint", joint.name), interval(joint.limits, joint.kind)
         low, high = joint.limits
@@ -51,7 +51,7 @@ def joint_limits(subject: Subject) -> Iterator[Finding]:
 
 
 def coupling(subject: Subject) -> Iterator[Finding]:
-    """Joints that their motors drive beyond their own limits, and joints that nothing drives."""
+    """Find joints that their motors drive beyond their own limits, and joints that no motor drives."""
     matrix, offset = subject.robot.coupling
     ends = matrix[:, :, None] * subject.range[None]
     low, high = ends.min(axis=2).sum(axis=1) + offset, ends.max(axis=2).sum(axis=1) + offset
@@ -63,7 +63,7 @@ def coupling(subject: Subject) -> Iterator[Finding]:
                 "coupling",
                 where,
                 f"no motor drives joint {joint.name!r}",
-                "it stays where it is drawn",
+                "it stays at its zero position",
                 "put it inside a motor, or write a fixed link instead",
             )
         elif low[index] < joint.limits[0] - SLACK or high[index] > joint.limits[1] + SLACK:
@@ -79,11 +79,11 @@ def coupling(subject: Subject) -> Iterator[Finding]:
             )
 
 
-LEAST = np.deg2rad(1.0)  # rad: less is no range; any range of a slide is one
+MIN_RANGE = np.deg2rad(1.0)  # rad: a smaller one cannot be used; any range of a slide can
 
 
 def home_limits(subject: Subject) -> Iterator[Finding]:
-    """Motors whose home lies outside of their limits."""
+    """Find motors whose home lies outside their limits."""
     for motor in subject.robot.motor_table:
         if not motor.limits[0] <= motor.home <= motor.limits[1]:
             home = f"{np.rad2deg(motor.home):.4g} deg ({motor.home:.4g} rad)"
@@ -98,29 +98,29 @@ def home_limits(subject: Subject) -> Iterator[Finding]:
 
 
 def idle_motors(subject: Subject) -> Iterator[Finding]:
-    """Motors that move no shape and no marker."""
+    """Find motors that move no shape and no marker."""
     bearing = {shape.link for shape in subject.robot.shapes} | {marker.link for marker in subject.robot.markers.values()}
     for motor in subject.robot.motor_table:
         driven = [joint for joint, scale, _ in motor.joints if scale]
         if any(subject.below[joint] & bearing for joint in driven):
             continue
-        lacks = "no shape and no marker hangs on what it drives" if driven else "it drives no joint"
+        lacks = "no shape and no marker is on the links that it moves" if driven else "it drives no joint"
         yield Finding(
             "warning",
             "idle-motor",
             subject.where("motor", motor.name),
             f"motor {motor.name!r} moves nothing: {lacks}",
-            "its movements can be neither felt nor seen, and still double the states an agent has to learn",
+            "its motion has no effect, and still doubles the states that an agent has to learn",
             "give its links a radius or a marker, or remove it",
         )
 
 
 def idle_parts(subject: Subject) -> Iterator[Finding]:
-    """Parts without a motor that an agent could use."""
+    """Find parts without a motor that an agent could use."""
     units = motor_units(subject.robot)
     ranges = {motor.name: float(np.ptp(motor.limits)) / unit for motor, unit in zip(subject.robot.motor_table, units, strict=True)}
     for part in subject.robot.parts.values():
-        if any(ranges[name] >= LEAST for name in part.motors):
+        if any(ranges[name] >= MIN_RANGE for name in part.motors):
             continue
         lacks = "all its motors move less than 1 deg" if part.motors else "it has no motor"
         yield Finding(
@@ -128,13 +128,13 @@ def idle_parts(subject: Subject) -> Iterator[Finding]:
             "idle-part",
             subject.where("part", part.name),
             f"no agent can use part {part.name!r}: {lacks}",
-            "an agent owns the goal of a part, and here it has nothing to choose from",
+            "an agent chooses goals of a part, and here there is nothing to choose",
             "give it a motor with a range, or move its links into another part",
         )
 
 
 def unreachable_markers(subject: Subject) -> Iterator[Finding]:
-    """Markers on links that stay where they are, whatever the motors do; one note of all in a URDF, where every link is a marker."""
+    """Find markers that no motor moves; in a URDF, where every link is a marker, one note for all."""
     unmoved = [marker for marker in subject.robot.markers.values() if marker.link not in subject.moved]
     if subject.is_urdf and unmoved:
         yield Finding(
@@ -142,7 +142,7 @@ def unreachable_markers(subject: Subject) -> Iterator[Finding]:
             "marker",
             subject.where("marker", unmoved[0].name),
             f"{count(unmoved, 'marker')} that no motor moves: {some(marker.name for marker in unmoved)}",
-            "their Jacobian is zero: they can neither be reached with nor be pushed",
+            "their Jacobian is zero: they can neither reach nor be pushed",
             "nothing, if they are frames of the base",
         )
         return
@@ -152,16 +152,16 @@ def unreachable_markers(subject: Subject) -> Iterator[Finding]:
             "marker",
             subject.where("marker", marker.name),
             f"no motor moves marker {marker.name!r}: it sits on link {subject.robot.links[marker.link]!r}",
-            "its Jacobian is zero: it can neither be reached with nor be pushed",
+            "its Jacobian is zero: it can neither reach nor be pushed",
             "write it inside the joint that should carry it",
         )
 
 
-ROUNDING = 1e-4  # of the motor's range: what the digits of a file leave open
+ROUNDING = 1e-4  # of the motor's range: tolerance for the digits of a file
 
 
 def home_zones(subject: Subject) -> Iterator[Finding]:
-    """Motors whose home lies in a limit zone of the default gains: those that are pushed away from it, and those whose zone ends there."""
+    """Find motors whose home lies in a limit zone of the default gains: those that are pushed away, and those whose zone ends there."""
     units = motor_units(subject.robot)
     better = {
         motor.name: outside_zones(motor.home, motor.limits, float(unit))
@@ -183,7 +183,7 @@ def home_zones(subject: Subject) -> Iterator[Finding]:
 
 
 def _drift(subject: Subject, motors: Sequence[Motor], better: dict[str, float]) -> str:
-    """How far from home the motor comes to rest that is pushed farthest: where the spring to home is as strong as the limit."""
+    """Describe how far from home the motor that is pushed farthest comes to rest: where the spring is as strong as the limit."""
     gains = Gains.default()
     slope = gains.max_limit / gains.limit_width
     share = slope / (slope + gains.stiffness)
@@ -206,7 +206,7 @@ def _finding(subject: Subject, motors: Sequence[Motor], better: dict[str, float]
 
 
 def _change(subject: Subject, motor: Motor, home: float) -> str:
-    """What to write where, in the words of the file."""
+    """Return the text to write, and its line, in the format of the file."""
     line = _line(subject, motor).rpartition(":")[2]
     if not subject.is_urdf:
         return f'{motor.name} home="{np.rad2deg(home):.6g}" (line {line})'
@@ -215,5 +215,5 @@ def _change(subject: Subject, motor: Motor, home: float) -> str:
 
 
 def _line(subject: Subject, motor: Motor) -> str:
-    """Where the home is written: in the SRDF, or at the motor."""
+    """Return file and line of a motor's home: in the SRDF, or at the motor."""
     return subject.robot.where.get(("home", motor.name)) or subject.where("motor", motor.name)

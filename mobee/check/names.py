@@ -1,4 +1,4 @@
-"""Checks for duplicates: identical shapes, names that differ in case only, names that other programs cannot use."""
+"""Checks names and duplicates: identical shapes, names that differ in case only, names that other programs cannot use."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from mobee.check.finding import Finding
 from mobee.check.subject import Subject
 from mobee.robot.robot import Shape
 
-NEAR = 1e-6  # m
+SAME_WITHIN = 1e-6  # m
 KEY = re.compile(r"[a-z0-9_]+")
 
 
 def identical_shapes(subject: Subject) -> Iterator[Finding]:
-    """Shapes of the same role, kind, size and place on the same link."""
+    """Find shapes of the same role, kind, size and position on the same link."""
     for one, other in combinations(subject.robot.shapes, 2):
         if _same(one, other):
             yield Finding(
                 "warning",
                 "duplicate",
                 subject.where("shape", other.name),
-                f"{other.role} {other.name!r} is {one.name!r} again: same kind, size and place",
-                "each contact is found twice, and its force counts twice",
+                f"{other.role} {other.name!r} is a duplicate of {one.name!r}: same kind, size and position",
+                "each contact is counted twice, and so is its force",
                 "remove one of the two",
             )
 
 
 def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
-    """Names of one kind that differ in upper and lower case only."""
+    """Find names of one kind that differ in upper and lower case only."""
     robot = subject.robot
     kinds: dict[str, Iterable[str]] = {
         "part": robot.parts,
@@ -52,21 +52,21 @@ def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
                     "name-case",
                     subject.where(kind, name),
                     f"{kind} {name!r} differs from {kind} {before!r} in upper and lower case only",
-                    "names are told apart by case, and people do not",
+                    "names are case-sensitive, and people overlook the difference",
                     "rename one of the two",
                 )
 
 
 def unusable_names(subject: Subject) -> Iterator[Finding]:
-    """Parts that cannot stand in a key of the bus, and motors that no list of names can hold."""
+    """Find parts whose names are not valid in a key of the bus, and motors whose names are not valid in a list."""
     for part in subject.robot.parts:
         if not KEY.fullmatch(part):
             yield Finding(
                 "warning",
                 "part-name",
                 subject.where("part", part),
-                f"part name {part!r} cannot stand in a key of the bus",
-                "the services name their topics after the parts: none of them can run this robot",
+                f"part name {part!r} is not valid in a key of the bus",
+                "the services name their keys after the parts, so that none of them can run this robot",
                 "rename it: a-z, 0-9 and _ only",
             )
     for motor in subject.robot.motors:
@@ -75,21 +75,23 @@ def unusable_names(subject: Subject) -> Iterator[Finding]:
                 "warning",
                 "motor-name",
                 subject.where("motor", motor),
-                f"motor name {motor!r} holds a blank or a comma",
-                "lists of motors are separated by these: a constraint cannot name it",
-                "rename it: _ instead of the blank",
+                f"motor name {motor!r} contains a space or a comma",
+                "lists of motors are separated by these, so that no constraint can name it",
+                "rename it, with _ instead",
             )
 
 
 def _same(one: Shape, other: Shape) -> bool:
-    if (one.link, one.role, one.kind) != (other.link, other.role, other.kind) or not np.allclose(one.size, other.size, rtol=0, atol=NEAR):
+    if (one.link, one.role, one.kind) != (other.link, other.role, other.kind) or not np.allclose(
+        one.size, other.size, rtol=0, atol=SAME_WITHIN
+    ):
         return False
-    if not np.allclose(one.position, other.position, rtol=0, atol=NEAR):
+    if not np.allclose(one.position, other.position, rtol=0, atol=SAME_WITHIN):
         return False
     if one.kind == "convex":
         return np.array_equal(vertices(one), vertices(other))
     if one.kind == "sphere":
         return True
     if one.kind == "box":
-        return np.allclose(one.rotation, other.rotation, atol=NEAR)
-    return bool(abs(one.rotation[:, 2] @ other.rotation[:, 2]) > 1 - NEAR)  # an axis has no sign
+        return np.allclose(one.rotation, other.rotation, atol=SAME_WITHIN)
+    return bool(abs(one.rotation[:, 2] @ other.rotation[:, 2]) > 1 - SAME_WITHIN)  # an axis has no sign

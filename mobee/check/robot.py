@@ -44,9 +44,9 @@ CHECKS: tuple[Check, ...] = (
 
 
 def check_robot(robot: Robot, world: World | None = None) -> list[Finding]:
-    """Everything that is wrong with a robot, errors first; with a world also what it touches there at home.
+    """Return all findings about a robot, errors first; with a world also the objects that it touches there at home.
 
-    Poses are sampled with a fixed seed: the same robot is answered the same way.
+    Poses are sampled with a fixed seed, so that the same robot always gets the same findings.
     """
     subject = Subject(robot, world)
     with np.errstate(invalid="ignore"):  # joints without limits are a finding, not a failure of the others

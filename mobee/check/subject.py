@@ -17,38 +17,38 @@ from mobee.model.world import World
 from mobee.robot.robot import Robot, Shape
 from mobee.robot.xml.node import read_xml
 
-POSES = 256  # a pair that touches in all of them cannot be kept apart
-SEED = 20141030  # any: the same file is answered the same way every time
+POSES = 256  # sampled; a pair that touches in all of them cannot be separated
+SEED = 20141030  # fixed, so that the same file always gets the same findings
 
 Touch = tuple[str, str, str]  # first, second, kind
 
 
 class Subject:
-    """A robot, perhaps in a world, and what can be asked about it."""
+    """A robot, perhaps in a world, with the values that several checks use."""
 
     def __init__(self, robot: Robot, world: World | None = None) -> None:
         self.robot = robot
         self.world = world
 
     def where(self, kind: str, name: str) -> str:
-        """File and line of a thing; the robot's own where the reader kept none."""
+        """Return file and line of an element, or those of the robot where the reader recorded none."""
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
     @property
     def is_urdf(self) -> bool:
-        """Whether the robot was read from a URDF, in which some remedies are written otherwise."""
+        """Whether the robot was read from a URDF, for which some remedies differ."""
         return any(".urdf:" in line for line in self.robot.where.values())
 
     def urdf_link(self, shape: str) -> str | None:
-        """The link of the URDF that a shape is on, which a fixed joint may hold on the robot's link.
+        """Return the URDF link of a shape; a fixed joint may join it to the robot's link.
 
-        None for another file, and where shapes of several links begin in one line.
+        None for another kind of file, and where shapes of several links begin in one line.
         """
         return self._urdf_links.get(self.where("shape", shape))
 
     @cached_property
     def _urdf_links(self) -> dict[str, str]:
-        """For every line of a URDF on which a shape of the robot begins its link."""
+        """The link for every line of a URDF on which a shape of the robot begins."""
         lines = (line.rpartition(":")[0] for (kind, _), line in self.robot.where.items() if kind == "shape")
         files = {Path(file) for file in lines if file.lower().endswith(".urdf")}
         links = (node for file in files for node in read_xml(file) if node.tag == "link")
@@ -60,7 +60,7 @@ class Subject:
 
     @cached_property
     def range(self) -> Array:
-        """Motor limits (n, 2) rad, half a turn to a side where a motor has none."""
+        """Motor limits (n, 2) rad; half a turn to each side for a motor without limits."""
         return np.nan_to_num(self.robot.limits, nan=0.0, neginf=-np.pi, posinf=np.pi)
 
     @cached_property
@@ -71,18 +71,18 @@ class Subject:
 
     @cached_property
     def home(self) -> Array:
-        """Where the robot starts, (n,) rad."""
+        """The home posture, (n,) rad."""
         return np.nan_to_num(self.robot.home)
 
     @cached_property
     def limited(self) -> Robot:
-        """The same robot with limits everywhere, for a model needs some."""
+        """The same robot with limits for all motors, as a model needs them."""
         motors = zip(self.robot.motor_table, self.range, strict=True)
         return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
 
     @cached_property
     def at_home(self) -> tuple[Contact, ...]:
-        """Contacts at home, with the world if there is one."""
+        """Contacts at home, including those with the world."""
         return Model(self.limited, self.world).evaluate(self.home).contacts
 
     @cached_property
@@ -98,7 +98,7 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """Fields that reach, at home, into solids of other parts without meeting a field of the solid's link, and how deep [m]."""
+        """Fields, solids of other parts that they reach into at home without touching a field of the solid's link, and depths [m]."""
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
         near = [
@@ -110,17 +110,17 @@ class Subject:
         pairs = np.array(near, dtype=np.intp).reshape(-1, 2)
         probe = replace(robot, shapes=bodies, field_pairs=pairs[:0], solid_pairs=pairs)
         named = {shape.name: shape for shape in shapes}
-        felt = {end for c in self.at_home if c.kind == "field" for end in ((c.first, c.second_link), (c.second, c.first_link))}
+        acting = {end for c in self.at_home if c.kind == "field" for end in ((c.first, c.second_link), (c.second, c.first_link))}
         found = []
         for contact in Model(probe).evaluate(self.home).contacts:
             field, solid = sorted((named[contact.first], named[contact.second]), key=lambda shape: shape.role)
-            if (field.name, solid.link) not in felt:
+            if (field.name, solid.link) not in acting:
                 found.append((field, solid, contact.depth))
         return tuple(found)
 
     @cached_property
     def moved(self) -> frozenset[int]:
-        """Links that some motor moves in the root frame."""
+        """Links that a motor moves in the root frame."""
         driven = set(np.flatnonzero(self.robot.coupling[0].any(axis=1)))
         found: set[int] = set()
         for index, joint in enumerate(self.robot.joints):
@@ -130,7 +130,7 @@ class Subject:
 
     @cached_property
     def below(self) -> tuple[frozenset[int], ...]:
-        """For every joint the links that it carries, its own first."""
+        """The links that each joint carries, including the one that it moves."""
         carried: list[set[int]] = [{index + 1} for index in range(len(self.robot.joints))]
         for index in reversed(range(len(self.robot.joints))):
             parent = self.robot.joints[index].parent
@@ -140,5 +140,5 @@ class Subject:
 
 
 def touches(contacts: tuple[Contact, ...]) -> set[Touch]:
-    """The pairs of these contacts."""
+    """Return the pairs of these contacts."""
     return {(contact.first, contact.second, contact.kind) for contact in contacts}

@@ -1,4 +1,4 @@
-"""Checks which links touch at home or in every pose and which pairs are never tested; writes them into an SRDF."""
+"""Checks which links touch at home or in every pose, and which pairs are never tested; writes touching pairs into an SRDF."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ OTHER_ROLE = {
     "solid": "solids that an <ignore> or the rule of 2014 leaves out, while fields of these links are tested",
     "field": "fields that an <ignore> or the rule of 2014 leaves out, while solids of these links are tested",
 }
-UNKNOWN = "left out by an <ignore> of the file, or by who made the robot"
+UNKNOWN = "left out by an <ignore> of the file, or by the program that made the robot"
 
 
 @dataclass(frozen=True, slots=True)
 class UntestedGroup:
-    """Pairs that are never tested for one reason: names of links, and how many pairs of shapes that leaves out."""
+    """Pairs that are never tested for one reason: names of links, and the numbers of pairs of shapes."""
 
     reason: str
-    kind: str  # the reason without what it names: groups of one kind are summed up together
+    kind: str  # the reason without names: groups of one kind are summed up together
     links: tuple[tuple[str, str], ...]
     solids: int  # pairs of solids
     fields: int  # pairs of fields
 
 
 def untested_groups(robot: Robot) -> list[UntestedGroup]:
-    """All pairs of links with shapes that are never tested against each other, by reason, the largest group first.
+    """Return all pairs of links with shapes that are never tested against each other, by reason, the largest group first.
 
     Solids are never tested against fields of the same robot, so such pairs are not listed.
     """
@@ -73,14 +73,14 @@ def untested_groups(robot: Robot) -> list[UntestedGroup]:
 
 
 def _kind(reason: str) -> str:
-    """The reason without what it names: "adjacent" of "adjacent: joint elbow"."""
+    """Return a reason without names: "adjacent" for "adjacent: joint elbow"."""
     if reason.startswith("joined at"):
         return "joined at a joint or at joints that are close together"
     return re.split(r": | \(|, line ", reason, maxsplit=1)[0]
 
 
 def _reason(robot: Robot, i: int, j: int, met: Mapping[str, set[LinkPair]]) -> str:
-    """Why two shapes of one role are not tested; `met`: for each role the pairs of links of which some shapes are."""
+    """Return why two shapes of one role are not tested; `met`: for each role the pairs of links of which some shapes are tested."""
     one, other = robot.shapes[i], robot.shapes[j]
     links = frozenset((one.link, other.link))
     if one.link == other.link:
@@ -94,27 +94,27 @@ def _reason(robot: Robot, i: int, j: int, met: Mapping[str, set[LinkPair]]) -> s
     return OTHER_ROLE[one.role] if any(links in tested for tested in met.values()) else UNKNOWN
 
 
-POSES = 10_000  # random ones: a pair that touches in all of them touches in every pose that matters
-CHUNK = 500  # poses evaluated at once
+POSES = 10_000  # random; a pair that touches in all of them counts as always touching
+CHUNK = 500  # poses in one evaluation
 
 LinkNames = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class TouchingPair:
-    """Two links whose solids touch; of a URDF its own links, before those of fixed joints are merged."""
+    """Two links whose solids touch; for a URDF its own links, before links of fixed joints are merged."""
 
     first: str
     second: str
-    reason: Literal["Default", "Always"]  # at home, or in all random poses: MoveIt's words
+    reason: Literal["Default", "Always"]  # at home, or in all random poses, as MoveIt names them
     depth: float  # m, of the deepest contact at home; 0 where they do not touch there
     share: float  # of the random poses in which they touch
 
 
 def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]:
-    """The pairs that touch at home or in all random poses, those that always touch first; a fixed seed draws the poses.
+    """Return the pairs that touch at home or in all random poses, those that always touch first; the poses have a fixed seed.
 
-    Of a robot in which no world object is: only its own solids are looked at, fields do not count.
+    Only the robot's own solids are tested: no fields, and no objects of a world.
     """
     subject = Subject(replace(robot, field_pairs=robot.field_pairs[:0]))
     model = Model(subject.limited)
@@ -139,7 +139,7 @@ def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]
 
 
 def _counted(model: Model, poses: Array, names: dict[tuple[int, int], LinkNames]) -> dict[LinkNames, int]:
-    """In how many of the poses (k, n) each pair of links touches."""
+    """Return in how many of the poses (k, n) each pair of links touches."""
     numbers = model.evaluate(poses).table.numbers
     seen: dict[LinkNames, set[int]] = defaultdict(set)
     for pose, first, second in numbers[:, [0, 2, 3]].tolist():
@@ -154,14 +154,14 @@ def _links(subject: Subject, first: int, second: int) -> LinkNames:
 
 
 def always_touching(subject: Subject) -> Iterator[Finding]:
-    """Pairs that overlap in every sampled pose."""
+    """Find pairs that overlap in every sampled pose."""
     for first, second, kind in sorted(subject.always):
         yield Finding(
             "warning",
             "always-touching",
             subject.where("shape", first),
-            f"{kind}s {first!r} and {second!r} overlap in every pose tried",
-            "their contact says nothing, and hides others behind a force that never ends"
+            f"{kind}s {first!r} and {second!r} overlap in every sampled pose",
+            "their contact carries no information, and its force never ends"
             if kind == "field"
             else "every pose counts as a collision, so no plan is ever valid",
             f"make one smaller, or leave the pair out: {_ignoring(subject, first, second)}{_written(subject) if kind == 'solid' else ''}",
@@ -169,12 +169,12 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
 
 
 def _written(subject: Subject) -> str:
-    """What writes the lines of a URDF's solids."""
+    """Return a hint at the option that writes the lines for solids of a URDF."""
     return " (--write-srdf writes it)" if subject.is_urdf else ""
 
 
 def _ignoring(subject: Subject, first: str, second: str) -> str:
-    """What leaves out the pair of links of two shapes."""
+    """Return the line of XML that excludes the pair of links of two shapes."""
     link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
     if link1 and link2:
         return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
@@ -183,7 +183,7 @@ def _ignoring(subject: Subject, first: str, second: str) -> str:
 
 
 def home_contacts(subject: Subject) -> Iterator[Finding]:
-    """Solids that collide and fields that push at home, where they do not in every pose."""
+    """Find solids that collide and fields that push at home, but not in every pose."""
     world = subject.world.objects if subject.world else {}
     for contact in subject.at_home:
         if (contact.first, contact.second, contact.kind) in subject.always:
@@ -206,13 +206,13 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
                 f"at home fields {pair} overlap by {length(contact.depth)}"
                 if contact.second not in world
                 else f"at home field {pair} overlap by {length(contact.depth)}",
-                "the force pushes the robot away from its home before anything has happened",
+                "the force pushes the robot away from its home from the first tick on",
                 "make a field smaller, or move the home",
             )
 
 
 def world_contacts(subject: Subject) -> Iterator[Finding]:
-    """What the robot touches at home in the world, in one line; nothing without a world."""
+    """Report in one note what the robot touches at home in the world; nothing without a world."""
     if subject.world is None:
         return
     world = subject.world.objects
@@ -229,7 +229,7 @@ def world_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def _parting(subject: Subject, contact: Contact) -> str:
-    """What to do about two solids that collide at home."""
+    """Return the remedy for two solids that collide at home."""
     if not subject.is_urdf:
         return "move the home, make a shape smaller, or correct where one is placed"
     remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
@@ -239,7 +239,7 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Parts whose fields reach, at home, into solids of another part whose own fields are not felt there: the deepest of each two parts."""
+    """Find fields that reach, at home, into solids of another part whose own fields do not touch them: the deepest for each two parts."""
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
         parts = field.part, solid.part
@@ -251,7 +251,7 @@ def foreign_solids(subject: Subject) -> Iterator[Finding]:
             "foreign-solid",
             subject.where("shape", field.name),
             f"at home field {field.name!r} of part {part!r} reaches {length(depth)} into solid {solid.name!r} of {other!r}",
-            f"fields feel fields only: {part} comes this near without a force",
+            f"fields act on fields only: {part} comes this near without any force",
             f"nothing, if the limits keep them apart; else test the fields of {subject.robot.links[solid.link]!r} against those of "
             f"{subject.robot.links[field.link]!r} (`mobee check --pairs` says why they are not)"
             if _left_out(subject, field.link, solid.link)
@@ -260,7 +260,7 @@ def foreign_solids(subject: Subject) -> Iterator[Finding]:
 
 
 def _left_out(subject: Subject, one: int, other: int) -> bool:
-    """Whether both links have fields that are never tested against each other."""
+    """Return whether both links have fields, and these are never tested against each other."""
     shapes, links = subject.robot.shapes, {one, other}
     bearing = {shape.link for shape in shapes if shape.role == "field"}
     return links <= bearing and not any({shapes[i].link, shapes[j].link} == links for i, j in subject.robot.field_pairs)
@@ -268,21 +268,21 @@ def _left_out(subject: Subject, one: int, other: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What was written where, and what still touches at home."""
+    """The result of `leave_out_touching`: what was written where, and what still touches at home."""
 
     path: Path
-    merged: bool  # whether the file was there before, or took over the text of another SRDF
+    merged: bool  # whether the file existed before, or the text of another SRDF was copied
     pairs: tuple[TouchingPair, ...]  # new in the file
-    enabled: tuple[TouchingPair, ...]  # not written: the file asks for their test
-    touching: int  # contacts of solids at home, of the robot as it is now read
+    enabled: tuple[TouchingPair, ...]  # not written, because the file enables their test
+    touching: int  # contacts of solids at home, of the robot with the new file
     found: bool  # whether load_robot finds the file by itself
 
 
 def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any) -> LeftOut:
     """Write <disable_collisions> for every two links of a URDF whose solids touch at home or in all of many random poses.
 
-    `out`: the SRDF; None: the one that the robot is read with, or a new one beside it.  What is in an SRDF stays, word for word;
-    it is written whole or not at all.  `options`: of load_robot.  Raises RobotFileError or InvalidValue where that cannot be done.
+    `out`: the SRDF; None: the one that the robot is read with, or a new one beside it. The text of an existing SRDF is kept word for
+    word. The file is written completely or not at all. `options`: of `load_robot`. Raises RobotFileError and InvalidValue.
     """
     path = find_file(urdf, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":
@@ -304,14 +304,14 @@ def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any
 
 
 def _read(path: Path, options: dict[str, Any], srdf: Path | None) -> Robot:
-    """The robot; what its reader warns of is for the check to say."""
+    """Return the robot, without the reader's warnings: the check reports them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return load_robot(path, **options | {"srdf": srdf})
 
 
 def _used(path: Path, srdf: str | Path | None) -> Path | None:
-    """The SRDF that load_robot reads."""
+    """Return the SRDF that `load_robot` reads."""
     if srdf is not None:
         return Path(srdf)
     root = read_xml(path)
@@ -326,7 +326,7 @@ def _is_found(path: Path, srdf: Path) -> bool:
 def _target(path: Path, out: Path | None, used: Path | None, srdf: str | Path | None) -> Path:
     target = out or used or path.with_suffix(".srdf")
     if target.suffix.lower() != ".srdf":
-        raise InvalidValue(f"{target} is no name for an SRDF. Give one that ends in .srdf.")
+        raise InvalidValue(f"{target} is not the name of an SRDF. Give one that ends in .srdf.")
     if srdf is not None and is_file(target) and target.resolve() != Path(srdf).resolve():
         raise InvalidValue(
             f"{target} is there already, and the robot is read with {srdf}. Read it with --srdf {target}, or name a new file."
@@ -335,9 +335,9 @@ def _target(path: Path, out: Path | None, used: Path | None, srdf: str | Path | 
 
 
 def _require_links(robot: Robot, path: Path) -> None:
-    """Raise where several links stand in one line: lines are all that says which link of the URDF a shape is on."""
+    """Raise RobotFileError if several links are in one line: only its line says which link of the URDF a shape is on."""
     subject = Subject(robot)
     unknown = next((shape for shape in robot.shapes if subject.urdf_link(shape.name) is None), None)
     if unknown is not None:
         line = subject.where("shape", unknown.name)
-        raise RobotFileError(f"{line}: several links stand in this line. Put each on lines of its own: xmllint --format {path.name}")
+        raise RobotFileError(f"{line}: several links are in this line. Put each on lines of its own: xmllint --format {path.name}")

@@ -12,13 +12,13 @@ from mobee.check.finding import Finding, interval, length, some
 from mobee.check.subject import Subject
 from mobee.robot.robot import Motor, Shape
 
-LARGEST, SMALLEST = 10.0, 0.01  # m: robots are between
-TURN_AS_DEGREES = np.deg2rad(6.3)  # rad: 2 pi, read as degrees
+LARGEST, SMALLEST = 10.0, 0.01  # m: the range of plausible robots
+TURN_AS_DEGREES = np.deg2rad(6.3)  # rad: 2 pi read as degrees
 QUARTERS = np.deg2rad(np.pi / 4 * np.array([1, 2, 3, 4, 6, 8]))  # rad: 45, 90, ... deg written in radians and read as degrees
 
 
 def size(subject: Subject) -> Iterator[Finding]:
-    """A robot larger than a room or smaller than a nail."""
+    """Find a robot that is implausibly large or small."""
     things = list(_things(subject))
     if not things:
         return
@@ -31,8 +31,8 @@ def size(subject: Subject) -> Iterator[Finding]:
             "warning",
             "unit",
             subject.where(kind, name),
-            f"the robot is {length(span)} across; what lies farthest out is {kind} {name!r}, at {length(float(np.abs(corners).max()))}",
-            "lengths are in metres: widths of fields and thresholds of agents are meant for metres",
+            f"the robot is {length(span)} across; the farthest out is {kind} {name!r}, at {length(float(np.abs(corners).max()))}",
+            "lengths are in metres, and so are the widths of fields and the thresholds of agents",
             "divide by 1000 if the numbers are millimetres",
         )
     elif span < SMALLEST:
@@ -47,7 +47,7 @@ def size(subject: Subject) -> Iterator[Finding]:
 
 
 def radians(subject: Subject) -> Iterator[Finding]:
-    """Ranges of motors that look like radians read as degrees, which a URDF is not."""
+    """Find ranges of motors that look like radians read as degrees; not in a URDF, which is in radians."""
     if subject.is_urdf:
         return
     turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor)]
@@ -62,14 +62,14 @@ def radians(subject: Subject) -> Iterator[Finding]:
         "unit",
         subject.where("motor", first.name),
         f"motor {first.name!r} turns {interval(first.limits, 'revolute')}"
-        + (f", and so with {some(motor.name for motor in suspects[1:])}" if len(suspects) > 1 else ""),
-        "these numbers are radians by the look of them, and the file is read in degrees: the robot would hardly move",
+        + (f"; so do {some(motor.name for motor in suspects[1:])}" if len(suspects) > 1 else ""),
+        "these numbers look like radians, and the file is read in degrees: the robot would hardly move",
         "write the limits in degrees",
     )
 
 
 def _things(subject: Subject) -> Iterator[tuple[str, str, Array]]:
-    """Everything that has a place: its kind, its name, points (k, 3) m that enclose it in the zero pose."""
+    """Yield everything that has a position: its kind, its name, and points (k, 3) m that enclose it in the zero pose."""
     for joint in subject.robot.joints:
         yield "joint", joint.name, joint.point[None]
     for marker in subject.robot.markers.values():
@@ -80,7 +80,7 @@ def _things(subject: Subject) -> Iterator[tuple[str, str, Array]]:
 
 
 def half_extent(shape: Shape) -> Array:
-    """Half the size (3,) m of a box along the root frame's axes that holds the shape."""
+    """Return half the size (3,) m of the shape's bounding box along the root frame's axes."""
     if shape.kind == "convex":
         return np.asarray(np.abs(vertices(shape) @ shape.rotation.T).max(axis=0))
     if shape.kind == "box":
@@ -94,7 +94,7 @@ def _turns(subject: Subject, motor: Motor) -> bool:
 
 
 def _is_quarter(motor: Motor) -> bool:
-    """Whether an end of the range is pi/4, pi/2, ..., read as degrees and to three digits."""
+    """Return whether an end of the range is pi/4, pi/2, ... to three digits, read as degrees."""
     ends = np.abs(motor.limits)
     if ends.max() > TURN_AS_DEGREES:
         return False

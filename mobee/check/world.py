@@ -1,4 +1,4 @@
-"""Checks a world."""
+"""Checks a world: units, thin obstacles, duplicates."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from mobee.model.world import World, WorldObject
 
 FAR = 10.0  # m from the origin: no robot reaches there
 TINY = 1e-3  # m
-THIN = 0.02  # m: at 2 m/s and 100 Hz a hand moves this far between two looks
+THIN = 0.02  # m: at 2 m/s and 100 Hz a hand moves this far between two ticks
 
 
 def check_world(world: World, lines: Mapping[str, str]) -> list[Finding]:
-    """Everything that is wrong with a world; `lines`: "file:line" of the objects, by name."""
-    found = [finding for thing in world.objects.values() for finding in _judge(thing, lines.get(thing.name, thing.name))]
-    return found + list(_twice(world, lines))
+    """Return all findings about a world; `lines`: "file:line" of the objects, by name."""
+    found = [finding for thing in world.objects.values() for finding in _check_object(thing, lines.get(thing.name, thing.name))]
+    return found + list(_duplicates(world, lines))
 
 
-def _judge(thing: WorldObject, where: str) -> Iterator[Finding]:
+def _check_object(thing: WorldObject, where: str) -> Iterator[Finding]:
     thinnest = _thinnest(thing)
     if max(np.abs(thing.position).max(), *thing.size) > FAR:
         yield Finding(
@@ -47,7 +47,7 @@ def _judge(thing: WorldObject, where: str) -> Iterator[Finding]:
             "thin",
             where,
             f"obstacle {thing.name!r} is {length(thinnest)} thin",
-            "a fast hand passes through it between two looks, and is then pushed out on the wrong side",
+            "a fast hand can pass through it between two ticks, and is then pushed out on the wrong side",
             "make it thicker on the side that nothing can come from",
         )
 
@@ -56,7 +56,7 @@ def _thinnest(thing: WorldObject) -> float:
     return min(thing.size) if thing.kind == "box" else min(2 * thing.size[0], *thing.size[1:], np.inf)
 
 
-def _twice(world: World, lines: Mapping[str, str]) -> Iterator[Finding]:
+def _duplicates(world: World, lines: Mapping[str, str]) -> Iterator[Finding]:
     for one, other in combinations(world.objects.values(), 2):
         same = (one.kind, one.size) == (other.kind, other.size) and np.allclose(one.position, other.position, atol=1e-6)
         if same and np.allclose(one.rotation, other.rotation, atol=1e-6):
@@ -64,8 +64,8 @@ def _twice(world: World, lines: Mapping[str, str]) -> Iterator[Finding]:
                 "warning",
                 "duplicate",
                 lines.get(other.name, other.name),
-                f"object {other.name!r} is {one.name!r} again: same kind, size and place",
-                "what touches it is pushed twice as hard",
+                f"object {other.name!r} is a duplicate of {one.name!r}: same kind, size and position",
+                "contacts with it push twice as hard",
                 "remove one of the two",
             )
         if one.name.lower() == other.name.lower():
@@ -74,6 +74,6 @@ def _twice(world: World, lines: Mapping[str, str]) -> Iterator[Finding]:
                 "name-case",
                 lines.get(other.name, other.name),
                 f"object {other.name!r} differs from {one.name!r} in upper and lower case only",
-                "names are told apart by case, and people do not",
+                "names are case-sensitive, and people overlook the difference",
                 "rename one of the two",
             )

@@ -39,7 +39,7 @@ def test_a_warning_is_said_with_what_why_and_what_to_do(bad: Path, capsys: pytes
     assert main(["check", str(bad)]) == 1
     what, why, remedy, *_, summary = capsys.readouterr().out.splitlines()
     assert "warning: marker 'tip' differs from marker 'Tip'" in what
-    assert (why, remedy) == ("    names are told apart by case, and people do not", "    rename one of the two")
+    assert (why, remedy) == ("    names are case-sensitive, and people overlook the difference", "    rename one of the two")
     assert summary.endswith("1 warning")
 
 

@@ -20,12 +20,12 @@ def test_links_without_a_field_are_counted(tmp_path: Path) -> None:
 def test_a_field_smaller_than_its_solid_is_found(tmp_path: Path) -> None:
     findings = named(arm(tmp_path, (FORE, FORE.replace("0.06", "0.015"))), "field")
     assert [finding.severity for finding in findings] == ["warning", "note"]
-    assert findings[0].what == "field 'fore_field' lies inside of solid 'fore'"
+    assert findings[0].what == "field 'fore_field' lies inside solid 'fore'"
 
 
 def test_a_solid_that_stands_out_of_its_fields_is_noted(tmp_path: Path) -> None:
     (finding,) = named(arm(tmp_path, ("<marker", '<box name="nose" width="0.1" height="0.02" depth="0.02"/><marker')), "field")
-    assert finding.what == "not enclosed by the fields of link 'bend': nose stands out 50 mm"
+    assert finding.what == "not enclosed by the fields of link 'bend': nose by 50 mm"
 
 
 def test_two_fields_enclose_together(tmp_path: Path) -> None:

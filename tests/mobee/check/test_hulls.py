@@ -46,7 +46,7 @@ def test_check_says_by_how_much_hulls_stand_out_and_what_to_do() -> None:
     path = foreign("kuka_iiwa/model.urdf")
     (found,) = [finding for finding in check_file(path).findings if finding.check == "reduced-hulls"]
     assert found.severity == "note"
-    assert found.what == "the hulls of 8 meshes stand out of the exact hulls, by 8.3 mm at most ('lbr_iiwa_link_3')"
+    assert found.what == "the hulls of 8 meshes extend beyond the exact hulls, by 8.3 mm at most ('lbr_iiwa_link_3')"
     assert found.where == load_robot(path).where["shape", "lbr_iiwa_link_3"]
     assert "--corners N" in found.remedy and "576 corners" in found.remedy
     fewer = [finding.what for finding in check_file(path, corners=200).findings if finding.check == "reduced-hulls"]

@@ -128,7 +128,7 @@ def test_an_srdf_under_another_name_is_not_mixed_with_the_one_that_is_read(urdf:
 
 def test_links_in_one_line_are_refused_for_lines_tell_them_apart(urdf: Path) -> None:
     urdf.write_text(urdf.read_text().replace("\n", " "))
-    with pytest.raises(RobotFileError, match=r"toy.urdf:1: several links stand in this line. .*xmllint --format toy.urdf"):
+    with pytest.raises(RobotFileError, match=r"toy.urdf:1: several links are in this line. .*xmllint --format toy.urdf"):
         leave_out_touching(urdf)
 
 

@@ -49,7 +49,7 @@ def test_a_motor_that_cannot_hold_the_arm_is_named(tmp_path: Path, kilograms: st
 def test_moments_of_inertia_that_cannot_be_are_noted(tmp_path: Path) -> None:
     (note,) = found(tmp_path, upper='<mass value="2" inertia="1 0 0 1 0 3"/>')
     assert note.severity == "note"
-    assert note.what == "no solid thing has the moments of inertia of pan"
+    assert note.what == "no rigid body can have the moments of inertia of pan"
 
 
 def test_of_the_icub_only_the_weightless_fingers_and_eyes_are_noted() -> None:

@@ -15,7 +15,7 @@ BALLS = '<sphere name="one" radius="0.01" py="{}"/><sphere name="two" radius="{}
 @pytest.mark.parametrize(("place", "radius", "found"), [("0.01", "0.01", 1), ("0.02", "0.01", 0), ("0.01", "0.02", 0)])
 def test_a_shape_that_is_there_twice_is_found(tmp_path: Path, place: str, radius: str, found: int) -> None:
     findings = named(arm(tmp_path, ("<marker", BALLS.format(place, radius))), "duplicate")
-    assert [finding.what for finding in findings] == ["solid 'two' is 'one' again: same kind, size and place"] * found
+    assert [finding.what for finding in findings] == ["solid 'two' is a duplicate of 'one': same kind, size and position"] * found
 
 
 def test_a_cylinder_turned_about_itself_or_upside_down_is_the_same(tmp_path: Path) -> None:
@@ -44,7 +44,7 @@ def test_the_same_name_for_things_of_different_kinds_is_none(tmp_path: Path) -> 
 @pytest.mark.parametrize("name", ["left arm", "Arm", "arm/left", "arm*"])
 def test_a_part_that_cannot_stand_in_a_key_is_found(tmp_path: Path, name: str) -> None:
     (finding,) = named(arm(tmp_path, ('name="arm"', f'name="{name}"')), "part-name")
-    assert finding.what == f"part name {name!r} cannot stand in a key of the bus"
+    assert finding.what == f"part name {name!r} is not valid in a key of the bus"
     assert finding.where.endswith(":2")
 
 

@@ -15,7 +15,7 @@ from tests.mobee.check.arm import arm, named
 def test_a_robot_in_millimetres_is_found_by_what_lies_farthest_out(tmp_path: Path) -> None:
     findings = check_robot(arm(tmp_path, ('name="fore" x="-0.2"', 'name="fore" x="-200"')))
     (finding,) = [finding for finding in findings if finding.check == "unit"]
-    assert finding.what.startswith("the robot is 200 m across; what lies farthest out is")
+    assert finding.what.startswith("the robot is 200 m across; the farthest out is")
     assert "divide by 1000" in finding.remedy
 
 
@@ -35,7 +35,7 @@ def test_limits_that_are_all_a_few_degrees_are_radians(tmp_path: Path) -> None:
         ('"10" maxPos="100" home="30"', '"0.2" maxPos="1.7" home="0.5"'),
     )
     (finding,) = named(robot, "unit")
-    assert finding.what == "motor 'pan' turns -1.6 to 1.6 deg, and so with bend"
+    assert finding.what == "motor 'pan' turns -1.6 to 1.6 deg; so do bend"
 
 
 def test_a_single_quarter_turn_in_radians_is_found(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_a_field_grown_inside_of_a_solid_that_has_its_own_is_a_note(file: Path) 
         URDF.format("").replace('radius="0.06"/></geometry></collision></link>', f'radius="0.06"/></geometry></collision>{seed}')
     )
     findings = [finding for finding in check_file(file, field=0.03).findings if finding.check == "field"]
-    assert [(finding.severity, finding.what) for finding in findings] == [("note", "field 'seed_field' lies inside of solid 'fore'")]
+    assert [(finding.severity, finding.what) for finding in findings] == [("note", "field 'seed_field' lies inside solid 'fore'")]
 
 
 def test_fields_and_srdf_are_given_as_to_load_robot(file: Path, tmp_path: Path) -> None:
@@ -96,5 +96,5 @@ def test_fields_and_srdf_are_given_as_to_load_robot(file: Path, tmp_path: Path) 
 
 
 def test_a_world_has_no_fields_to_grow() -> None:
-    with pytest.raises(InvalidValue, match=r"table.xml is a world: it is checked by itself"):
+    with pytest.raises(InvalidValue, match=r"table.xml is a world: it is checked alone"):
         check_file("table", field=0.03)
