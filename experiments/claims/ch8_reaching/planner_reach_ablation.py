@@ -32,7 +32,7 @@ import numpy as np
 
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_bars, new_figure
-from experiments.kit.reaching.arm import LEARNED
+from experiments.kit.reaching.arm import TRANSITIONS
 from experiments.kit.reaching.cases import METHODS, SCENES, attempt, make_cases, trained
 from experiments.kit.reaching.targets import GOOD
 from experiments.kit.statistics import estimate, interval
@@ -78,7 +78,7 @@ Groups = Mapping[str, list[dict[str, Any]]]  # law -> values by seed
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return one condition per law: a learner, and all scenes."""
-    full = {"transitions": LEARNED, "tries": TRIES, "cases": CASES}
+    full = {"transitions": TRANSITIONS, "tries": TRIES, "cases": CASES}
     settings = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else full
     return [Condition(law, settings | {"law": law}) for law in LAWS]
 

@@ -21,7 +21,7 @@ import numpy as np
 
 import mobee
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, RIGHT
-from experiments.kit.reaching.arm import LEARNED, MARKER, PART
+from experiments.kit.reaching.arm import MARKER, PART, TRANSITIONS
 from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.arrays import Array
@@ -58,7 +58,7 @@ def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
     return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
 
 
-def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = LEARNED) -> None:
+def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRANSITIONS) -> None:
     """Learn transitions and then reaches at the table, recorded in a file."""
     plant = table_plant(seed)
     space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)

@@ -33,7 +33,7 @@ import numpy as np
 from experiments.kit.control.plant_runs import place
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_bars, new_figure
-from experiments.kit.reaching.arm import LEARNED, PART, JudgedPlant, arm_belief, body
+from experiments.kit.reaching.arm import PART, TRANSITIONS, JudgedPlant, arm_belief, body
 from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, shortened
 from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained
 from experiments.kit.reaching.planner_peer import PlannerPeer
@@ -97,7 +97,7 @@ Runs = list[dict[str, Any]]  # values by seed
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the cases of the right arm, and the queries of both arms."""
-    full: dict[str, Any] = {"transitions": LEARNED, "tries": TRIES, "cases": CASES}
+    full: dict[str, Any] = {"transitions": TRANSITIONS, "tries": TRIES, "cases": CASES}
     cases = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else full
     queries = 3 if arguments.quick else QUERIES
     return [Condition("cases", {"scene": "cases", **cases}, 2.0), Condition("arms", {"scene": "two arms", "queries": queries})]

@@ -1,4 +1,4 @@
-"""The right arm that reaches: robot, laws, states, plants, what is learned of its transitions, and what a planner believes of it.
+"""The reaching right arm: robot, control laws, states, plants, learned transitions, and the model of a planner.
 
 The four joints of the published lattice move; the wrist and the fingers are rigid at home.  `reach_space`, `reach_plant` and
 `learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under either law, with equidistant neighbours.  The functions
@@ -30,12 +30,12 @@ from mobee.reach import Aim, ReachOutcome, ReachPlant, ReachTarget
 from mobee.robot.robot import Robot
 
 PART, MARKER = "right_arm", "right_palm"
-LEARNED = 3000  # curious transitions, after which the lattice was known (thesis 7.2.2: 2987)
+TRANSITIONS = 3000  # curious ones, enough to learn the lattice (thesis 7.2.2: 2987)
 
 
 @dataclass(frozen=True)
 class Law:
-    """The gains and the time step of a control law, and where its reaches bring the palm: to the target's "centre" or its "surface"."""
+    """A control law: gains, time step [s], and whether its reaches aim at the "centre" or the "surface" of the target."""
 
     gains: Gains
     dt: float
@@ -44,24 +44,24 @@ class Law:
 
 @cache
 def laws() -> dict[str, Law]:
-    """The published law, whose reaches pull against the attractor; and ours, whose reaches arrive at the target."""
+    """Return the published law, whose reaches pull against the attractor, and the default law, whose reaches arrive at the target."""
     return {"published": Law(Gains.published_2014(), DT, "centre"), "default": Law(Gains.default(), 0.01, "surface")}
 
 
 @cache
 def reach_space() -> Lattice:
-    """81 states of the right arm's four joints, with equidistant neighbours: 432 actions."""
+    """Return the 81 states of the right arm's four joints with equidistant neighbours: 432 actions."""
     return arm_space(RANK3, joints=RIGHT)
 
 
 def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
-    """The four motors of the right arm, in an empty world."""
+    """Return a plant of the four motors of the right arm, in an empty world."""
     chosen = laws()[law]
     return OfflinePlant(Model(published_robot()), seed, chosen.gains, dt=chosen.dt, active=RIGHT)
 
 
-def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = LEARNED) -> OutcomeModel:
-    """The outcomes of the transitions, as a curious agent learns them without a target; reaching does not change them (thesis 8.1)."""
+def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS) -> OutcomeModel:
+    """Return the transition model that a curious agent learns without a target; reaching does not change it (thesis 8.1)."""
     space = reach_space()
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed)
@@ -74,31 +74,31 @@ PREDICTOR, STRATEGY = "gp", "ucb"
 
 @cache
 def body(law: str = "default") -> Robot:
-    """Today's robot; that of 2014 for the published law."""
+    """Return today's robot, or that of 2014 for the published law."""
     return published_robot() if law == "published" else mobee.load_robot("icub")
 
 
 @cache
 def space(law: str = "default") -> Lattice:
-    """81 states, with the 16 nearest as neighbours."""
+    """Return the 81 states with the 16 nearest as neighbours."""
     return Lattice(body(law), RIGHT, RANK3, ARM_NEIGHBOURS)
 
 
 @cache
 def hands(law: str = "default") -> Array:
-    """Where the palm is in each state, (S, 3) m, root frame: the wrist is rigid at home, and not at rest as in the space's targets."""
+    """Return the position of the palm in each state, (S, 3) m, root frame, with the wrist at home."""
     found: Array = Model(body(law)).evaluate(_poses(law)).position(MARKER)
     return found
 
 
 @cache
 def jacobians(law: str = "default") -> Array:
-    """How the joints move the palm in each state, (S, 3, 4) m/rad."""
+    """Return the Jacobian of the palm in each state, (S, 3, 4) m/rad."""
     return Model(body(law)).jacobian(_poses(law), MARKER)[:, :3, _motors(law)]
 
 
 def _poses(law: str) -> Array:
-    """All motors in each state, (S, n) rad: those that do not move at home."""
+    """Return the pose of the robot in each state, (S, n) rad, the other motors at home."""
     poses = np.tile(body(law).home, (len(space(law)), 1))
     poses[:, _motors(law)] = space(law).samples
     return poses
@@ -109,26 +109,26 @@ def _motors(law: str) -> list[int]:
 
 
 def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
-    """The plant; `motors`: None for the usual ones."""
+    """Return a plant of the arm; `motors`: None for the default motors."""
     chosen = laws()[law]
     return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
 
 
 def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None, law: str = "default") -> PeerBelief:
-    """The belief of a planner: a world, the cables' constraints if it knows them, joint offsets `turns` (4,) rad."""
+    """Return the model of a planner: a world, the cable constraints if `cables`, and joint offsets `turns` (4,) rad."""
     clauses = [clause for clause in body(law).clauses if clause.part == PART] if cables else []
     return PeerBelief(Model(body(law), world), RIGHT, MARKER, clauses, laws()[law].gains, turns)
 
 
-def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = LEARNED, law: str = "default") -> TransitionModel:
-    """The transition model of a curious agent, learned while no target is presented."""
+def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS, law: str = "default") -> TransitionModel:
+    """Return the transition model of a curious agent, learned without a target."""
     agent = CuriousAgent(space(law), plant, seed=seed)
     agent.run(transitions)
     return agent.model
 
 
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
-    """The learner: the shipped predictor, the model learned on (thesis 9.4.1); failures count where they were, as for the planner peer."""
+    """Return the learner: default predictor, updated transition model (thesis 9.4.1), failures remembered by place."""
     return ReachAgent(
         space(law),
         plant,
@@ -144,7 +144,7 @@ def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str =
 
 
 def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:
-    """Poses of the motors on the straight paths between states: (pairs, points, 4) rad."""
+    """Return poses on the straight paths between pairs of states, (pairs, points, 4) rad."""
     samples, shares = space().samples, np.linspace(0.0, 1.0, points)[:, None]
     found: Array = np.array([samples[a] + shares * (samples[b] - samples[a]) for a, b in pairs])
     return found
@@ -159,11 +159,11 @@ class Errors:
 
 
 class JudgedPlant:
-    """An offline plant with wrong encoders and eyes: control follows them, but the result of a reach is measured in the true poses.
+    """An offline plant with wrong encoders and eyes: control uses them, but the result of a reach is measured in the true poses.
 
     Args:
-        plant: which is driven.
-        errors: of its encoders and eyes.
+        plant: the plant to drive.
+        errors: calibration errors of its encoders and eyes.
         unseen: names of world objects that outcomes do not report.
     """
 
@@ -199,16 +199,16 @@ class JudgedPlant:
         return self._reported(self.inner.act(part, target))
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """As `act`, but the target exerts no force on the marker's hand, as in a reach: the planner has planned around it."""
+        """Act, while the target exerts no force on the marker's hand, as in a reach: the planner plans around it."""
         return self._reported(self.inner.act(part, target, reaching=marker))
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant; the target where it is seen."""
+        """See ReachPlant; the target is at its seen position."""
         self._target = target
         self.inner.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant; with the true position of the marker at the end of the force, and the true remaining error."""
+        """See ReachPlant; the outcome has the true position of the marker and the true remaining error."""
         found = self.inner.reach(part, marker, stay)
         where = self.marker_at(marker, part, found.q)
         return replace(
@@ -216,11 +216,11 @@ class JudgedPlant:
         )
 
     def missing(self, marker: str) -> float:
-        """The true distance of the marker from the target, now; m."""
+        """Return the true distance of the marker from the target now, m."""
         return self._true.missing(self.marker_at(marker))
 
     def marker_at(self, marker: str, part: str | None = None, q: Array | None = None) -> Array:
-        """The true position of the marker, (3,) m: now, or with the part's motors at encoder readings q (n_part,) rad."""
+        """Return the true position of the marker, (3,) m, now or with the part's encoders at q (n_part,) rad."""
         whole = self.inner.q
         if part is not None and q is not None:
             whole[self.robot.part(part).slice] = q

@@ -1,4 +1,4 @@
-"""Cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), drawn at random: planner alone, reach alone, and both attempt them."""
+"""Random cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), attempted by the planner alone, the reach alone, and both."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import RADIUS, ReachTarget, reward_of
 
 SCENES = ("free", "around", "against", "between", "moving")
-"""From anywhere; the hand behind the target; the hand at it, and not with the palm; a ball between hand and target; a target that moves."""
-OBSTACLE, BALL = "obstacle", 0.04  # m, its radius
-APART = 0.14  # m, at least, from its middle to those of palm and target
-NEAR = 0.25  # m: the hand behind the target is no farther from it
-BEYOND = np.cos(np.deg2rad(70.0))  # between the vectors from shoulder to target and from target to hand
-TOUCH = 0.03  # m: so near to the target a link is "at" it
-MOVED = (0.05, 0.12)  # m that a target moves, at least and at most
+"""Any start; the hand behind the target; the back of the hand at it; a ball between hand and target; a moving target."""
+OBSTACLE, BALL = "obstacle", 0.04  # m, radius
+MIN_GAP = 0.14  # m from the centre of the obstacle to those of palm and target
+MAX_BEHIND = 0.25  # m from the target to a hand behind it
+MIN_BEHIND_COSINE = np.cos(np.deg2rad(70.0))  # between the vectors from shoulder to target and from target to hand
+TOUCH = 0.03  # m: a link within this distance is "at" the target
+MOVED = (0.05, 0.12)  # m, least and largest motion of a target
 SPEED = 0.03  # m/s
-DRAWS = 20_000
+MAX_DRAWS = 20_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A target, the pose (4,) rad to begin in, and if there are, where an obstacle is and where the target goes, (3,) m.
+    """A target and the start pose (4,) rad, with the position of an obstacle and the place to which the target moves, (3,) m.
 
-    `to_and_fro`: it never stops.
+    `to_and_fro`: the target moves back and forth and never stops.
     """
 
     target: ReachTarget
@@ -44,14 +44,14 @@ class Case:
     to_and_fro: bool = False
 
     def world(self) -> World:
-        """All but the target."""
+        """Return the world without the target."""
         world = World()
         if self.obstacle is not None:
             world.add(OBSTACLE, sphere(BALL), position=self.obstacle)
         return world
 
     def target_at(self, seconds: float) -> Array:
-        """Where the target is so long after it was presented, (3,) m."""
+        """Return the position of the target a time after it was presented, (3,) m."""
         if self.to is None:
             return self.target.position
         offset = self.to - self.target.position
@@ -61,26 +61,26 @@ class Case:
         return found
 
     def seen_at(self, seconds: float) -> ReachTarget:
-        """The target so long after it was presented first."""
+        """Return the target a time after it was first presented."""
         return replace(self.target, position=self.target_at(seconds))
 
 
 def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
-    """Draw so many cases of one of the SCENES with targets of `touchable_targets`; no solid touches anything in their starting poses."""
+    """Draw cases of one of the SCENES with targets of `touchable_targets`; no solid touches anything in their start poses."""
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
     targets, belief = touchable_targets(law, free), arm_belief(law=law)
     found: list[Case] = []
-    for _ in range(DRAWS):
+    for _ in range(MAX_DRAWS):
         case = _case(scene, targets[rng.integers(len(targets))], belief, rng)
         if case is not None:
             found.append(case)
         if len(found) == count:
             return found
-    raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {DRAWS} draws: take another seed.")
+    raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {MAX_DRAWS} draws: take another seed.")
 
 
 def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Case | None:
-    """Draw a pose to begin in; None if it does not suit the scene."""
+    """Draw a start pose; None if it does not suit the scene."""
     low, high = belief.limits.T
     q = rng.uniform(low, high)
     hand = belief.model.evaluate(belief.whole(q)).position(belief.marker)
@@ -93,7 +93,7 @@ def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Ge
     if scene == "between":
         obstacle = hand + 0.5 * offset
         apart = float(np.linalg.norm(offset)) / 2.0
-        return Case(target, q, obstacle) if apart > APART and _leaves_path(belief, target, q, obstacle) else None
+        return Case(target, q, obstacle) if apart > MIN_GAP and _leaves_path(belief, target, q, obstacle) else None
     if scene == "moving":
         to = _goal_of(target, belief, rng)
         return None if to is None else Case(target, q, to=to)
@@ -101,7 +101,7 @@ def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Ge
 
 
 def _leaves_path(belief: PeerBelief, target: ReachTarget, q: Array, obstacle: Array) -> bool:
-    """Whether no solid touches the obstacle in the pose, nor in some pose with the palm on the target."""
+    """Return whether the start pose, and some pose with the palm on the target, are free of the obstacle."""
     world = belief.model.world
     world.add(OBSTACLE, sphere(BALL), position=obstacle)
     leaves = bool(belief.sound(q[None])[0]) and touchable(belief, target, free=False)
@@ -110,16 +110,16 @@ def _leaves_path(belief: PeerBelief, target: ReachTarget, q: Array, obstacle: Ar
 
 
 def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
-    """Whether the hand is on the far side of the target, as seen from the shoulder."""
+    """Return whether the hand is on the far side of the target, as seen from the shoulder."""
     robot = belief.model.robot
     shoulder = robot.joints[int(np.flatnonzero(robot.coupling[0][:, belief.columns[0]])[0])].point  # the torso is at home
     out, beyond = target.position - shoulder, hand - target.position
     length = float(np.linalg.norm(beyond))
-    return bool(length < NEAR and out @ beyond > BEYOND * np.linalg.norm(out) * length)
+    return bool(length < MAX_BEHIND and out @ beyond > MIN_BEHIND_COSINE * np.linalg.norm(out) * length)
 
 
 def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -> bool:
-    """Whether a solid of the arm is within TOUCH of the target, and the palm is turned away from it, which is at `offset` (3,) m."""
+    """Return whether a solid of the arm is within TOUCH of the target and the palm, `offset` (3,) m from it, faces away from it."""
     belief.present(ReachTarget(target.position, target.radius + TOUCH))
     near = not belief.sound(q[None])[0]
     belief.present(target)
@@ -127,7 +127,7 @@ def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -
 
 
 def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Array | None:
-    """A place at the distance MOVED from the target that the palm can touch too; None if the one drawn is not."""
+    """Draw a place at a distance MOVED from the target; None if the palm cannot touch it."""
     offset = rng.normal(size=3)
     place = target.position + rng.uniform(*MOVED) * offset / np.linalg.norm(offset)
     low, high = belief.limits.T
@@ -138,15 +138,15 @@ def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) 
 
 METHODS = ("planner", "reach", "both")
 EVERY = 5  # ticks between two positions of a target that moves
-REACHES = {"published": 1, "default": 3}  # a case; the thesis reached once
+REACHES = {"published": 1, "default": 3}  # per case; the thesis reached once
 
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
     """The result of an attempt.
 
-    `missing`: m from the target's surface to the palm.  `seconds`: of plant time.  `thinking`: s of processor time spent on
-    plans.  `reward`: thesis eq. 8.4, of what the law aims at.
+    `missing`: distance from the target's surface to the palm [m].  `seconds`: plant time.  `thinking`: processor time for plans [s].
+    `reward`: thesis eq. 8.4, of the distance from the law's aim.
     """
 
     missing: float
@@ -156,7 +156,7 @@ class Attempt:
 
 
 def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
-    """A reach learner that has tried the targets of `touchable_targets`, in an empty world."""
+    """Train a reach learner on the targets of `touchable_targets`, in an empty world."""
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
     agent.learn(touchable_targets(law, free), tries)
@@ -164,9 +164,9 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
 
 
 def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
-    """From rest in the case's pose: go to the best pre-reach state, or reach from there, or first the one and then the other.
+    """Attempt a case from rest in its start pose: go to the best pre-reach state ("planner"), reach from the start ("reach"), or both.
 
-    A reach that misses is repeated, up to REACHES in all.
+    A reach that misses is repeated, up to REACHES times in all.
     """
     plant = begun(case, seed, motors, law)
     start = plant.time
@@ -186,19 +186,19 @@ def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: Motor
 
 
 def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
-    """The distance of the palm from its aim, now, m."""
+    """Return the distance of the palm from its aim now, m."""
     whole = plant.q
     return case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
 
 
 def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
-    """A plant with the arm at rest in the starting pose of a case."""
+    """Return a plant with the arm at rest in the start pose of a case."""
     plant = arm_plant(seed, case.world(), motors, law)
     place(plant, arm_belief(law=law).whole(case.start))
     return plant
 
 
 def _nearness(palms: Array, target: Array) -> Array:
-    """The worth of each state without a reach, (S,): the reward of the palm's position there."""
+    """Return the value of each state without a reach, (S,): the reward of its palm position."""
     distances = np.maximum(np.linalg.norm(palms - target, axis=1) - RADIUS, 0.0)
     return np.array([reward_of(float(distance)) for distance in distances])

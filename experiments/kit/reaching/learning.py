@@ -1,4 +1,4 @@
-"""Learning to reach in experiments: learners by name, learning with evaluations in between, and one try by plans."""
+"""Learning to reach in experiments: learners by name, learning with evaluations, and single tries by plans."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from mobee.learning.reaching.tries import Try
 from mobee.plant import Plant
 from mobee.reach import ReachTarget
 
-LIMIT = 10  # actions of a try, its reach included
+MAX_ACTIONS = 10  # of a try, its reach included
 
 
 @dataclass(frozen=True)
 class Learner:
-    """A predictor, a strategy and a memory of failures, named as for ReachAgent; `cost`: relative time of a run."""
+    """Predictor, strategy and memory of failures, named as in ReachAgent; `cost`: relative duration of a run."""
 
     predictor: str
     strategy: str
@@ -59,9 +59,9 @@ def learn(
 ) -> dict[str, Any]:
     """Learn from the problems, and evaluate the agent on each of the named sets at the checkpoints, which are numbers of tries.
 
-    Returns arrays: of the T problem-tries `problem`, `reach_state`, `reward`, `actions`, `duration` (s), each (T,); `failures`
-    (S, A), how often each transition failed in them; and of a set `rewards_NAME` and `states_NAME`, (L, R, P), and
-    `blocked_NAME` (L,), failed transitions of the L evaluations of R repetitions of P problems.
+    Returns arrays.  For the T problem-tries: `problem`, `reach_state`, `reward`, `actions`, `duration` [s], each (T,), and `failures`
+    (S, A), the number of failures of each transition.  For each set, with L evaluations of R repetitions of P problems: `rewards_NAME`
+    and `states_NAME` (L, R, P), and `blocked_NAME` (L,), the number of failed transitions.
     """
     tries: list[Try] = []
     found: dict[str, list[Evaluation]] = {name: [] for name in sets}
@@ -79,7 +79,7 @@ def learn(
 
 
 def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """The evaluations on a set as arrays."""
+    """Return the evaluations on a set as arrays."""
     return {
         f"rewards_{name}": np.array([one.rewards for one in evaluations]),
         f"states_{name}": np.array([one.states for one in evaluations], dtype=np.int16),
@@ -88,7 +88,7 @@ def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, An
 
 
 def _numbers(agent: ReachAgent, problems: Sequence[ReachTarget]) -> Ints:
-    """The place of each of the agent's problems in this sequence."""
+    """Return the index of each of the agent's problems in this sequence."""
     order = {problem.position.tobytes(): number for number, problem in enumerate(problems)}
     return np.array([order[target.position.tobytes()] for target in agent.problems.targets], dtype=np.int16)
 
@@ -108,17 +108,18 @@ def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
 
 
 class Course:
-    """One try by plans, as in an evaluation (thesis 8.3.3), on any plant and to any target, also one that moves; nothing is learned.
+    """A single try by plans, as in an evaluation (thesis 8.3.3), on any plant and for any target, also a moving one; learns nothing.
 
-    It goes to where reaching is worth most, and remembers in this try which transitions failed and from which states reaches missed.
+    The part goes to the state with the highest expected reward of reaching.  Within the try, transitions that failed and states from
+    which reaches missed are avoided.
 
     Args:
         plant: the robot.
-        agent: its transition model and its planning are used.
-        worth: the expected reward of reaching for a target (3,) m from each state, (S,).
-        where: the position of the target now, (3,) m.
-        rng: of draws among equal actions.
-        apart: sum of the motors' distances as shares of their ranges: states no farther from one that missed are expected to miss too.
+        agent: the agent whose transition model and planning are used.
+        worth: returns the expected reward (S,) of reaching for a target (3,) m from each state.
+        where: returns the current position of the target, (3,) m.
+        rng: for ties between actions.
+        apart: distance, summed over the motors as shares of their ranges, within which states near one that missed are avoided too.
     """
 
     def __init__(
@@ -136,15 +137,15 @@ class Course:
         self._spent = np.zeros(len(agent.space), dtype=bool)
         self._apart = apart
         self.actions = 0
-        """Transitions made."""
+        """Number of transitions made."""
         self.thinking = 0.0
-        """s of processor time spent on plans."""
+        """Processor time spent on plans, s."""
 
     def go(self) -> None:
-        """Follow the plan to the state from which to reach, or until the actions are used up."""
+        """Follow the plan to the state from which to reach, or until MAX_ACTIONS."""
         space = self._agent.space
         self._state = space.state_of(self._plant.measure(space.part))
-        for _ in range(LIMIT - 1):
+        for _ in range(MAX_ACTIONS - 1):
             target, asked = self._where(), time.process_time()
             worth = np.maximum(self._worth(target), 0.0)
             worth[self._spent] = 0.0
@@ -160,7 +161,7 @@ class Course:
             self._state = following
 
     def missed(self) -> None:
-        """Expect no reward of reaching from this state in this try."""
+        """Avoid reaching from the current state in this try."""
         space = self._agent.space
         spans = np.ptp(space.robot.limits[space.robot.part(space.part).slice][space.columns], axis=1)
         distances = np.abs(space.samples - space.samples[self._state]) / spans

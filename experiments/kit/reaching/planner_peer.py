@@ -1,8 +1,8 @@
-"""The peer of a reach learner: inverse kinematics and RRT-Connect, planned anew on every change and executed through MoBeE.
+"""The planner that reach learners are compared with: inverse kinematics and RRT-Connect, executed through MoBeE.
 
-It plans with a belief about robot and world (belief.py); the plant that moves may differ from it.  Where a motion ends otherwise than
-planned, the peer avoids that pose and plans again from where it is.  With memory it does so in later tries too: for good, or for this
-target alone where the target was touched, as thesis 9.4.1 distinguishes body and workspace.
+It plans with a belief about robot and world (belief.py), which may differ from the plant, and plans again on every change.  If a motion
+does not end as planned, the peer avoids that pose and plans again from where it is.  With memory it does so in later tries too: always,
+or for this target only if the target was touched, as thesis 9.4.1 distinguishes body and workspace.
 """
 
 from __future__ import annotations
@@ -25,64 +25,64 @@ Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 
 
 class PeerMemory:
-    """Blocked poses of the motors, (d,) rad; where the target was touched they count for it alone (thesis 9.4.1).
+    """Blocked poses of the motors, (d,) rad; those at which the target was touched count for this target only (thesis 9.4.1).
 
-    `span`: (d,) rad, how wide the motors' ranges are.
+    `span`: (d,) rad, widths of the motors' ranges.
     """
 
     def __init__(self, span: Array) -> None:
         self._span = span
-        self._for_good: list[Array] = []
+        self._always: list[Array] = []
         self._at_target: dict[bytes, list[Array]] = {}
 
     def __len__(self) -> int:
-        return len(self._for_good) + sum(map(len, self._at_target.values()))
+        return len(self._always) + sum(map(len, self._at_target.values()))
 
     def knowledge(self) -> Knowledge:
-        """All of it, to be given to `restore`."""
-        return list(self._for_good), {place: list(poses) for place, poses in self._at_target.items()}
+        """Return the content of the memory, for `restore`."""
+        return list(self._always), {place: list(poses) for place, poses in self._at_target.items()}
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Remember that, and nothing else."""
-        self._for_good, self._at_target = list(knowledge[0]), {place: list(poses) for place, poses in knowledge[1].items()}
+        """Replace the content of the memory."""
+        self._always, self._at_target = list(knowledge[0]), {place: list(poses) for place, poses in knowledge[1].items()}
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Forget all poses."""
         self.restore(([], {}))
 
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
-        """A motion to `aim` ended elsewhere: avoid the pose that it would have passed next, or its aim if that is nearer."""
+        """Record that a motion to `aim` ended elsewhere: avoid the next pose on its path, or its aim if that is nearer."""
         left = (aim - end) / self._span
         ahead = end + min(1.0, NEAR / max(float(np.linalg.norm(left)), 1e-9)) * (aim - end)
         if touched:
             self.missed(ahead, target)
         else:
-            self._for_good.append(ahead)
+            self._always.append(ahead)
 
     def missed(self, pose: Array, target: ReachTarget) -> None:
         """Avoid a pose when reaching for this target."""
         self._at_target.setdefault(place_of(target), []).append(pose)
 
     def of(self, target: ReachTarget) -> tuple[Array, Array]:
-        """Poses to avoid for this target, (B, d) rad: all, and those of this target alone."""
+        """Return the poses to avoid for this target, (B, d) rad: all, and those of this target only."""
         here = self._at_target.get(place_of(target), [])
-        everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._for_good + here, here))
+        everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._always + here, here))
         return everything, alone
 
 
 def place_of(target: ReachTarget) -> bytes:
-    """The same for targets at the same place."""
+    """Return a key that is equal for targets at the same place."""
     return target.position.tobytes()
 
 
-NEAREST = 8  # goals that are planned to
-ESCAPES = 64  # poses tried, to come away from where it touches something
+MAX_GOALS = 8  # nearest goals that are planned to
+ESCAPES = 64  # random poses, to get away from a contact
 
 
 class PeerPlans:
-    """Plans of one belief; the goals of a target are kept, and drawn anew where the remembered poses leave no path to them.
+    """Plans paths with one belief; keeps the goals of each target, and draws new ones if the avoided poses leave no path.
 
-    `seed`: of its draws.
+    `seed`: of random goals and paths.
     """
 
     def __init__(self, belief: PeerBelief, seed: int) -> None:
@@ -91,9 +91,9 @@ class PeerPlans:
         self._goals: dict[bytes, tuple[Array, Array]] = {}
 
     def path(self, target: ReachTarget, here: Array, memory: PeerMemory) -> tuple[Array, Array] | None:
-        """From a pose (d,) rad: the corners to pass, the last before the target, and the pose at it; None: no path was found.
+        """Return the corners of a path from a pose (d,) rad, the last one before the target, and the pose at the target; None without path.
 
-        Where the remembered poses leave none, other goals are drawn; then they are ignored, first those for good.
+        If the avoided poses leave no path, new goals are drawn; then avoided poses are ignored, first those for all targets.
         """
         belief = self._belief
         belief.present(target)
@@ -115,7 +115,7 @@ class PeerPlans:
         free = np.flatnonzero(belief.sound(poses, "grasping") & belief.sound(befores)) if len(poses) else np.array([], dtype=np.intp)
         if not len(free):
             return None
-        near = free[np.argsort(np.linalg.norm((befores[free] - here) / belief.span, axis=1))[:NEAREST]]
+        near = free[np.argsort(np.linalg.norm((befores[free] - here) / belief.span, axis=1))[:MAX_GOALS]]
         start, escape = here, np.zeros((0, len(here)))
         if not belief.sound(here[None])[0]:
             start = self._escape(here)
@@ -127,7 +127,7 @@ class PeerPlans:
         return np.concatenate([escape, path[1:]]) if len(path) > 1 or len(escape) else path, poses[chosen]
 
     def _path(self, start: Array, ends: Array) -> Array | None:
-        """Through what no field feels, if start and end allow that, else through what no solid touches."""
+        """Plan a path free of field contacts if start and end allow that, else one free of solid contacts."""
         belief = self._belief
         clear = ends[belief.sound(ends, "fields")]
         cares: tuple[Care, ...] = ("fields", "solids") if len(clear) and belief.sound(start[None], "fields")[0] else ("solids",)
@@ -138,7 +138,7 @@ class PeerPlans:
         return None
 
     def _escape(self, here: Array) -> Array:
-        """The nearest sound pose among some that are drawn around here, further and further away."""
+        """Return the nearest sound pose among random poses around here, in growing distance."""
         belief = self._belief
         for width in (0.05, 0.1, 0.2, 0.4):
             drawn = np.clip(here + width * belief.span * self._rng.normal(size=(ESCAPES, len(here))), *belief.range.T)
@@ -149,8 +149,8 @@ class PeerPlans:
         return here
 
 
-OFF = 0.05  # of a motor's range, from where a motion was to end: more was blocked
-LIMIT = 20  # actions a try
+BLOCKED_OFFSET = 0.05  # of a motor's range: a motion that ends farther from its aim was blocked
+MAX_ACTIONS = 20  # per try
 Memory = Literal["none", "blocked", "missed"]
 MEMORIES: tuple[Memory, ...] = ("none", "blocked", "missed")
 Ended = Literal["there", "used up", "no plan"]
@@ -159,12 +159,11 @@ ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 
 @dataclass(frozen=True, slots=True)
 class PeerTry:
-    """How a try ended.
+    """The result of a try.
 
-    `missing`: true remaining error, m.  `ended`: believed to be "there"; with "no plan"; or with the actions "used up", since motions
-    were blocked or the target moved.
-    `actions`, `plans`: how many.
-    `seconds`: of plant time.  `planning`: s of processor time.  `checked`: poses checked.
+    `missing`: true remaining error, m.  `ended`: believed to be "there", with "no plan", or with the actions "used up" because motions
+    were blocked or the target moved.  `actions`, `plans`: their numbers.  `seconds`: plant time.  `planning`: processor time, s.
+    `checked`: number of poses checked.
     """
 
     missing: float
@@ -177,11 +176,11 @@ class PeerTry:
 
 
 class PeerPlant(Protocol):
-    """What the peer drives; the target repels no hand of it."""
+    """The plant that the peer drives."""
 
     @property
     def robot(self) -> Robot:
-        """Of the plant."""
+        """The robot."""
         ...
 
     @property
@@ -194,7 +193,7 @@ class PeerPlant(Protocol):
         ...
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """As `Plant.act`, but the marker's hand does not feel the target."""
+        """Act, while the target exerts no force on the marker's hand."""
         ...
 
     def present(self, target: ReachTarget | None) -> None:
@@ -202,24 +201,26 @@ class PeerPlant(Protocol):
         ...
 
     def missing(self, marker: str) -> float:
-        """How far the marker is from where it is to be, now; m."""
+        """Return the distance of the marker from its aim now, m."""
         ...
 
 
 class PlannerPeer:
-    """Brings a marker to targets, one try after the other, from wherever the robot is.
+    """Brings a marker to targets, one try after the other, each from the current pose.
 
     Args:
-        plant: what moves; motors that are not planned with stay where they are at first.
-        belief: what is planned with.
-        part: of the motors.
-        memory: of earlier tries: nothing, where motions were "blocked", or also which poses "missed" their
-            target though nothing blocked them.
-        seed: of its draws.
-        limit: actions a try.
+        plant: the plant to move; motors that are not planned with keep their initial position.
+        belief: the model to plan with.
+        part: the part of the motors.
+        memory: what is kept from earlier tries: "none", where motions were "blocked", or also which poses "missed" their target
+            although nothing blocked them.
+        seed: of random goals and paths.
+        limit: largest number of actions per try.
     """
 
-    def __init__(self, plant: PeerPlant, belief: PeerBelief, part: str, memory: Memory = "none", seed: int = 0, limit: int = LIMIT) -> None:
+    def __init__(
+        self, plant: PeerPlant, belief: PeerBelief, part: str, memory: Memory = "none", seed: int = 0, limit: int = MAX_ACTIONS
+    ) -> None:
         self._plant, self._belief, self._part, self._memory, self._limit = plant, belief, part, memory, limit
         self._columns = belief.columns - plant.robot.part(part).start
         self._rest = plant.measure(part)
@@ -230,21 +231,21 @@ class PlannerPeer:
 
     @property
     def remembered(self) -> int:
-        """How many poses it avoids, in some or all tries."""
+        """Number of poses that it avoids, for one or all targets."""
         return len(self._known)
 
     def knowledge(self) -> Knowledge:
-        """What it remembers now, to be given to `restore`."""
+        """Return the content of its memory, for `restore`."""
         return self._known.knowledge()
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Remember that, and nothing else."""
+        """Replace the content of its memory."""
         self._known.restore(knowledge)
 
     def try_problem(self, target: ReachTarget, sees: Callable[[], ReachTarget] | None = None) -> PeerTry:
-        """Present the target, go to it, and back to the pose before.
+        """Present the target, go to it, and back to the pose before it.
 
-        `sees`: where the target is believed to be, asked before each action; None: where it is presented.
+        `sees`: returns the target as it is seen now; called before each action; None: as presented.
         """
         if self._memory == "none":
             self._known.clear()
@@ -258,7 +259,7 @@ class PlannerPeer:
         return self._actions, self._plans, self._plant.time, self._planning, self._belief.checked
 
     def _approach(self, sees: Callable[[], ReachTarget]) -> tuple[float, Ended]:
-        """Plan and go until the marker is believed there or nothing more can be tried; the true remaining error, m."""
+        """Plan and go until the marker is believed at the target or no action is left; returns the true remaining error, m, and the end."""
         missing, stop, ended = np.inf, self._actions + self._limit, ENDS[1]
         while self._actions < stop:
             seen = sees()
@@ -282,7 +283,7 @@ class PlannerPeer:
         return (missing if missing < np.inf else self._plant.missing(self._belief.marker)), ended
 
     def _follow(self, corners: Array, seen: ReachTarget, sees: Callable[[], ReachTarget], stop: int) -> bool:
-        """Go along the corners; False as soon as a motion is blocked, the target is elsewhere or too many actions were made."""
+        """Go along the corners; returns False when a motion is blocked, the target has moved or the actions are used up."""
         for corner in corners:
             if place_of(sees()) != place_of(seen) or self._actions >= stop:
                 return False
@@ -299,7 +300,7 @@ class PlannerPeer:
         return found
 
     def _go(self, q: Array) -> Array:
-        """One action; where the motors ended, (d,) rad."""
+        """Make one action; returns the reached positions of the motors, (d,) rad."""
         whole = self._rest.copy()
         whole[self._columns] = np.clip(q, *self._belief.range.T)
         outcome = self._plant.go(self._part, whole, self._belief.marker)
@@ -317,4 +318,4 @@ class PlannerPeer:
         return here
 
     def _off(self, end: Array, aim: Array) -> bool:
-        return bool((np.abs(end - aim) / self._belief.span).max() > OFF)
+        return bool((np.abs(end - aim) / self._belief.span).max() > BLOCKED_OFFSET)

@@ -2,11 +2,11 @@
 
     python -m experiments.kit.reaching.targets
 
-prints which of them inverse kinematics can reach; README.md in this folder has that table.
+prints which of them inverse kinematics can reach; the table is in README.md of this folder.
 
 The figure gives no coordinates.  The original's program draws targets from x -0.4 to -0.1, y 0 to 0.4 and z 0 to 0.4 m in steps of 0.1,
 in the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The places here are every second
-of those in y and z, and all in x but the farthest, which lies at the end of the stretched arm.
+of those in y and z, and all in x except the farthest, which only the stretched arm reaches.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ from mobee.arrays import Array
 from mobee.reach import RADIUS, Aim, ReachTarget
 from mobee.robot.robot import Clause
 
-GOOD = 0.02  # m from the surface, within which a target counts as reached, as in `mobee reach`
+GOOD = 0.02  # m from the surface within which a target counts as reached, as in `mobee reach`
 COUNT = 27
 X, Y, Z = (-0.3, -0.2, -0.1), (0.0, 0.2, 0.4), (0.0, 0.2, 0.4)  # m
 
 
 def grid() -> Array:
-    """The 27 places, shape (27, 3), in [m] in the root frame; z changes fastest, x slowest."""
+    """Return the 27 places, (27, 3) m, root frame; z changes fastest, x slowest."""
     return np.array(list(product(X, Y, Z)))
 
 
 def between() -> Array:
-    """The middles of the eight cells between them, shape (8, 3), in [m]: targets that no learner tries."""
+    """Return the centres of the eight cells of the grid, (8, 3) m: targets that no learner tries."""
     return np.array(list(product(*((np.array(levels[1:]) + levels[:-1]) / 2.0 for levels in (X, Y, Z)))))
 
 
 def targets_at(places: Array, aim: Aim = "centre") -> list[ReachTarget]:
-    """Spheres of 10 cm at places (P, 3) m."""
+    """Return spheres of 10 cm at places (P, 3) m."""
     return [ReachTarget(place, aim=aim) for place in places]
 
 
 RESTARTS, STEPS = 16, 200  # of least squares
-SLACK = 1e-6  # rad: how far below 0 a clause may end
+SLACK = 1e-6  # rad, allowed violation of a clause
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The pose (n,) rad that brings the marker nearest to a place, and the distance that remains, m."""
+    """The pose (n,) rad that brings the marker nearest to a place, and the remaining distance, m."""
 
     q: Array
     distance: float
@@ -63,10 +63,10 @@ class Nearest:
 def nearest_pose(
     model: Model, marker: str, place: Array, joints: Sequence[str], restarts: int = RESTARTS, seed: int = 0, good: float = 1e-5
 ) -> Nearest:
-    """The nearest pose by least squares (SLSQP) from random poses; it stops at the first within `good` m of the place.
+    """Return the pose nearest to a place (3,) m by least squares (SLSQP) from random poses; stops at the first within `good` m.
 
-    Kinematics alone: no planner, no law.  The named motors move within their limits, the others are at home; unlike with
-    `mobee.roadmap.reachable`, the clauses of their part hold.  Place (3,) m, root frame.
+    It uses kinematics only.  The named motors move within their limits, the others are at home; unlike in
+    `mobee.roadmap.reachable`, the clauses of their part hold.
     """
     robot = model.robot
     columns = np.array([robot.motor_index(name) for name in joints])
@@ -96,14 +96,14 @@ def nearest_pose(
 
 
 def _error(q: Array, model: Model, marker: str, place: Array, columns: Array) -> tuple[float, Array]:
-    """Half the squared distance, and its gradient."""
+    """Return half the squared distance, and its gradient."""
     whole = _whole(q, model.robot.home, columns)
     error = model.evaluate(whole).position(marker) - place
     return 0.5 * float(error @ error), model.jacobian(whole, marker)[:3, columns].T @ error
 
 
 def _clearance(q: Array, home: Array, columns: Array, clauses: Sequence[Clause]) -> Array:
-    """The largest row of each clause: a clause holds where it is above 0."""
+    """Return the largest row of each clause: a clause holds where it is above 0."""
     whole = _whole(q, home, columns)
     return np.array([(clause.a @ whole + clause.b).max() for clause in clauses])
 
@@ -114,30 +114,30 @@ def _whole(q: Array, home: Array, columns: Array) -> Array:
     return whole
 
 
-AT_CENTRE = 2e-3  # m: the palm is at the centre
+AT_CENTRE = 2e-3  # m within which the palm counts as at the centre
 
 
 def joints_of(count: int) -> tuple[str, ...]:
-    """The first motors of the right arm: 4 are those of the lattice, 7 are all but those of the hand."""
+    """Return the first motors of the right arm: 4 are those of the lattice, 7 are all without the hand."""
     return robot().parts[PART].motors[:count]
 
 
 def distances(places: Array, joints: tuple[str, ...]) -> list[float]:
-    """The least distance [m] of the palm from each place (P, 3) m; other joints at home, limits and cables hold, contacts are ignored."""
+    """Return the least distance [m] of the palm from each place (P, 3) m, within limits and cable constraints; contacts are ignored."""
     model = Model(robot())
     return [nearest_pose(model, MARKER, place, joints, good=AT_CENTRE / 10.0).distance for place in places]
 
 
 def counts(found: list[float]) -> tuple[int, int]:
-    """The number of targets at whose centre the palm can be, and of those within 2 cm of whose surface it can be."""
+    """Return the number of targets whose centre the palm can reach, and the number whose surface it can reach within 2 cm."""
     return sum(d <= AT_CENTRE for d in found), sum(d <= RADIUS + GOOD for d in found)
 
 
 @cache
 def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
-    """27 targets that the palm can touch in an empty world: those of the thesis' 27, and others drawn between them.
+    """Return 27 targets that the palm can touch in an empty world: from the thesis' 27, and others drawn between them.
 
-    In the touching pose no solid but the hand's is in the target, cables hold, and, if `free`, no joint limit pushes.
+    In the touching pose only the hand's solid is in the target, cable constraints hold, and, if `free`, no joint limit pushes.
     """
     belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
     found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
@@ -148,14 +148,14 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
 
 
 def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> bool:
-    """Whether, by a belief, the palm can touch a target; `free`: in a pose in which no joint limit pushes."""
+    """Return whether the palm can touch a target according to a belief; `free`: in a pose in which no joint limit pushes."""
     to_surface = replace(target, aim="surface")
     belief.present(to_surface)
     return len(goals(belief, to_surface, np.random.default_rng(0), most=1, free=free)[0]) > 0
 
 
 def table() -> str:
-    """The distances of all targets, and how many can be reached."""
+    """Return the table of the distances of all targets, and the numbers that can be reached."""
     lines = ["| joints | targets | palm at the centre | palm within 2 cm of the surface |", "| --- | --- | --- | --- |"]
     each = {}
     for count in (len(RIGHT), 7):

@@ -1,13 +1,12 @@
-"""A toy arm of four joints that reaches at once: a small world whose truth is known, to compare learners of reaches on.
+"""A toy arm of four joints with known true rewards, to compare learners of reaches quickly.
 
     python -m experiments.kit.reaching.toy_arm --seeds 3 --only gp
 
-Two links on a shoulder of three joints, with the ranges of the iCub's.  A reach draws the hand to the target by damped least squares and
-may leave its pose by half a radian a joint; the pose in which it begins is noisy.  Targets are balls, and most actions that sweep
-through one fail.
+Two links on a shoulder of three joints, with the ranges of the iCub.  A reach moves the hand to the target by damped least squares, by at
+most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions that sweep through one fail.
 
 The command prints a table by predictor and strategy.  Each row: the rewards of an evaluation on the 27 targets as a fraction of the
-oracle's, after so many problem-tries; the same on eight targets between them that are never tried, after 800; then the learning time.
+oracle's, after each number of problem-tries; the same on eight targets between them that are never tried, after 800; the learning time.
 """
 
 from __future__ import annotations
@@ -32,21 +31,21 @@ from mobee.learning.tabular import ideal
 from mobee.reach import ReachOutcome, ReachTarget, reward_of
 
 UPPER, FORE = 0.152, 0.20  # m: shoulder to elbow, elbow to palm
-TETHER = 0.5  # rad: how far a reach leaves its pose, a joint
+MAX_REACH = 0.5  # rad per joint, motion of a reach
 STEPS, DAMPING, PULL = 30, 0.02, 0.6  # of the least squares; DAMPING in m
 WAYPOINTS = 9  # poses of an action's path that are checked
-AWAY = 0.005  # m: an arm that is near the target already may leave
+LEAVE_MARGIN = 0.005  # m: an arm already near the target may leave it
 
 
 def hands(poses: Array) -> Array:
-    """Where the palm is, (..., 3) m from the shoulder, at poses (..., 4) rad: shoulder pitch, roll, yaw, elbow."""
+    """Return the palm positions (..., 3) m from the shoulder at poses (..., 4) rad: shoulder pitch, roll, yaw, elbow."""
     upper, fore = _links(poses)
     return upper + fore
 
 
 def missing(starts: Array, target: Array, ranges: Array) -> Array:
-    """How far the palm ends from a target (3,) m, shape (...), in m, reaching from poses (..., 4) rad within ranges (4, 2) rad."""
-    low, high = np.maximum(starts - TETHER, ranges[:, 0]), np.minimum(starts + TETHER, ranges[:, 1])
+    """Return the remaining errors (...) m of reaches for a target (3,) m from poses (..., 4) rad within ranges (4, 2) rad."""
+    low, high = np.maximum(starts - MAX_REACH, ranges[:, 0]), np.minimum(starts + MAX_REACH, ranges[:, 1])
     q = np.clip(starts, low, high)
     for _ in range(STEPS):
         hand, jacobian = hands(q), jacobians(q)
@@ -58,25 +57,25 @@ def missing(starts: Array, target: Array, ranges: Array) -> Array:
 
 
 def jacobians(poses: Array) -> Array:
-    """Derivatives of the palm's place, shape (..., 3, 4), by central differences."""
+    """Return the derivatives of the palm position, (..., 3, 4), by central differences."""
     step = 1e-6
     return np.stack([(hands(poses + step * unit) - hands(poses - step * unit)) / (2.0 * step) for unit in np.eye(4)], axis=-1)
 
 
 def swept(starts: Array, ends: Array, point: Array, clearance: float) -> NDArray[np.bool_]:
-    """Whether the arm comes nearer than that [m] to a point (3,) m, and nearer than it was, shape (S, A).
+    """Return (S, A) whether the arm comes within a clearance [m] of a point (3,) m, and nearer than at the start.
 
     The paths are straight, from poses (S, 4) to (S, A, 4) rad.
     """
     shares = np.linspace(0.0, 1.0, WAYPOINTS)[:, None]
     upper, fore = _links(starts[:, None, None] + shares * (ends - starts[:, None])[:, :, None])
     near = np.minimum(_distance(np.zeros(3), upper, point), _distance(upper, fore, point))
-    passed: NDArray[np.bool_] = near.min(axis=-1) < np.minimum(clearance, near[..., 0] - AWAY)
+    passed: NDArray[np.bool_] = near.min(axis=-1) < np.minimum(clearance, near[..., 0] - LEAVE_MARGIN)
     return passed
 
 
 def _links(poses: Array) -> tuple[Array, Array]:
-    """The upper arm and the forearm as vectors, (..., 3) m each: x forward, y outward, z up."""
+    """Return the upper arm and the forearm as vectors, (..., 3) m each: x forward, y outward, z up."""
     pitch, roll, yaw, elbow = np.moveaxis(np.asarray(poses), -1, 0)
     none, bent = np.zeros_like(pitch), np.sin(elbow)
     upper = np.stack([none, none, np.full_like(pitch, -UPPER)], axis=-1)
@@ -91,7 +90,7 @@ def _turned(vector: Array, pitch: Array, roll: Array) -> Array:
 
 
 def _distance(start: Array, along: Array, point: Array) -> Array:
-    """From a point to line pieces, shape (...)."""
+    """Return the distances from a point to line segments, (...)."""
     share = np.clip(((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
     gap: Array = np.linalg.norm(start + share[..., None] * along - point, axis=-1)
     return gap
@@ -99,11 +98,11 @@ def _distance(start: Array, along: Array, point: Array) -> Array:
 
 MARKER = "toy_palm"
 NOISE = 0.04  # rad, standard deviation
-STARTS = 8  # poses, around a state's, from which its reaches begin
-CLEARANCE = 0.10  # m: an action whose path comes nearer to a target is blocked; 11 per cent are
-FAILS = 0.9  # probability that it fails then
-QUANTILES = (0.15, 0.5, 0.85)  # of the places that the hand can come to, a direction: where the targets stand
-SURE = 20  # failures after which an action is not tried again
+STARTS = 8  # noisy start poses of each state's reaches
+CLEARANCE = 0.10  # m: actions whose path comes nearer to a target are blocked, 11 per cent
+FAILURE_PROBABILITY = 0.9  # of a blocked action
+QUANTILES = (0.15, 0.5, 0.85)  # of the hand positions in each direction, where the targets are
+SURE_FAILURES = 20  # failures after which an action is not tried again
 
 
 class ToyArm(ReachTable):
@@ -115,18 +114,18 @@ class ToyArm(ReachTable):
         self.hands: Array = hands(space.samples)
         """(S, 3) m, from the shoulder."""
         self.jacobians: Array = jacobians(space.samples)
-        """(S, 3, 4) m/rad, how the joints move the hand."""
+        """(S, 3, 4) m/rad, Jacobians of the hand."""
         self._starts = Draws("toy arm")
         self._place: Array = np.empty(3)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world; None takes it away."""
+        """Put the target into the world; None removes it."""
         super().present(target)
         if target is not None:
             self._place = target.position
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """End where a reach from one of the starting poses does."""
+        """Return the outcome of a reach from one of the start poses."""
         if self._presented is None:
             raise InvalidValue("nothing to reach for: present a target first.")
         start = int(self._starts.at(self.seed, self.actions).integers(STARTS))
@@ -135,11 +134,11 @@ class ToyArm(ReachTable):
 
     @staticmethod
     def _of(target: Array) -> tuple[Array, Array]:
-        return _missing(target.tobytes()).mean(axis=1), FAILS * blocked(target).astype(np.float64)
+        return _missing(target.tobytes()).mean(axis=1), FAILURE_PROBABILITY * blocked(target).astype(np.float64)
 
 
 class Truth:
-    """The predictor that knows the mean rewards of the toy arm."""
+    """A predictor that knows the mean rewards of the toy arm."""
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
         """Learn nothing."""
@@ -149,7 +148,7 @@ class Truth:
         return true_rewards(target)
 
     def deviation(self, target: Array) -> Array:
-        """Zeros, shape (S,)."""
+        """Return zeros (S,)."""
         return np.zeros(len(toy_space()))
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
@@ -158,12 +157,12 @@ class Truth:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name."""
+        """The name of the predictor."""
         return {"name": "truth"}
 
 
 def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
-    """An agent on a toy arm of its own that knows all mean rewards and all blocked actions, and learns nothing."""
+    """Return an agent on its own toy arm that knows all mean rewards and blocked actions, and learns nothing."""
     arm = ToyArm(seed)
     agent = ReachAgent(
         arm.space,
@@ -179,26 +178,26 @@ def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
     )
     for target in targets:
         for state, action in np.argwhere(blocked(target.position)).tolist():
-            for _ in range(SURE):
+            for _ in range(SURE_FAILURES):
                 agent.failures.add(state, action, target.position, agent.penalty)
     return agent
 
 
 @cache
 def toy_space() -> Lattice:
-    """81 states of the four joints of the right arm."""
+    """Return the 81 states of the four joints of the right arm."""
     return arm_space(joints=RIGHT)
 
 
 def true_rewards(target: Array) -> Array:
-    """Mean rewards of reaching from each state, shape (S,)."""
+    """Return the mean rewards of reaching from each state, (S,)."""
     rewards: Array = np.vectorize(reward_of)(_missing(target.tobytes()))
     mean: Array = rewards.mean(axis=1)
     return mean
 
 
 def blocked(target: Array) -> NDArray[np.bool_]:
-    """Which actions a target blocks, shape (S, A)."""
+    """Return which actions a target blocks, (S, A)."""
     space = toy_space()
     found: NDArray[np.bool_] = swept(space.samples, space.samples[space.goals], target, CLEARANCE) & (space.goals >= 0)
     return found
@@ -206,7 +205,7 @@ def blocked(target: Array) -> NDArray[np.bool_]:
 
 @cache
 def grid() -> list[ReachTarget]:
-    """27 targets at quantiles of the hand's positions, three a direction."""
+    """Return 27 targets at quantiles of the hand positions, three in each direction."""
     low, high = _ranges().T
     reached = hands(np.random.default_rng(0).uniform(low, high, size=(4000, 4)))
     axes = np.quantile(reached, QUANTILES, axis=0).T
@@ -214,7 +213,7 @@ def grid() -> list[ReachTarget]:
 
 
 def cell_centres() -> list[ReachTarget]:
-    """Eight targets that no learner tries: the middles of the cells of the grid."""
+    """Return eight targets that no learner tries: the centres of the cells of the grid."""
     cube = np.array([target.position for target in grid()]).reshape(3, 3, 3, 3)
     corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
     return [ReachTarget(cube[i : i + 2, j : j + 2, k : k + 2].mean(axis=(0, 1, 2))) for i, j, k in corners]
@@ -228,7 +227,7 @@ def _ranges() -> Array:
 
 @cache
 def _missing(place: bytes) -> Array:
-    """How far reaches from each state end from a target, shape (S, STARTS), in m; the starts are the same for all targets."""
+    """Return the remaining errors (S, STARTS) m of reaches from each state; the starts are the same for all targets."""
     space = toy_space()
     noise = NOISE * np.random.default_rng(0).standard_normal((len(space), STARTS, 4))
     return missing(space.samples[:, None] + noise, np.frombuffer(place), _ranges())
@@ -263,7 +262,7 @@ ROWS = (
 
 
 def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
-    """Rewards as fractions of the oracle's after so many tries, shape (checkpoints,), and on targets never tried, NaN if not that far."""
+    """Return rewards as fractions of the oracle's at the checkpoints, and on targets never tried (NaN before UNSEEN_AFTER)."""
     arm, problems, unseen = ToyArm(seed), grid(), np.nan
     agent = ReachAgent(
         arm.space,

@@ -1,11 +1,11 @@
-"""The true rewards of reaches and the transitions that targets block, measured on the plant, and the oracle that plans with them.
+"""True rewards of reaches and transitions blocked by targets, measured on the plant, and the oracle that plans with them.
 
-Every reach and every transition is tried several times on the offline plant, from where the part came to rest after the action before.
-A state from which a try is still to be made is entered with the target in place if a try ends there, else without it.
+Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  A state that
+needs more tries is entered with the target in place if a try ends there, otherwise without the target.
 
-The oracle is an agent that plans and is evaluated as the learners are, with the same discount, the same model of the free transitions and
-the same limit of actions, but knows the mean rewards and the blocked transitions.  Its score is what a learner could have that knew all;
-it can be exceeded by chance, and a little by an agent that knows how transitions fail.
+The oracle is an agent that plans and is evaluated like the learners, with the same discount, the same model of free transitions and the
+same limit of actions, but it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners; it can be
+exceeded by chance, and slightly by an agent that knows how transitions fail.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachTarget
 
-TRIES = 5  # of everything
-SEED = 9001  # no learner has it
-CARRIES = 3  # attempts to enter a state
-BLOCKED = 0.5  # share of tries that do not end in their goal, from which a transition counts as blocked
+TRIES = 5  # of every reach and transition
+SEED = 9001  # not used by learners
+MAX_ENTRIES = 3  # attempts to enter a state
+BLOCKED = 0.5  # share of failed tries from which a transition counts as blocked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
     """Measured results of one target.
 
-    `missing`: (S, n) m, of the tries of each state's reach.  `made`, `failed`: (S, A) tries of each transition, and how many did not end
-    in its goal.
+    `missing`: (S, n) m, remaining errors of the tries to reach from each state.  `made`, `failed`: (S, A) number of tries of each
+    transition, and of those that did not end in its goal.
     """
 
     missing: Array
@@ -46,16 +46,16 @@ class Tried:
     failed: Ints
 
     def values(self) -> dict[str, Any]:
-        """As the values of a cell."""
+        """Return the results as the values of a cell."""
         return {"missing": self.missing, "made": self.made, "failed": self.failed}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The truth about several targets.
+    """Measured results of several targets.
 
-    `places`: (T, 3) m.  `missing`: (T, S, n) m, NaN where a state was not entered.  `blocked`: (T, S, A) share of failures, NaN where
-    nothing was tried.
+    `places`: (T, 3) m.  `missing`: (T, S, n) m, NaN where a state was not entered.  `blocked`: (T, S, A) share of failures, NaN without
+    tries.
     """
 
     places: Array
@@ -63,25 +63,25 @@ class Truth:
     blocked: Array
 
     def rewards(self, scale: float) -> Array:
-        """The mean reward of reaching from each state, shape (T, S) (thesis eq. 8.4); 0 where the state was not entered."""
+        """Return the mean reward of reaching from each state, (T, S) (thesis eq. 8.4); 0 where the state was not entered."""
         found = 1.0 / (1.0 + self.missing / scale)
         tried = np.isfinite(found)
         mean: Array = np.where(tried, found, 0.0).sum(axis=-1) / np.maximum(tried.sum(axis=-1), 1)
         return mean
 
     def save(self, path: Path) -> None:
-        """Write it as .npz."""
+        """Write the results to a .npz file."""
         np.savez_compressed(path, places=self.places, missing=self.missing, blocked=self.blocked)
 
 
 def load_truth(path: Path) -> Truth:
-    """The truth in a file."""
+    """Read a file written by `Truth.save`."""
     with np.load(path) as file:
         return Truth(file["places"], file["missing"], file["blocked"])
 
 
 def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
-    """The truth from the measured values of cells, by place."""
+    """Combine the measured values of cells, by place of the target."""
     each = list(measured.values())
     made = np.array([one["made"] for one in each])
     with np.errstate(invalid="ignore"):
@@ -90,7 +90,7 @@ def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
 
 
 def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int = SEED) -> Tried:
-    """Make so many tries of every reach and every transition with the target at a place (3,) m."""
+    """Try every reach and every transition `tries` times with the target at a place (3,) m."""
     target = ReachTarget(place, aim=laws()[law].aim)
     return _Measuring(reach_space(), reach_plant(seed, law), target, tries, seed).run()
 
@@ -109,28 +109,28 @@ class _Measuring:
 
     def run(self) -> Tried:
         self.plant.present(None)
-        state = self._at(int(self.rng.integers(len(self.space))))
+        state = self._go(int(self.rng.integers(len(self.space))))
         while self.left.any():
             if not self.left[state].any():
-                state = self._carry()
+                state = self._enter()
             self.plant.present(self.target)
             while self.left[state].any():
                 state = self._try(state)
         return Tried(self.missing, self.made, self.failed)
 
-    def _carry(self) -> int:
-        """Go without the target to a state with remaining tries; one that cannot be entered is given up."""
+    def _enter(self) -> int:
+        """Go without the target to a state with remaining tries; give up a state that cannot be entered."""
         self.plant.present(None)
         goal = int(self.rng.choice(np.flatnonzero(self.left.any(axis=1))))
-        for _ in range(CARRIES):
-            state = self._at(goal)
+        for _ in range(MAX_ENTRIES):
+            state = self._go(goal)
             if self.left[state].any():
                 return state
         self.left[goal] = 0
         return state
 
-    def _at(self, goal: int) -> int:
-        """Go to a state from wherever the part is; returns the state it comes to."""
+    def _go(self, goal: int) -> int:
+        """Act towards a state from the current pose; returns the state reached."""
         outcome = self.plant.act(self.space.part, self.space.target(goal))
         return self.space.state_of(outcome.q)
 
@@ -161,23 +161,23 @@ class Known:
         """Learn nothing."""
 
     def mean(self, target: Array) -> Array:
-        """The true mean rewards, shape (S,); raises InvalidValue for a target that was not measured."""
+        """Return the true mean rewards (S,); raises InvalidValue for a target that was not measured."""
         rewards = self._rewards.get((np.asarray(target, dtype=np.float64) + 0.0).tobytes())
         if rewards is None:
-            raise InvalidValue(f"nothing is known of a target at {target} m: measure its truth first.")
+            raise InvalidValue(f"the target at {target} m was not measured: measure it first.")
         return rewards
 
     def deviation(self, target: Array) -> Array:
-        """Zeros: nothing is uncertain."""
+        """Return zeros: nothing is uncertain."""
         return np.zeros_like(self.mean(target))
 
     def sample(self, target: Array, rng: np.random.Generator) -> NoReturn:
         """Raise InvalidValue: there is no distribution to draw from."""
-        raise InvalidValue("what is known is not drawn.")
+        raise InvalidValue("known rewards have no distribution to draw from.")
 
 
 def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
-    """An agent with true rewards and true failures, for `evaluate` on measured targets."""
+    """Return an agent with true rewards and true failures, to be evaluated on measured targets."""
     known = Known(truth, scale)
     agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)
     for place, blocked in zip(truth.places, truth.blocked, strict=True):

@@ -6,8 +6,8 @@ import pytest
 from experiments.kit.reaching.toy_arm import (
     FORE,
     MARKER,
+    MAX_REACH,
     STARTS,
-    TETHER,
     UPPER,
     ToyArm,
     blocked,
@@ -43,7 +43,7 @@ def test_a_reach_comes_to_where_a_pose_nearby_has_the_hand_and_no_farther_than_i
     start = np.array([-0.8, 1.2, 0.3, 1.0])
     assert missing(start, hands(start + [0.3, -0.2, 0.1, 0.2]), RANGES) < 0.002
     assert missing(start, np.array([0.0, 0.0, 1.0]), RANGES) > 1.0 - UPPER - FORE
-    far = hands(start + [0.0, 3.0 * TETHER, 0.0, 0.0])
+    far = hands(start + [0.0, 3.0 * MAX_REACH, 0.0, 0.0])
     assert missing(start, far, RANGES) > 0.05
 
 

@@ -95,5 +95,5 @@ def test_the_oracle_goes_around_what_is_blocked_to_the_best_reach(space):
 def test_the_oracle_knows_nothing_of_other_targets():
     known = Known(SimpleNamespace(places=PLACE[None], rewards=lambda scale: np.ones((1, 81))), 0.01)
     assert known.mean(PLACE.copy()).shape == (81,)
-    with pytest.raises(mobee.InvalidValue, match="measure its truth"):
+    with pytest.raises(mobee.InvalidValue, match="was not measured"):
         known.mean(PLACE + 0.1)
