@@ -1,13 +1,13 @@
 """Babbling: collisions and completed commands under random position moves of 23 motors at 20 % speed, at a table (thesis 4.1.1).
 
 Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second
-MoBeE lets more of the commands happen, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
+MoBeE completes more of the commands, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
 hours over several trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all
 of them", on the robot.  Here: the PyBullet robot, every process in lockstep, postures uniform over the whole ranges of torso (3
 motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is a posture of one part; it
 is completed when all its motors end within 10 degrees, returned when the part ends where it began, else deflected.
 
-Run time: 2 h of robot time in each of three modes take about an hour; an interrupted run goes on with --resume.
+Run time: 2 h of robot time in each of three modes take about an hour; an interrupted run continues with --resume.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 
 TRIAL = "trial.json"
-SEEDS = 10_000  # trials a seed
-TRIES = 3  # of a trial in which a process was late for a tick
+SEED_STRIDE = 10_000  # seeds reserved for the trials of a run
+MAX_ATTEMPTS = 3  # of a trial in which a process was late for a tick
 
 OUTCOMES: tuple[Outcome, ...] = ("completed", "deflected", "returned")
-DEEPEST = 2e-3  # m, allowed with MoBeE 2.0
-BEYOND = float(np.deg2rad(0.5))  # rad, allowed with MoBeE 2.0
-STRICT = float(np.deg2rad(5.0))  # rad, reported beside what counts as completed
-HUNDREDS = 100.0 / 7200.0  # events a second of robot time without MoBeE: hundreds in two hours
+MAX_DEPTH = 2e-3  # m, allowed with MoBeE 2.0
+MAX_BEYOND = float(np.deg2rad(0.5))  # rad beyond a limit, allowed with MoBeE 2.0
+STRICT = float(np.deg2rad(5.0))  # rad, a stricter criterion that is reported too
+MIN_RATE = 100.0 / 7200.0  # events per second of robot time without MoBeE: a hundred in two hours
 EDGES = (0.1, 0.2, 0.5, 1.0, 2.0)  # mm, of the depth histogram
 
 LABEL, COLUMN = 38, 14
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the trials that are not there yet; returns the table, and whether the claims hold."""
+    """Run the trials that are not in the folder yet; returns the table, and whether the claims hold."""
     robot = load_robot(ROBOT)
     lengths = trial_lengths(arguments.minutes, arguments.trial)
     total, done = len(lengths) * len(arguments.modes), 0
@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 place = folder / mode / f"{number:03}"
                 if not (place / TRIAL).exists():
                     text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
-                    seed, ticks = SEEDS * arguments.seed + number, round(60.0 * minutes * RATE)
+                    seed, ticks = SEED_STRIDE * arguments.seed + number, round(60.0 * minutes * RATE)
                     _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text))
                 done += 1
     rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
@@ -94,35 +94,35 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
     """Repeat a trial until no process was late for a tick; raises TrialFailed."""
-    for _ in range(TRIES):
+    for _ in range(MAX_ATTEMPTS):
         run_trial(place, mode, robot, seed, ticks, show)
         trial = measure(place, robot, 1.0 / RATE)
         if trial.lockstep.repeatable:
             write_trial(place / TRIAL, trial)
             (place / POSITIONS).unlink()
             return
-    raise TrialFailed(f"{mode}: in {TRIES} trials somebody was late for a tick: this machine is too busy; see {place / 'launch'}")
+    raise TrialFailed(f"{mode}: in {MAX_ATTEMPTS} trials a process was late for a tick: this machine is too busy; see {place / 'launch'}")
 
 
 def _shower(progress: Progress, done: int, total: int, text: str) -> Callable[[float], None]:
-    """Shows the share of all trials that is done, given that of the one under way."""
+    """Return a function that shows the finished share of all trials, given that of the current trial."""
     return lambda share: progress.show((done + share) / total, text)
 
 
 def trial_lengths(minutes: float, trial: float) -> list[float]:
-    """The trials that make up so many minutes, in minutes; the last may be shorter."""
+    """Return the lengths of the trials that add up to `minutes`; the last may be shorter."""
     whole = int(minutes / trial + 1e-9)
     rest = minutes - whole * trial
     return [trial] * whole + ([rest] if rest > 1e-6 * trial else [])
 
 
 def read_trials(folder: Path, mode: str) -> list[Trial]:
-    """All finished trials of a mode, in order."""
+    """Read all finished trials of a mode, in order."""
     return [read_trial(path) for path in sorted(folder.glob(f"{mode}/*/{TRIAL}"))]
 
 
 def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
-    """The row of a mode: lengths in mm, angles in degrees, paths in rad."""
+    """Return the row of a mode: depths in mm, angles in degrees, paths in rad."""
     touches = [touch for trial in trials for touch in trial.touches]
     commands = [command for trial in trials for command in trial.commands]
     seconds = sum(trial.seconds for trial in trials)
@@ -151,7 +151,7 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
         "endings": dict(Counter(ending for command in commands for ending in command.endings.values())),
         "seconds_a_posture": _mean([command.duration for command in commands]),
         "path_rad": _mean([command.path for command in commands]),
-        "straight_way_rad": _mean([command.way for command in commands]),
+        "straight_path_rad": _mean([command.way for command in commands]),
         "path_a_minute_rad": round(60.0 * sum(trial.path for trial in trials) / seconds, 2),
         "speed_rms": round(speed, 4),
         "jerk_rms": round(jerk, 2),
@@ -161,23 +161,23 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def verdict(rows: Rows) -> dict[str, bool]:
-    """The claims that can be judged with the modes that were run."""
+    """Judge the claims for which the modes were run."""
     claims: dict[str, bool] = {}
     off, one, two = (rows.get(mode) for mode in ("off", "one", "two"))
     if off:
-        hundreds = max(1.0, HUNDREDS * 60.0 * off["minutes"])
+        hundreds = max(1.0, MIN_RATE * 60.0 * off["minutes"])
         claims["without MoBeE it collides, hundreds of times in two hours"] = off["collisions"] >= hundreds
     if two:
-        claims["with 2.0 no listed contact is deeper than 2 mm"] = two["deepest_mm"] <= 1e3 * DEEPEST
-        claims["with 2.0 no joint is beyond its limit by more than 0.5 degrees"] = two["worst_beyond_limit_deg"] <= np.rad2deg(BEYOND)
+        claims["with 2.0 no listed contact is deeper than 2 mm"] = two["deepest_mm"] <= 1e3 * MAX_DEPTH
+        claims["with 2.0 no joint is beyond its limit by more than 0.5 degrees"] = two["worst_beyond_limit_deg"] <= np.rad2deg(MAX_BEYOND)
     if one and two:
         claims["2.0 completes a larger share of the commands than 1.0"] = share(two, "completed") > share(one, "completed")
         claims["2.0 moves more smoothly than 1.0"] = two["jerk_over_speed"] < one["jerk_over_speed"]
-    return {claim: bool(stands) for claim, stands in claims.items()}
+    return {claim: bool(holds) for claim, holds in claims.items()}
 
 
 def share(row: Mapping[str, Any], count: str) -> float:
-    """What share of the commands a count is; 0 when there are none."""
+    """Return a count as a share of the commands; 0 without commands."""
     return float(row[count] / row["commands"]) if row["commands"] else 0.0
 
 
@@ -186,7 +186,7 @@ def _count(commands: Sequence[Judged], outcome: Outcome) -> int:
 
 
 def _rms(squares: Sequence[float], trials: Sequence[Trial]) -> float:
-    """Of mean squares, one a trial."""
+    """Return the root of mean squares, one per trial, weighted by their durations."""
     return float(np.sqrt(np.average(squares, weights=[trial.seconds for trial in trials])))
 
 
@@ -195,7 +195,7 @@ def _mean(values: Sequence[float]) -> float | None:
 
 
 def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
-    """The number of events by range of depth in mm."""
+    """Count the events by range of depth in mm."""
     depths = [1e3 * event.depth for event in events]
     bounds = (0.0, *EDGES, float("inf"))
     labels = [f"<{EDGES[0]:g}", *(f"{low:g}-{high:g}" for low, high in zip(EDGES, EDGES[1:], strict=False)), f">{EDGES[-1]:g}"]
@@ -203,7 +203,7 @@ def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
 
 
 def as_table(rows: Rows) -> str:
-    """A column a mode."""
+    """Return the rows as a text table with a column for each mode."""
     lines = [_line("", [TITLES[mode] for mode in rows])]
 
     def add(label: str, text: Mapping[str, str]) -> None:
@@ -224,11 +224,11 @@ def as_table(rows: Rows) -> str:
     for outcome in OUTCOMES:
         add(f"  {outcome}{LIMITS[outcome]}", {mode: f"{share(row, outcome):.0%}" for mode, row in rows.items()})
     add("  within 5 deg", {mode: f"{share(row, 'within_5_deg'):.0%}" for mode, row in rows.items()})
-    plain("  left to go, median [deg]", "left_median_deg", 1)
+    plain("  remaining error, median [deg]", "left_median_deg", 1)
     add("postures of all parts completed", {mode: f"{row['postures_completed']} of {row['postures']}" for mode, row in rows.items()})
-    plain("time a posture [s]", "seconds_a_posture", 1)
-    plain("path a posture [rad, all motors]", "path_rad", 1)
-    plain("  straight way to it [rad]", "straight_way_rad", 1)
+    plain("time per posture [s]", "seconds_a_posture", 1)
+    plain("path per posture [rad, all motors]", "path_rad", 1)
+    plain("  straight path to it [rad]", "straight_path_rad", 1)
     plain("speed, rms [rad/s]", "speed_rms", 3)
     plain("jerk, rms [rad/s^3]", "jerk_rms", 1)
     plain("  largest [rad/s^3]", "jerk_max", 0)
@@ -237,7 +237,7 @@ def as_table(rows: Rows) -> str:
 
 
 def _pairs(rows: Rows) -> list[str]:
-    """The pairs that touched, the most frequent first."""
+    """Return lines with the pairs that touched, the most frequent first."""
     total: dict[str, int] = {}
     for row in rows.values():
         for pair, count in row["pairs"].items():
@@ -263,14 +263,14 @@ def figure(folder: Path) -> Path:
     """Draw the finished trials; raises InvalidValue if there are none."""
     trials = {mode: found for mode in MODES if (found := read_trials(folder, mode))}
     if not trials:
-        raise InvalidValue(f"{folder} has no finished trial: it was stopped before the first was over.")
+        raise InvalidValue(f"{folder} has no finished trial: the run was stopped before the first was over.")
     path = folder / "figure.png"
     plot({mode: summarise(found) for mode, found in trials.items()}).savefig(path, dpi=150)
     return path
 
 
 def plot(rows: Rows) -> Any:
-    """Collisions by pair and by depth, outcomes of the commands, and roughness; rows as of `summarise`, by mode."""
+    """Draw collisions by pair and by depth, outcomes of the commands, and roughness; rows as from `summarise`, by mode."""
     drawing = new_figure(11.0, 7.5)
     axes = drawing.subplots(2, 2)
     minutes = ", ".join(f"{TITLES[mode]} {row['minutes']:g} min" for mode, row in rows.items())
@@ -299,7 +299,7 @@ def _by_depth(axes: Any, rows: Rows) -> None:
     depths = list(next(iter(rows.values()))["depth_histogram_mm"])
     _bars(axes.bar, rows, [list(row["depth_histogram_mm"].values()) for row in rows.values()])
     axes.set_xticks(range(len(depths)), depths)
-    axes.set(title=f"Depth of the collisions (allowed with 2.0: {1e3 * DEEPEST:g} mm)", xlabel="mm", ylabel="events")
+    axes.set(title=f"Depth of the collisions (allowed with 2.0: {1e3 * MAX_DEPTH:g} mm)", xlabel="mm", ylabel="events")
     axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
     axes.legend(fontsize=8)
 
@@ -312,7 +312,7 @@ def _outcomes(axes: Any, rows: Rows) -> None:
         bottom = [below + height for below, height in zip(bottom, heights, strict=True)]
     axes.set_xticks(range(len(rows)), [f"{TITLES[mode]}\n{row['commands']} commands" for mode, row in rows.items()])
     axes.set(ylabel="share", ylim=(0.0, 1.0))
-    axes.set_title("What became of the commands", pad=22.0)
+    axes.set_title("Outcomes of the commands", pad=22.0)
     axes.legend(fontsize=8, ncols=len(OUTCOMES), loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 
 
@@ -323,7 +323,7 @@ def _smoothness(axes: Any, rows: Rows) -> None:
 
 
 def _bars(bars: Callable[..., Any], rows: Rows, heights: list[list[int]]) -> None:
-    """A bar a mode at every place; `bars`: bar or barh of some axes."""
+    """Draw a bar for each mode at every place; `bars`: bar or barh of some axes."""
     width = 0.8 / len(rows)
     for i, (mode, values) in enumerate(zip(rows, heights, strict=True)):
         shift = (i - (len(rows) - 1) / 2.0) * width
@@ -332,7 +332,7 @@ def _bars(bars: Callable[..., Any], rows: Rows, heights: list[list[int]]) -> Non
 
 EXPERIMENT = Experiment(
     name="babbling",
-    claim="random position moves break nothing under MoBeE, and 2.0 deflects them less than 1.0",
+    claim="random position moves cause no collisions under MoBeE, and 2.0 deflects them less than 1.0",
     source="thesis 4.1.1",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

@@ -1,4 +1,4 @@
-"""One trial of `babbling`: a fresh system of real processes in lockstep, from home, until its robot time is over, and its measures."""
+"""One trial of `babbling`: commands, a new system of real processes in lockstep that executes them, and its measures."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from mobee.robot.robot import Robot
 from services.common.session import NAMESPACE
 
 ROBOT = "icub"
-HANDS = ("hand", "thumb", "index", "middle", "pinky")  # in the names of the motors that are left alone
+HANDS = ("hand", "thumb", "index", "middle", "pinky")  # in the names of the motors that do not move
 COUNT = 23  # thesis 4.1.1: "all joints on the iCub upper-body except those in the hands"
 PEAK = 1.875  # peak over mean speed of a minimum-jerk motion
 COMMANDS = "commands.jsonl"
-Ending = Literal["over", "settled", "timeout", "refused"]  # over: its time is over; refused: the safety layer ended it
+Ending = Literal["over", "settled", "timeout", "refused"]  # over: its time has passed; refused: ended by the safety layer
 
 
 def moved_motors(robot: Robot) -> Array:
-    """Indices of the 23 motors: torso 3, head with eyes 6, and 7 of each arm."""
+    """Return the indices of the 23 motors: torso 3, head with eyes 6, and 7 of each arm."""
     return np.array([i for i, name in enumerate(robot.motors) if not any(word in name for word in HANDS)])
 
 
 class Targets:
-    """Random postures, the same sequence for the same seed: uniform in the whole ranges of the 23 motors; hands stay at home."""
+    """Random postures, uniform over the whole ranges of the 23 motors, hands at home; a seed always gives the same sequence."""
 
     def __init__(self, robot: Robot, seed: int) -> None:
         self._rng = np.random.default_rng([seed, 0xBABB1E])
@@ -43,23 +43,23 @@ class Targets:
         self._home, self._limits = robot.home, robot.limits[self._moved]
 
     def next(self) -> Array:
-        """A posture of the whole robot, (n,) rad."""
+        """Return the next posture of the whole robot, (n,) rad."""
         q = self._home.copy()
         q[self._moved] = self._rng.uniform(self._limits[:, 0], self._limits[:, 1])
         return q
 
 
 class PositionMove:
-    """From rest to rest; arrays (n,) rad."""
+    """A minimum-jerk motion from rest to rest; arrays (n,) rad."""
 
     def __init__(self, start: Array, target: Array, speed: Array) -> None:
-        """`speed` (n,) rad/s: the peak that no motor exceeds."""
+        """`speed` (n,) rad/s: largest speed of each motor."""
         self._start, self._distance = start, target - start
         self._durations = PEAK * np.abs(self._distance) / speed
         self.duration = float(self._durations.max())  # s
 
     def at(self, t: float) -> Array:
-        """The reference position t [s] after the start."""
+        """Return the reference position (n,) rad at t [s] after the start."""
         share = np.divide(t, self._durations, out=np.ones_like(self._durations), where=self._durations > 0.0).clip(0.0, 1.0)
         smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         position: Array = self._start + smooth * self._distance
@@ -70,13 +70,13 @@ class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
     """A posture that was commanded to all parts at once."""
 
     begin: int  # tick
-    end: int  # tick at which the robot is judged
+    end: int  # tick at which the outcome is judged
     target: list[float]  # rad, all motors
     endings: dict[str, Ending]  # by part
 
 
 class CommandLog:
-    """Every command is in the file when `note` returns."""
+    """A file of commands; each command is on disk when `note` returns."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,7 +88,7 @@ class CommandLog:
 
 
 def read_commands(path: Path) -> list[Commanded]:
-    """All commands that have ended; a last line that a kill has cut is dropped."""
+    """Read all commands that have ended; an incomplete last line is ignored."""
     *whole, _ = path.read_text().split("\n")
     return [msgspec.json.decode(line, type=Commanded) for line in whole]
 
@@ -135,17 +135,17 @@ speed = {speed:g}
 run_dir = {folder}
 """
 PERIOD = 0.05  # s between two checks of the progress
-BEGINS = 60.0  # s within which the first tick must come
-STANDS = 30.0  # s without a tick after which a trial is given up
-REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the limits' own zone, less than half a cell of the thesis' lattices
-RETURNED = float(np.deg2rad(5.0))  # rad, likewise
+START_TIMEOUT = 60.0  # s until the first tick
+TICK_TIMEOUT = 30.0  # s without a tick after which a trial has failed
+REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the zone of the limits; less than half a lattice cell
+RETURNED = float(np.deg2rad(5.0))  # rad, of every motor of a part
 SUMMARY = "summary.json"  # of the launcher
 
 Outcome = Literal["completed", "deflected", "returned"]
 
 
 def scenario(mode: str, folder: Path, seed: int, ticks: int) -> str:
-    """The scenario's text; the recordings go to the folder."""
+    """Return the text of the scenario; recordings go to the folder."""
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
@@ -159,11 +159,14 @@ def _quoted(path: Path) -> str:
 
 
 class TrialFailed(MobeeError):
-    """A trial that did not end in order; the message names its logs."""
+    """Raised when a trial fails; the message names its logs."""
 
 
 def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
-    """Leave commands, positions and contacts in the folder; `show` is called with the share that is done.  Raises TrialFailed."""
+    """Run a trial; writes commands, positions and contacts into the folder.
+
+    `show` is called with the finished share.  Raises TrialFailed.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for left in (COMMANDS, POSITIONS):  # of an interrupted trial
         (folder / left).unlink(missing_ok=True)
@@ -171,26 +174,26 @@ def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show
     file.write_text(scenario(mode, folder.resolve(), seed, ticks))
     due = ticks * 8 * len(robot.motors)  # bytes of a whole record
     with _launched(file, folder) as process:
-        written, stands_at = 0, time.monotonic() + BEGINS
-        while process.poll() is None:  # robot_sim counts the ticks, and the launcher ends with it
+        written, deadline = 0, time.monotonic() + START_TIMEOUT
+        while process.poll() is None:  # robot_sim ends after its ticks, and the launcher with it
             time.sleep(PERIOD)
             size = _size(folder / POSITIONS)
             if size != written:
-                written, stands_at = size, time.monotonic() + STANDS
+                written, deadline = size, time.monotonic() + TICK_TIMEOUT
                 show(size / due)
-            elif time.monotonic() > stands_at:
-                raise TrialFailed(f"{mode}: no tick for {STANDS:g} s; see {folder / 'news'} and {folder / 'launch'}")
+            elif time.monotonic() > deadline:
+                raise TrialFailed(f"{mode}: no tick for {TICK_TIMEOUT:g} s; see {folder / 'news'} and {folder / 'launch'}")
     if _size(folder / POSITIONS) != due:
         raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'news'} and {folder / 'launch'}")
 
 
 @contextmanager
 def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """`mobee launch` at an endpoint of its own; it must end without fault, and is stopped when anything is raised."""
+    """Run `mobee launch` at a free endpoint; stops it on any exception, and raises TrialFailed if it ends with an error."""
     argv = [sys.executable, "-m", "mobee_system", "launch", str(file), "--headless", "--json"]
     argv += ["--endpoint", free_endpoint(), "--runs", str(folder / "launch")]
     with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
-        # In a group of its own, so that a terminal's Ctrl-C reaches this process alone, which then ends it in order.
+        # In a process group of its own, so that a terminal's Ctrl-C reaches only this process, which then stops it in order.
         process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=summary, stderr=news, process_group=0)
     try:
         yield process
@@ -201,7 +204,7 @@ def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _last_line(path: Path) -> str:
-    *_, last = ["it said nothing", *path.read_text(errors="replace").strip().splitlines()]
+    *_, last = ["no message", *path.read_text(errors="replace").strip().splitlines()]
     return last
 
 
@@ -214,10 +217,10 @@ class Judged(Struct, frozen=True):
 
     outcomes: dict[str, Outcome]  # by part
     endings: dict[str, Ending]  # by part
-    left: dict[str, float]  # by part: rad, how far its worst motor ended from where it should
+    left: dict[str, float]  # by part: rad, remaining error of its worst motor
     duration: float  # s
     path: float  # rad, all motors together
-    way: float  # rad, the straight way from begin to target, all motors together
+    way: float  # rad, straight path from begin to target, all motors together
 
 
 class Lockstep(Struct, frozen=True):
@@ -241,8 +244,8 @@ class Trial(Struct, frozen=True):
     seconds: float  # robot time
     commands: list[Judged]
     touches: list[Touch]
-    beyond: float  # rad, the furthest beyond a limit; negative: inside
-    motor: str  # that went there
+    beyond: float  # rad, largest distance beyond a limit; negative: inside
+    motor: str  # of that distance
     speed_squared: float  # (rad/s)^2, mean over ticks and motors
     jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
     jerk_max: float  # rad/s^3
@@ -251,7 +254,7 @@ class Trial(Struct, frozen=True):
 
 
 def measure(folder: Path, robot: Robot, dt: float) -> Trial:
-    """The measures of a finished trial, from its folder."""
+    """Measure a finished trial from the files in its folder."""
     q_all = read_positions(folder, robot)
     moved = moved_motors(robot)
     q = q_all[:, moved]
@@ -272,7 +275,7 @@ def measure(folder: Path, robot: Robot, dt: float) -> Trial:
 
 
 def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged:
-    """The outcome of a command; q_all (ticks, n) rad at the ends of the ticks, the first is tick 1."""
+    """Return the outcome of a command; q_all: (ticks, n) rad at the ends of the ticks, row 0 is tick 1."""
     moved = moved_motors(robot)
     target = np.array(commanded.target)
     course = q_all[max(commanded.begin - 2, 0) : max(commanded.end - 1, 1)]  # from the beginning of tick `begin` to that of `end`
@@ -290,42 +293,42 @@ def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged
 
 
 def _outcome(left: float, gone: float) -> Outcome:
-    """From how far a part ended from its target, and from where it began, rad."""
+    """Return the outcome of a part from its remaining error and its distance from the start, rad."""
     if left <= REACHED:
         return "completed"
     return "returned" if gone <= RETURNED else "deflected"
 
 
 def write_trial(path: Path, trial: Trial) -> None:
-    """Write it whole or not at all."""
+    """Write a trial, whole or not at all."""
     new = path.with_suffix(".new")
     new.write_bytes(msgspec.json.format(msgspec.json.encode(trial), indent=1))
     new.replace(path)
 
 
 def read_trial(path: Path) -> Trial:
-    """Read what `write_trial` wrote."""
+    """Read a trial written by `write_trial`."""
     return msgspec.json.decode(path.read_bytes(), type=Trial)
 
 
 def beyond_limits(q: Array, limits: Array) -> Array:
-    """The furthest that each motor was beyond its limits, (m,) rad, negative inside; q (ticks, m), limits (m, 2) rad."""
+    """Return the largest distance of each motor beyond its limits, (m,) rad, negative inside; q (ticks, m), limits (m, 2) rad."""
     worst: Array = np.maximum(limits[:, 0] - q.min(axis=0), q.max(axis=0) - limits[:, 1])
     return worst
 
 
 def path_length(q: Array) -> float:
-    """The sum of the distances of all motors, rad; q (ticks, m)."""
+    """Return the length of the path summed over all motors, rad; q (ticks, m)."""
     return float(np.abs(np.diff(q, axis=0)).sum())
 
 
 def speed(q: Array, dt: float) -> Array:
-    """First difference of q (ticks, m) rad over dt [s], (ticks - 1, m) rad/s."""
+    """Return the first differences of q (ticks, m) rad over dt [s], (ticks - 1, m) rad/s."""
     first: Array = np.diff(q, axis=0) / dt
     return first
 
 
 def jerk(q: Array, dt: float) -> Array:
-    """Third difference of q (ticks, m) rad over dt [s] cubed, (ticks - 3, m) rad/s^3."""
+    """Return the third differences of q (ticks, m) rad over dt [s] cubed, (ticks - 3, m) rad/s^3."""
     third: Array = np.diff(q, n=3, axis=0) / dt**3
     return third

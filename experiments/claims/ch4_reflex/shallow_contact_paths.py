@@ -1,4 +1,4 @@
-"""Straight paths of the hand into the table's field, at any angle, as postures, and a client that drives along one."""
+"""Straight paths of the hand into the table's field at any angle, and a client that sends position references along one."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from mobee.robot.robot import Robot
 
 SPEED = 0.2  # of the motors' top speed, as in the thesis
 MARKER = "left_palm"
-MOTORS = ("torso_*", "l_shoulder_*", "l_elbow", "l_wrist_*")  # that move the hand
-HAND = ("l_hand", "l_palm", "l_fingers", "l_thumb")  # how the names of its shapes begin
+MOTORS = ("torso_*", "l_shoulder_*", "l_elbow", "l_wrist_*")  # name patterns of the motors that move the hand
+HAND = ("l_hand", "l_palm", "l_fingers", "l_thumb")  # prefixes of the names of its shapes
 ASIDE = {"r_shoulder_roll": 70.0, "r_elbow": 90.0}  # degrees, so that the other hand is far from the paths
-BEFORE, BEHIND, LIFT = 0.06, 0.04, 0.04  # m of the path before and behind the first contact, and above its start
+BEFORE, BEHIND, LIFT = 0.06, 0.04, 0.04  # m, length of the path before and behind the first contact, and height above its start
 TOP = 0.1  # m below the root, the table's top
 STEP = 0.002  # m between two postures of a path
-SAMPLED = (0.3, 0.7)  # share of the motors' ranges from which postures are drawn
-TORSO = np.deg2rad([[0.0, 0.0], [0.0, 0.0], [0.0, 25.0]])  # rad, range of yaw, roll and pitch from which they are drawn
+SAMPLED = (0.3, 0.7)  # shares of the motors' ranges within which postures are drawn
+TORSO = np.deg2rad([[0.0, 0.0], [0.0, 0.0], [0.0, 25.0]])  # rad, ranges of yaw, roll and pitch of drawn postures
 PRECISE, DAMPING = 2e-4, 1e-5  # of the inverse kinematics: m and rad; m^2
 MARGIN = 2.0  # degrees within the motors' limits, so that noise does not matter there
 HIGHEST_START = 0.15  # m, of the palm
@@ -33,7 +33,7 @@ HIGHEST_START = 0.15  # m, of the palm
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """Where the hand just touches the table's field, and its heading there."""
+    """A place at which the hand just touches the table's field, and the heading of its paths."""
 
     q: Array  # (n,) rad
     position: Array  # (3,) m, of the palm
@@ -43,7 +43,7 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandPath:
-    """Postures (w, n) rad, from above the start over the start into the field; `start` is the index of the start."""
+    """Postures (w, n) rad from above the start, through the start, into the field; `start`: index of the start."""
 
     postures: Array
     start: int
@@ -69,7 +69,7 @@ class Table:
             self._home[self.robot.motor_index(name)] = np.deg2rad(degrees)
 
     def spots(self, number: int, seed: int) -> list[Spot]:
-        """So many random spots that have a path at 90, 45 and 0 degrees."""
+        """Return `number` random spots that have paths at 90, 45 and 0 degrees."""
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
         while len(found) < number:
@@ -79,7 +79,7 @@ class Table:
         return found
 
     def _touch(self, rng: np.random.Generator) -> Spot | None:
-        """Lower the hand from a posture drawn at random until it touches the table, and nothing else does."""
+        """Lower the hand from a random posture until it, and nothing else, touches the table; None if that fails."""
         q = self._home.copy()
         low, high = self._limits.T
         q[self._moving] = low + rng.uniform(*SAMPLED, len(low)) * (high - low)
@@ -101,7 +101,7 @@ class Table:
         return None
 
     def _edge(self, touching: Array, position: Array, rotation: Array, heading: float) -> Spot | None:
-        """The height at which contact begins, between two heights a step apart."""
+        """Return the spot at which contact begins, by bisection of a step."""
         low, high, q = position[2], position[2] + STEP, touching
         for _ in range(8):
             middle = np.array([*position[:2], 0.5 * (low + high)])
@@ -114,7 +114,7 @@ class Table:
         return Spot(q, np.array([*position[:2], high]), rotation, direction)
 
     def path(self, spot: Spot, angle: float) -> HandPath | None:
-        """The path into the spot at an angle to the table's top, rad; None where the arm cannot follow it."""
+        """Return the path through the spot at an angle [rad] to the table's top; None if the arm cannot follow it."""
         direction = np.cos(angle) * spot.heading - np.array([0.0, 0.0, np.sin(angle)])
         into = self._line(spot.q, spot, [spot.position + s * direction for s in np.arange(STEP, BEHIND + 1e-9, STEP)])
         back = self._line(spot.q, spot, [spot.position - s * direction for s in np.arange(STEP, BEFORE + 1e-9, STEP)])
@@ -128,7 +128,7 @@ class Table:
         return HandPath(postures, len(up))
 
     def _line(self, q: Array, spot: Spot, positions: list[Array]) -> list[Array] | None:
-        """Postures on a line of positions, the hand turned as at the spot; None where there is no posture, or another contact."""
+        """Return postures with the hand at the positions, oriented as at the spot; None without a posture, or with another contact."""
         found = []
         for position in positions:
             solved = self._solve(q, position, spot.rotation)
@@ -142,7 +142,7 @@ class Table:
         return found
 
     def _solve(self, q: Array, position: Array, rotation: Array) -> Array | None:
-        """The posture near q whose palm is there, by damped least squares over the arm; None when it is not found."""
+        """Return the posture near q with this pose of the palm, by damped least squares; None if it is not found."""
         q = q.copy()
         for _ in range(30):
             pose = self.model.evaluate(q)
@@ -157,12 +157,12 @@ class Table:
 
 
 def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> bool:
-    """Whether all violations are contacts of shapes whose names begin so with the table."""
+    """Return whether all violations are contacts with the table of shapes with one of the name prefixes."""
     return all(v.kind == "contact" and v.what.endswith(" - table") and v.what.startswith(touching) for v in violations)
 
 
 class Client:
-    """Position references along a path, tick by tick; when it failed, once more from the beginning."""
+    """A client that sends position references along a path, tick by tick, and starts again after a failure."""
 
     def __init__(self, robot: Robot, path: HandPath, dt: float) -> None:
         fastest = SPEED * np.array([motor.max_velocity for motor in robot.motor_table])
@@ -172,32 +172,32 @@ class Client:
         self._references = np.array([np.interp(self._ticks, times, column) for column in path.postures.T]).T
         self.begin = int(np.searchsorted(self._ticks, times[path.start]))  # index of the reference at the start
         self._next = 0
-        self.runs = 0  # times that it has left the start
+        self.runs = 0  # number of departures from the start
 
     @property
     def start(self) -> Array:
-        """Where the robot stands before it begins: above the start."""
+        """The posture above the start in which the robot begins, (n,) rad."""
         start: Array = self._references[0]
         return start
 
     @property
     def leaves_start(self) -> bool:
-        """Whether the next reference is the start, from which on the path is a position command of its own."""
+        """Whether the next reference is the start, where a new position command begins."""
         return self._next == self.begin
 
     @property
     def is_over(self) -> bool:
-        """Whether the last reference was commanded."""
+        """Whether the last reference was sent."""
         return self._next >= len(self._references)
 
     def next(self) -> Array:
-        """The next reference (n,) rad; behind the end the last one."""
+        """Return the next reference (n,) rad; after the end the last one."""
         self.runs += self.leaves_start
         reference: Array = self._references[min(self._next, len(self._references) - 1)]
         self._next += 1
         return reference
 
     def retry(self, q: Array) -> None:
-        """Go on from whichever is nearer to q (n,) rad: the beginning above the start, or the start."""
+        """Continue from the beginning or from the start of the path, whichever is nearer to q (n,) rad."""
         places = (0, self.begin)
         self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))

@@ -1,16 +1,16 @@
-"""Graze: recovery of the reflex when the hand comes into the table's field at a low angle.
+"""Shallow contact recovery: the reflex when the hand enters the table's field at a low angle.
 
-Claim: the reflex of MoBeE 1.0 recovers from a contact that it meets head on; where the hand comes in flat its recovery fails ever
-more often and control goes back and forth, as the encoders' noise decides what counts as contact; a filter and a dead time mend
-most of that; MoBeE 2.0 lets the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which
-gives no numbers.  Run time: 5 to 10 minutes for 10 angles with 30 trials of each of four variants.
+Claim: the reflex of MoBeE 1.0 recovers from steep contacts. The flatter the approach, the more often its recovery fails and control
+switches back and forth, since encoder noise decides what counts as contact. A filter and a dead time prevent most of that. MoBeE 2.0 lets
+the hand slide along the surface at any angle, and settles. Source: thesis 4.4 (discussion), which gives no numbers. Run time: 5 to 10
+minutes for 10 angles with 30 trials of each of four variants.
 
 A client drives the left hand along a straight path through the surface of the table's field, 6 cm before it and 4 cm behind, at 20 % speed,
-and tries again whenever it gets control back, for 12 s.  Motors with lag, delay, play and encoder noise, ticks of 10 ms.  Variants:
+and tries again whenever it gets control back, for 12 s.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.  Variants:
 off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
-are attractors of the controller.  The first recovery of each trial counts.  It is a success when the hand ends out of contact, has not come
-into contact again nor gone deeper while it moved back, and the reflex does not come again within 0.3 s; it is clean when besides the reflex
-saw nothing of the contact any more meanwhile.
+are attractors of the controller.  The first recovery of each trial counts.  It succeeds if the hand ends without contact, did not
+touch again or go deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the
+encoders reported no contact during the motion back.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 
 ANGLES = (90.0, 60.0, 30.0, 20.0, 10.0, 7.0, 5.0, 3.0, 2.0, 1.0)  # degrees
 SHARES = ("recovered", "clean", "again", "came_back", "never", "deeper", "relapse", "settled", "switches", "flips", "flicker")
-LOW = 3.0  # degrees, up to which a path counts as flat
+MAX_FLAT_ANGLE = 3.0  # degrees, of a flat path
 QUICK_ANGLES, QUICK_SPOTS, QUICK_REPEAT = (60.0, 2.0), 2, 1
 
 DT = 0.01  # s
 SECONDS = 12.0
-RELAPSE = 0.3  # s after control is back; the motion from the start to the contact takes longer
-UNLIMITED = 1e6  # rad/s: the velocity of the naive reflex has no limit
+RELAPSE_TIME = 0.3  # s after control is given back; shorter than the motion from the start to the contact
+UNLIMITED = 1e6  # rad/s, velocity limit of the naive reflex: none
 SETTINGS = {"naive": ReflexSettings.naive(), "mended": ReflexSettings()}
 VARIANTS = ("off", *SETTINGS, "2.0")
 
-STOPPING = 30  # ticks in which the robot comes to a stop
-MORE = 1e-3  # m by which the motion back must be deeper than the stop to count as deeper
+STOPPING_TICKS = 30  # until the robot has stopped
+DEEPER_BY = 1e-3  # m beyond the depth during the stop, from which the motion back counts as deeper
 
 COLORS = {"off": "0.6", "naive": "tab:red", "mended": "tab:orange", "2.0": "tab:blue"}
 LABELS = {"off": "no reflex", "naive": "1.0, naive", "mended": "1.0, filter and dead time", "2.0": "2.0"}
@@ -55,14 +55,14 @@ SWITCHING = ("naive", "mended")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Angles, places and repetitions."""
+    """Add angles, places and repetitions."""
     parser.add_argument("--angles", nargs="+", type=positive_number, default=list(ANGLES), metavar="DEG", help="of the approach, degrees")
     parser.add_argument("--spots", type=positive_whole, default=10, metavar="N", help="places on the table (default: 10)")
     parser.add_argument("--repeat", type=positive_whole, default=3, metavar="N", help="trials at each place, other noise (default: 3)")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every angle at every place; each seed has places of its own."""
+    """Return every angle at every place; each seed has its own places."""
     angles, spots, repeat = arguments.angles, arguments.spots, arguments.repeat
     if arguments.quick:
         angles, spots, repeat = QUICK_ANGLES, min(spots, QUICK_SPOTS), min(repeat, QUICK_REPEAT)
@@ -74,7 +74,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """All variants with several noises at a place; no trials where the hand has no path at the angle."""
+    """Run all variants with several noises at a place; no trials if the hand has no path at the angle."""
     table, spot, angle = _table(), settings["spot"], settings["angle"]
     path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))
     if path is None:
@@ -94,24 +94,24 @@ def _spots(count: int, seed: int) -> list[Spot]:
 
 
 class Truth:
-    """Depths, and the course of the first recovery, by the joints, without the noise of the encoders."""
+    """Records depths and the course of the first recovery, from the true joint positions."""
 
     def __init__(self, table: Table, path: HandPath) -> None:
         self._track = table.model.track()
         start, end = (table.model.evaluate(path.postures[i]).position(MARKER)[:2] for i in (path.start, -1))
         length = float(np.linalg.norm(end - start))
-        self._start, self._along = start, (end - start) / length if length > MORE else np.zeros(2)
+        self._start, self._along = start, (end - start) / length if length > DEEPER_BY else np.zeros(2)
         self.depth = self.solid = self.progress = 0.0
         self.flips = self.flicker = 0
         self.again = self.came_back = self.never = self.deeper = False
         self._seen = False
-        self._since_first = -1  # ticks, since the encoders first saw a contact
+        self._since_first = -1  # ticks since the encoders first reported a contact
         self._first: Recovery | None = None
         self._depths: list[float] = []  # along the first recovery
         self._is_over = False
 
     def update(self, q: Array, seen: bool, reflex: Reflex | None) -> None:
-        """One tick: the joints q (n,) rad, whether the encoders saw a violation, and the reflex after this tick."""
+        """Record a tick: true joints q (n,) rad, whether the encoders reported a violation, and the reflex after the tick."""
         pose = self._track.evaluate(q)
         depths = {"solid": 0.0, "field": 0.0}
         for contact in pose.contacts:
@@ -129,12 +129,12 @@ class Truth:
             self._follow(reflex.recovery, depth)
 
     def finish(self) -> None:
-        """The trial is over."""
+        """Evaluate the first recovery at the end of the trial."""
         if not self._is_over and self._first is not None:
             self._conclude(self._first, self._depths[-1])
 
     def _follow(self, recovery: Recovery, depth: float) -> None:
-        """The first recovery, from where control is taken to where it is given back."""
+        """Follow the first recovery until control is given back."""
         if self._first is None:
             self._first = recovery
         self._depths.append(depth)
@@ -148,8 +148,8 @@ class Truth:
         self.again = recovery.again > 0
         self.came_back = bool(len(left)) and bool(touching[left[0] + 1 :].any())
         self.never = depth > 0.0
-        stop, back = self._depths[:STOPPING], self._depths[STOPPING:]
-        self.deeper = bool(back) and max(back) > max(stop) + MORE
+        stop, back = self._depths[:STOPPING_TICKS], self._depths[STOPPING_TICKS:]
+        self.deeper = bool(back) and max(back) > max(stop) + DEEPER_BY
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,33 +160,33 @@ class Trial:
     angle: float  # degrees
     spot: int
     seed: int
-    depth: float  # m, deepest that any shape went into the table, of the joints as they are
-    solid: float  # m, the same of solids alone
-    switches: float  # of control, a second
-    flips: float  # changes between free and in contact by the encoders, a second
-    flicker: float  # s, from the first contact to the last free pose, on the path of `off`
+    depth: float  # m, deepest contact of any shape with the table, true joints
+    solid: float  # m, the same of solids
+    switches: float  # of control, per second
+    flips: float  # changes between contact and no contact by the encoders, per second
+    flicker: float  # s from the first contact to the last free pose by the encoders, variant `off`
     reflexes: int
-    again: bool  # the first recovery: contact came back, by the encoders
-    came_back: bool  # the same, by the joints
-    never: bool  # control came back, or never did, while the hand was in contact
+    again: bool  # first recovery: contact returned, by the encoders
+    came_back: bool  # the same, by the true joints
+    never: bool  # the hand was still in contact at the end of the recovery or of the trial
     deeper: bool  # the motion back went deeper than the stop
-    relapse: bool  # the second reflex came as soon as control was back
+    relapse: bool  # the second reflex started within RELAPSE_TIME
     settled: bool  # 2.0: by the controller's test
-    progress: float  # m, from the start to where the hand was farthest along the table
+    progress: float  # m, largest distance of the hand from the start, along the table
 
     @property
     def recovered(self) -> bool:
-        """1.0: the first recovery took the hand out of contact, and there it was free."""
+        """MoBeE 1.0: the first recovery succeeded."""
         return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
 
     @property
     def clean(self) -> bool:
-        """1.0: besides, the encoders saw nothing of the contact during the motion back."""
+        """MoBeE 1.0: the first recovery succeeded, and the encoders reported no contact during the motion back."""
         return self.recovered and not self.again
 
 
 def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: int, seed: int) -> Trial:
-    """Let the client insist for SECONDS; `angle` in degrees only names the path."""
+    """Run a trial of SECONDS; `angle` in degrees only labels the path."""
     client = Client(table.robot, path, DT)
     body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
     truth = Truth(table, path)
@@ -217,24 +217,24 @@ def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: in
 
 @dataclass(slots=True)
 class Control:
-    """When the reflex took control, and when it gave it back; ticks."""
+    """The ticks at which the reflex took control, and gave it back."""
 
     taken: list[int] = field(default_factory=list)
     given: list[int] = field(default_factory=list)
 
     @property
     def switches(self) -> int:
-        """How often control changed hands."""
+        """Number of changes of control."""
         return len(self.taken) + len(self.given)
 
     @property
     def relapsed(self) -> bool:
-        """Whether the second reflex followed at once upon the first."""
-        return len(self.taken) > 1 and (self.taken[1] - self.given[0]) * DT <= RELAPSE
+        """Whether the second reflex started within RELAPSE_TIME after the first."""
+        return len(self.taken) > 1 and (self.taken[1] - self.given[0]) * DT <= RELAPSE_TIME
 
 
 class _Body:
-    """Motors and encoders; a command acts one tick after it was formed, as live."""
+    """Motors and encoders; a command acts one tick after it was formed, as in the live system."""
 
     def __init__(self, table: Table, q: Array, rng: np.random.Generator) -> None:
         parameters = MotorParameters()
@@ -245,22 +245,22 @@ class _Body:
 
     @property
     def q(self) -> Array:
-        """Where the joints are, (n,) rad."""
+        """The true joint positions, (n,) rad."""
         return self._motors.q
 
     def encoders(self) -> Array:
-        """The encoders' readings of it."""
+        """Return noisy encoder readings, (n,) rad."""
         q: Array = self._motors.q + self._noise * self._rng.standard_normal(len(self._motors.q))
         return q
 
     def tick(self, mode: str, reference: Array) -> None:
-        """Run for a tick under the command of the tick before."""
+        """Run for a tick with a command formed in the previous tick."""
         self._motors.command(slice(None), "velocity" if mode == "velocity" else "position", reference)
         self._motors.move(self._substeps, DT / self._substeps)
 
 
 def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> Control:
-    """MoBeE 1.0, or no reflex: position commands, forwarded or replaced."""
+    """Run MoBeE 1.0, or no reflex: position commands are forwarded or replaced."""
     limit = np.full(len(table.robot.motors), UNLIMITED)
     if settings is not None and settings.brake:
         limit = np.array([motor.max_velocity for motor in table.robot.motor_table])
@@ -288,7 +288,7 @@ def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: R
 
 
 def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
-    """MoBeE 2.0: the client's references are attractors; whether the arm settled after the last one."""
+    """Run MoBeE 2.0, with the client's references as attractors; returns whether the arm settled after the last one."""
     controller = Controller(table.model, Gains.default(), speed_scale=SPEED)
     controller.reset(client.start)
     track, command = table.model.track(), np.zeros(len(client.start))
@@ -309,12 +309,12 @@ def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Every variant's numbers at every angle, and whether the claim holds."""
+    """Return the numbers of every variant at every angle, and whether the claim holds."""
     return results(_trials(found))
 
 
 def results(trials: Sequence[Trial]) -> dict[str, Any]:
-    """The same of trials."""
+    """Return the findings of trials."""
     angles = sorted({trial.angle for trial in trials}, reverse=True)
     table: dict[str, Any] = {
         variant: {f"{angle:g}": summary([t for t in trials if (t.variant, t.angle) == (variant, angle)]) for angle in angles}
@@ -324,7 +324,7 @@ def results(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def summary(trials: Sequence[Trial]) -> dict[str, float]:
-    """The trials of one variant at one angle: shares of all, depths in mm, rates a second."""
+    """Summarise the trials of one variant at one angle: shares of trials, depths in mm."""
     if not trials:
         return {"trials": 0}
 
@@ -342,10 +342,10 @@ def summary(trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def holds(trials: Sequence[Trial]) -> bool:
-    """The claim: flat paths are worse for the naive reflex than steep ones, the mended one is better there, and 2.0 settles."""
+    """Return whether the claim holds: flat paths are worse than steep ones for 1.0 naive, mended is better there, and 2.0 settles."""
 
     def share(name: str, variant: str, low: bool) -> float:
-        values = [getattr(t, name) for t in trials if t.variant == variant and (t.angle <= LOW) == low]
+        values = [getattr(t, name) for t in trials if t.variant == variant and (t.angle <= MAX_FLAT_ANGLE) == low]
         return float(np.mean(values)) if values else float("nan")
 
     naive_low, naive_steep = share("recovered", "naive", True), share("recovered", "naive", False)
@@ -360,7 +360,7 @@ def _trials(found: Cells) -> list[Trial]:
 
 
 def plot(found: Cells) -> Any:
-    """Recovery, switching, depth and progress against the angle of approach."""
+    """Draw recovery, switching, depth and progress against the angle of approach."""
     trials = _trials(found)
     drawing = new_figure(10.0, 7.0)
     (success, switching), (depth, progress) = drawing.subplots(2, 2, sharex=True)
@@ -382,7 +382,7 @@ def plot(found: Cells) -> Any:
         axes.minorticks_off()
         axes.grid(alpha=0.2)
     depth.legend(fontsize=8)
-    drawing.suptitle("Thesis 4.4: a hand that grazes the table at 20 % speed, its client insisting (mean, standard error)")
+    drawing.suptitle("Thesis 4.4: a hand meets the table at 20 % speed, its client tries again (mean, standard error)")
     return drawing
 
 
@@ -391,7 +391,7 @@ def _angles(trials: Sequence[Trial]) -> list[float]:
 
 
 def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: Callable[[Trial], float], line: str = "-") -> None:
-    """Mean and standard error against the angle."""
+    """Draw mean and standard error against the angle."""
     for variant in variants:
         rows = []
         for angle in _angles(trials):
@@ -405,7 +405,7 @@ def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: 
 
 EXPERIMENT = Experiment(
     name="shallow-contact-recovery",
-    claim="rewinding fails the more often the flatter the hand comes into contact; MoBeE 2.0 slides and settles at every angle",
+    claim="the flatter the hand approaches a contact, the more often rewinding fails; MoBeE 2.0 slides and settles at every angle",
     source="thesis 4.4",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),

@@ -21,7 +21,7 @@ from services.common.service import Service
 
 
 class BabblerNode:
-    """Commands one posture after the other, logs every command, and answers the barrier of every tick, until the system ends."""
+    """Commands one posture after the other, logs every command, and answers every tick, until the system ends."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._commands = 0
@@ -33,7 +33,7 @@ class BabblerNode:
         else:
             self._mover = AtGoals(service, robot, targets, self._note)
         service.describe = lambda: (f"{self._commands} commands", {"commands": self._commands})
-        if service.locked and config.at == "goals":  # behind the controller, when a motion may have ended
+        if service.locked and config.at == "goals":  # after the controller, which reports the end of motions
             service.on_turn(self._tick)
         else:
             service.on_clock(self._tick)
@@ -49,7 +49,7 @@ class BabblerNode:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Babble until the robot time is over."""
+    """Send random commands until the robot time is over."""
     config = load_config(Config, argv, "experiments.claims.ch4_reflex.babbler")
     with explained("experiments.claims.ch4_reflex.babbler"):
         robot = load_robot(config.robot)

@@ -11,13 +11,13 @@ from services.common.session import NAMESPACE
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The babbler's settings; its seed is that of the postures."""
+    """The babbler's settings; `seed` decides the postures."""
 
     at: Literal["drives", "goals"] = "drives"
-    """What it commands: the drives of the robot, or the goals of the controller."""
+    """Target of the commands: the drives of the robot, or the goals of the controller."""
     robot_of: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
-    """Namespace of the robot that it commands: the robot's own, or that of a filter in front of it."""
+    """Namespace of the commanded robot: that of the robot, or of a filter in front of it."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.2
-    """Share of the motors' top speed that its own moves use; the controller has its own."""
+    """Share of the motors' top speed for moves at the drives; the controller has its own setting."""
     run_dir: str = ""
-    """Folder in which commands.jsonl is written."""
+    """Folder of commands.jsonl."""

@@ -1,4 +1,4 @@
-"""Commands to all parts at once: positions at the drives, or goals of MoBeE's controller."""
+"""Sends commands to all parts at once: positions to the drives, or goals to MoBeE's controller."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 
 TTL = 100  # ms
-REST = 1.0  # s behind the end of a move, in which the motors arrive
-RETRY = 0.1  # s of robot time between attempts to arm a part
+REST = 1.0  # s after the end of a move, in which the motors arrive
+RETRY_PERIOD = 0.1  # s of robot time between attempts to arm a part
 
 _M = TypeVar("_M", bound=Message)
 
 
 class PartStreams(Generic[_M]):
-    """The newest message of each part; in lockstep that of the tick whose turn it is."""
+    """The newest message of each part; in lockstep that of the current tick."""
 
     def __init__(self, service: Service, robot: Robot, cls: type[_M]) -> None:
         self.newest: dict[str, _M] = {}
@@ -34,7 +34,7 @@ class PartStreams(Generic[_M]):
         service.on_run(self.newest.clear)
 
     def are_complete(self) -> bool:
-        """Whether there is a message of every part in this run."""
+        """Return whether every part has sent a message in this run."""
         return len(self.newest) == self._parts
 
     def _noter(self, part: str) -> Callable[[_M], None]:
@@ -45,7 +45,7 @@ class PartStreams(Generic[_M]):
 
 
 class AtDrives:
-    """Commands a position every tick, along the move to the posture that is due."""
+    """Sends position commands to the drives every tick, along moves from posture to posture."""
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, speed: float, note: Callable[[Commanded], None]) -> None:
         """`speed`: share of the motors' top speed; `note` is called with every command that has ended."""
@@ -57,7 +57,7 @@ class AtDrives:
         self._retry_at = 0  # tick
         self._reference = self._target = robot.home
         self._move = PositionMove(robot.home, robot.home, self._speed)
-        self._begin = 0  # tick of the command under way, 0: none
+        self._begin = 0  # tick of the current command, 0: none
         self._is_refused = True  # the safety layer ended it
         service.on_run(self._forget)
 
@@ -70,7 +70,7 @@ class AtDrives:
             self._is_refused = True
             self._arm(k, dt)
             return
-        if self._is_refused:  # only now is it known where the safety layer has left the robot
+        if self._is_refused:  # armed again: the pose in which the safety layer left the robot is known now
             self._end(k, "refused")
             self._start(k, np.concatenate([states[part].q for part in self._robot.parts]))
         elif (k - self._begin) * dt >= self._move.duration + REST:
@@ -94,10 +94,10 @@ class AtDrives:
             publisher.put(epoch=self._epochs[part], re_k=k, mode="position", ref=self._reference[where].tolist(), ttl=TTL)
 
     def _arm(self, k: int, dt: float) -> None:
-        """Take and arm the parts that do not obey; waits for the answers, so that they belong to this tick."""
+        """Take and arm the parts that are not armed; waits for the answers, so that they belong to this tick."""
         if k < self._retry_at:
             return
-        self._retry_at = k + round(RETRY / dt)
+        self._retry_at = k + round(RETRY_PERIOD / dt)
         for part, state in self._states.newest.items():
             if state.gate == "armed" and state.epoch == self._epochs[part]:
                 continue
@@ -107,7 +107,7 @@ class AtDrives:
                 self._epochs[part] = taken.epoch
             except CallFailed as failed:
                 self._service.log.info("%s cannot be armed yet: %s", part, failed)
-                return  # who refuses one part now refuses them all
+                return  # a refusal of one part applies to all parts
 
     def _forget(self) -> None:
         self._epochs = dict.fromkeys(self._epochs, 0)
@@ -115,14 +115,14 @@ class AtDrives:
 
 
 class AtGoals:
-    """The next posture comes when every part has settled, or has tried for too long."""
+    """Sends goals to the controller; the next posture follows when every part has settled or timed out."""
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None]) -> None:
         """`note` is called with every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
         self._motions = PartStreams(service, robot, Motion)
         self._epochs: dict[str, int] = {}
-        self._begin, self._number = -1, 0  # tick of the command under way, -1: none
+        self._begin, self._number = -1, 0  # tick of the current command, -1: none
         self._target: Array = robot.home
         self._endings: dict[str, Ending] = {}
         service.on_run(self._forget)
@@ -161,7 +161,7 @@ class AtGoals:
                 )
             except CallFailed as failed:
                 self._service.log.warning("%s refuses: %s", part, failed)
-                self._forget()  # who refuses does not know this process any more: take all parts again
+                self._forget()  # the controller does not know this process any more: take all parts again
                 return
 
     def _owns_all(self) -> bool:
