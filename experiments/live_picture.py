@@ -1,8 +1,8 @@
-"""The picture of the running system: starts the default scenario, opens its page in headless Chromium, takes a screenshot.
+"""Take the picture of the running system: start the default scenario, open its page in headless Chromium, take a screenshot.
 
 `python -m experiments.live_picture` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the
-tab of what the agents know.  Chromium draws in software here and would starve the robot: it runs at the lowest priority and on
-one core (2 cores are enough for both).
+tab of the agents' models.  Chromium renders in software here and would take the robot's time: it runs at the lowest priority and on
+one core (2 cores suffice for both).
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ DRAW_IN_SOFTWARE = (
     "--ignore-gpu-blocklist",
 )
 SIZE = (1280, 800)  # pixels
-DRAWN = {"robot": 120_000, "learning": 50_000}  # bytes at that size: a page on which nothing is drawn yet packs into less
-READY = 60.0  # s for the system to come up
-PATIENCE = 120.0  # s for the first picture
-POLL = 1.0  # s between two looks
+MIN_BYTES = {"robot": 120_000, "learning": 50_000}  # of a picture of that size; a page without a scene needs less
+START_TIMEOUT = 60.0  # s for the system to start
+SCENE_TIMEOUT = 120.0  # s for the first picture with a scene
+POLL_PERIOD = 1.0  # s
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Take the screenshots; returns 0, or 1 with one line that says what is missing."""
+    """Take the screenshots; returns 0, or 1 with a message if Chromium is not installed."""
     options = _options(argv)
     chromium = find_chromium()
     if chromium is None:
@@ -46,8 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     settings = [f"services.monitor.page={options.page}", *options.set]
     with _attached(options.url) if options.url else _launched(options.scenario, settings) as url:
-        step_back()
-        drawn = options.drawn or DRAWN[options.page]
+        lower_priority()
+        drawn = options.drawn or MIN_BYTES[options.page]
         for path in take(url, chromium, options.out, drawn, options.size, options.shots, options.gap, options.warm_up):
             print(path)
     return 0
@@ -55,12 +55,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Take a picture of the running system.")
-    parser.add_argument("--url", default="", help="page of a system that runs already")
-    parser.add_argument("--scenario", default="default", help="what to start otherwise")
+    parser.add_argument("--url", default="", help="address of the page of a system that runs already")
+    parser.add_argument("--scenario", default="default", help="the scenario to start otherwise")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", help="change a setting of the scenario")
-    parser.add_argument("--page", choices=DRAWN, default="robot", help="the tab that is open (default: robot)")
+    parser.add_argument("--page", choices=MIN_BYTES, default="robot", help="the tab that is open (default: robot)")
     parser.add_argument("--size", type=int, nargs=2, default=SIZE, metavar=("WIDTH", "HEIGHT"), help="pixels (default: 1280 800)")
-    parser.add_argument("--drawn", type=int, metavar="BYTES", help="what a page packs into that is drawn; goes with the size")
+    parser.add_argument("--drawn", type=int, metavar="BYTES", help="smallest size of a picture with a scene")
     parser.add_argument("--shots", type=int, default=1)
     parser.add_argument("--gap", type=float, default=10.0, help="s between two shots")
     parser.add_argument("--warm-up", type=float, default=45.0, help="s from the first picture to the first shot")
@@ -69,29 +69,29 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def find_chromium() -> str | None:
-    """The system's Chromium, if there is one."""
+    """Return the path of Chromium, or None if it is not installed."""
     return next((path for path in CHROMIUM if Path(path).exists()), shutil.which("chromium"))
 
 
-def step_back() -> None:
-    """From here on this process and its children take only time that is left over on one core."""
+def lower_priority() -> None:
+    """Let this process and its children use only idle time of one core."""
     os.nice(19)
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
 def take(url: str, chromium: str, folder: Path, drawn: int, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
-    """Screenshots of the page at `url`, `gap` seconds apart, once one has that many bytes."""
+    """Yield screenshots of the page at `url`, `gap` seconds apart, after the first that has `drawn` bytes."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAW_IN_SOFTWARE))
         page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
         page.goto(f"{url}&renderer=webgl")
-        give_up = time.monotonic() + PATIENCE
+        give_up = time.monotonic() + SCENE_TIMEOUT
         while len(page.screenshot(timeout=0)) < drawn:
             if time.monotonic() > give_up:
-                raise SystemExit(f"live picture: the page at {url} drew no scene within {PATIENCE:g} s")
-            time.sleep(POLL)
+                raise SystemExit(f"live picture: the page at {url} drew no scene within {SCENE_TIMEOUT:g} s")
+            time.sleep(POLL_PERIOD)
         time.sleep(warm_up)
         for shot in range(1, shots + 1):
             path = folder / ("live.png" if shots == 1 else f"live-{shot}.png")
@@ -109,7 +109,7 @@ def _attached(url: str) -> Iterator[str]:
 
 @contextmanager
 def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
-    """A system of its own on free ports, stopped as by Ctrl-C afterwards; the address of its page."""
+    """Start a system on free ports, yield the address of its page, and stop the system as by Ctrl-C."""
     router, web, grpc = free_ports(3)
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "mobee_system", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
@@ -125,18 +125,18 @@ def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
 
 
 def _wait_for(port: int, launcher: subprocess.Popen[bytes]) -> None:
-    give_up = time.monotonic() + READY
+    give_up = time.monotonic() + START_TIMEOUT
     while True:
         with socket.socket() as probe:
             if probe.connect_ex(("127.0.0.1", port)) == 0:
                 return
         if launcher.poll() is not None or time.monotonic() > give_up:
-            raise SystemExit("live picture: the system did not come up")
+            raise SystemExit("live picture: the system did not start")
         time.sleep(0.2)
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports of loopback that nobody listens on."""
+    """Return free ports of the loopback interface."""
     probes = [socket.socket() for _ in range(count)]
     for probe in probes:
         probe.bind(("127.0.0.1", 0))

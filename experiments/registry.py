@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import cast
 
-from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.experiment import Experiment
 from mobee.errors import UnknownName
 
 EXPERIMENTS = {
@@ -116,7 +116,4 @@ def load_experiment(name: str) -> Experiment:
     if name not in EXPERIMENTS:
         raise UnknownName("experiment", name, EXPERIMENTS)
     module = importlib.import_module(EXPERIMENTS[name])
-    if hasattr(module, "EXPERIMENT"):
-        return cast(Experiment, module.EXPERIMENT)
-    method = Steps(module.add_arguments, module.run, module.figure)
-    return Experiment(module.NAME, module.CLAIM, module.SOURCE, module.__doc__ or "", method, getattr(module, "CLAIMS", ()))
+    return cast(Experiment, module.EXPERIMENT)

@@ -2,9 +2,9 @@
 
     PYTHONPATH=CHECKOUT python -P against_cases.py CASE
 
-Checkouts back to commit 10a73fe can be measured: what has moved since then is imported by `_first`.  The process prepares the case, does
-its work once to warm up, and again for every line that it reads; each time it prints as JSON the processor time, and counts that show
-whether two checkouts did the same work.
+Checkouts back to commit 10a73fe can be measured: modules that have moved since then are imported by `_first`.  The process prepares
+the case, does its work once to warm up, and again for every line that it reads; each time it prints as JSON the processor time, and
+counts that show whether two checkouts did the same work.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A third of its time each goes to Python (calls, a dictionary, floating point numbers), to NumPy on arrays of a few numbers and to NumPy on
 arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is measured
-here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time: they
-are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.
+here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time, so
+they are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.
 
 For work of several processes at once there is a `Crew`: helper processes that do the same loop.
 """

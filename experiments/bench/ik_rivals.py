@@ -86,8 +86,8 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
     while problem.evaluations < most:
         samples = strategy.ask()
         q = _poses(problem, samples)
-        looks = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
-        costs, good = (np.concatenate(part) for part in zip(*looks, strict=True))
+        parts = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
+        costs, good = (np.concatenate(part) for part in zip(*parts, strict=True))
         if good.any():
             found: Array = q[int(good.argmax())]
             return found

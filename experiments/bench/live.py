@@ -2,8 +2,8 @@
 
 Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are the
 services' own numbers; a tick in hold counts as held and not as an age.  Before and after every run a bare chain of processes that do a
-little each (calibration.py) measures what the machine's scheduling costs: where that is more than on the standard machine, the ages may
-be as many times longer.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
+little each (calibration.py) measures the delay of the machine's own scheduling: where that is longer than on the standard machine, the
+ages may be as many times longer.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
 """
 
 from __future__ import annotations

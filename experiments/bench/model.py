@@ -26,7 +26,7 @@ from experiments.bench.collision_peers import FclPairs, FclTrees
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.scenes import ICUB, MAKERS, MIXED, OBJECTS, PLAIN, Scene, boxes_world, upper_body, upper_body_poses, upper_body_scene
 from experiments.bench.timing import Contestant, cores_text, one_core, rates
-from experiments.bench.verdicts import judged
+from experiments.bench.verdicts import Requirement, judged
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.model.model import Model
@@ -66,30 +66,19 @@ class Settings:
 QUICK = Settings(rounds=5, poses=500, other_poses=200, compared_poses=50)
 
 
-@dataclass(frozen=True, slots=True)
-class RatioRequirement:
+def _ratio_requirement(robot: str, ours: str, objects: int, at_least: float, aim: float | None = None, peer: str = "mujoco") -> Requirement:
     """A bound on a rate of ours as a multiple of a peer's, both of the same round."""
-
-    robot: str
-    ours: str
-    peer: str
-    objects: int
-    least: float
-    aim: float | None = None
-
-    @property
-    def name(self) -> str:
-        """The name in reports."""
-        peer = "python-fcl" if self.peer == PAIRS else self.peer
-        return f"{self.robot}, {self.ours}, {self.objects}: x {peer}"
+    shown = "MuJoCo" if peer == "mujoco" else "python-fcl"
+    table = () if robot == ICUB else ("others", robot)
+    return Requirement(f"{robot}, {ours}, {objects}: x {shown}", (*table, f"times_{peer}", objects, ours), at_least, aim=aim)
 
 
 REQUIREMENTS = (
-    *(RatioRequirement(ICUB, BATCH, MUJOCO, count, 8.0, 12.0) for count in (0, 100, 1000)),
-    *(RatioRequirement(ICUB, CALL, MUJOCO, count, 5.0) for count in (0, 100)),
-    *(RatioRequirement(ICUB, BATCH, PAIRS, count, 100.0) for count in (0, 100)),
+    *(_ratio_requirement(ICUB, BATCH, count, 8.0, 12.0) for count in (0, 100, 1000)),
+    *(_ratio_requirement(ICUB, CALL, count, 5.0) for count in (0, 100)),
+    *(_ratio_requirement(ICUB, BATCH, count, 100.0, peer="python_fcl") for count in (0, 100)),
     *(
-        RatioRequirement(maker.name, ours, MUJOCO, count, least)
+        _ratio_requirement(maker.name, ours, count, least)
         for maker in (MIXED, PLAIN)
         for ours, least in ((BATCH, 4.0), (CALL, 2.0))
         for count in _OBJECT_COUNTS
@@ -149,24 +138,13 @@ def summarized(
         }
 
     others = {name: tables(found) for name, found in measured.items() if name != ICUB}
-    about = {"others": others, "threads": threads, "agreement": [asdict(one) for one in compared]}
-    return {**tables(measured[ICUB]), **about, **_verdict(measured, threads, depth_error, all(one.passed for one in compared))}
-
-
-def _verdict(
-    measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, depth_error: float, agree: bool
-) -> dict[str, Any]:
-    """Return whether the model is as fast beside the peers as required, and finds the same contacts with right depths."""
-    required = [
-        judged(one.name, _ratio(measured[one.robot][one.objects], one.ours, one.peer), at_least=one.least, aim=one.aim)
-        for one in REQUIREMENTS
-        if one.objects in measured[one.robot]
-    ]
+    result = {**tables(measured[ICUB]), "others": others, "threads": threads, "agreement": [asdict(one) for one in compared]}
+    required = [one.judge(result) for one in REQUIREMENTS if one.is_measured(result)]
     if threads is not None:
         required.append(judged("2 threads' gain over 2 processes'", threads["gain"] / threads["processes"], at_least=MIN_THREADS_GAIN))
     required.append(judged("depth errors along the normal, m", depth_error, at_most=DEPTH_TOLERANCE))
-    result = verdicts.verdict(required)
-    return result | {"passed": result["passed"] and agree}
+    verdict = verdicts.verdict(required)
+    return result | verdict | {"passed": verdict["passed"] and all(one.passed for one in compared)}
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:

@@ -1,4 +1,4 @@
-"""The offline plant: how fast it is beside MuJoCo's stepper on the same model, and what a batch of plants gains.
+"""The offline plant: how fast it is beside MuJoCo's stepper on the same model, and the gain of a batch of plants.
 
 One arm goes to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
 """
@@ -115,9 +115,10 @@ class Pace:
     """How fast something ran."""
 
     seconds: float  # processor time of this process
-    plant_seconds: float
+    plant_seconds: float  # of all plants
     ticks: int
     ended: int  # actions or transitions
+    wall_seconds: float = float("nan")
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -135,23 +136,27 @@ class Pace:
 
 
 class Stopwatch:
-    """Sums the processor time and the plant's time that passed while it ran."""
+    """Sums the time that passes for plants, in processor time and on the wall, while it runs."""
 
-    def __init__(self, plant: OfflinePlant) -> None:
-        self._plant = plant
-        self.seconds = self.plant_seconds = 0.0
+    def __init__(self, *plants: OfflinePlant) -> None:
+        self._plants = plants
+        self._seconds = self._wall = self._plant_seconds = 0.0
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Measure what is done in this context."""
-        begin, start = self._plant.time, time.process_time()
+        """Measure the work in this context."""
+        begin, wall, start = self._plant_time(), time.perf_counter(), time.process_time()
         yield
-        self.seconds += time.process_time() - start
-        self.plant_seconds += self._plant.time - begin
+        self._seconds += time.process_time() - start
+        self._wall += time.perf_counter() - wall
+        self._plant_seconds += self._plant_time() - begin
 
     def pace(self, ended: int) -> Pace:
         """Return the pace of so many actions or transitions."""
-        return Pace(self.seconds, self.plant_seconds, round(self.plant_seconds / self._plant.dt), ended)
+        return Pace(self._seconds, self._plant_seconds, round(self._plant_seconds / self._plants[0].dt), ended, self._wall)
+
+    def _plant_time(self) -> float:
+        return sum(plant.time for plant in self._plants)
 
 
 def robot() -> Robot:
@@ -208,20 +213,6 @@ def trajectory_hash(actions: int) -> str:
     return plant.hash
 
 
-@dataclass(frozen=True, slots=True)
-class Spent:
-    """The time that some ticks took."""
-
-    ticks: int
-    processor: float  # s
-    wall: float  # s
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """The rates as the JSON has them."""
-        return {"us_per_tick": 1e6 * self.processor / self.ticks, "ticks_per_second": self.ticks / self.processor}
-
-
 class Batch:
     """Plants of one robot, one arm each, that go to random goals of the lattice; each has a world of its own, as learners have."""
 
@@ -229,11 +220,11 @@ class Batch:
         self.plants = [OfflinePlant(Model(body), SEED + k, Gains.published_2014(), dt=DT, active=LEFT) for k in range(count)]
         self._space, self._rng = Lattice(body, LEFT, LEVELS), np.random.default_rng(SEED)
 
-    def alone(self, actions: int) -> Spent:
+    def alone(self, actions: int) -> Pace:
         """Make that many actions with each plant, one action after the other."""
         return self._timed(actions, lambda goals: [plant.act("left_arm", goal) for plant, goal in zip(self.plants, goals, strict=True)])
 
-    def together(self, actions: int, threads: int = 1) -> Spent:
+    def together(self, actions: int, threads: int = 1) -> Pace:
         """Make that many actions with each plant, all plants at once."""
         return self._timed(actions, lambda goals: self._advance(goals, threads))
 
@@ -242,17 +233,14 @@ class Batch:
             plant.begin("left_arm", goal)
         advance_together(self.plants, threads)
 
-    def _timed(self, actions: int, act: Callable[[Sequence[Any]], object]) -> Spent:
+    def _timed(self, actions: int, act: Callable[[Sequence[Any]], object]) -> Pace:
         states = self._rng.integers(len(self._space), size=(actions, len(self.plants)))
         goals = [[self._space.target(int(state)) for state in row] for row in states]
-        before, wall, processor = self._ticks, time.perf_counter(), time.process_time()
-        for row in goals:
-            act(row)
-        return Spent(self._ticks - before, time.process_time() - processor, time.perf_counter() - wall)
-
-    @property
-    def _ticks(self) -> int:
-        return sum(round(plant.time / plant.dt) for plant in self.plants)
+        watch = Stopwatch(*self.plants)
+        with watch.running():
+            for row in goals:
+                act(row)
+        return watch.pace(states.size)
 
 
 def measure_batch(actions: int, rounds: int) -> dict[str, Any]:
@@ -275,10 +263,15 @@ def measure_batch(actions: int, rounds: int) -> dict[str, Any]:
             for number in range(rounds if len(cores) == 2 else 0):
                 progress.show(0.5 + 0.5 * number / rounds, f"{PLANTS} plants, two threads")
                 walls.append((many.together(actions), shared.together(actions, threads=2)))
-    found = {name: medians([pair[place].numbers for pair in pairs]) for place, name in enumerate(("alone", "together"))}
-    ratio = [together.numbers["ticks_per_second"] / alone.numbers["ticks_per_second"] for alone, together in pairs]
-    gains = [two.ticks / two.wall / (single.ticks / single.wall) for single, two in walls]
+    rates = [[_tick_rates(one) for one in pair] for pair in pairs]
+    found = {name: medians([pair[place] for pair in rates]) for place, name in enumerate(("alone", "together"))}
+    ratio = [together["ticks_per_second"] / alone["ticks_per_second"] for alone, together in rates]
+    gains = [two.ticks / two.wall_seconds / (single.ticks / single.wall_seconds) for single, two in walls]
     return {"plants": PLANTS, **found, "ratio": float(np.median(ratio)), "two_threads": float(np.median(gains)) if gains else None}
+
+
+def _tick_rates(pace: Pace) -> dict[str, float]:
+    return {"us_per_tick": 1e6 * pace.seconds / pace.ticks, "ticks_per_second": pace.ticks / pace.seconds}
 
 
 def batch_text(result: dict[str, Any]) -> str:

@@ -15,17 +15,28 @@ class Requirement:
     """A bound on one number of a benchmark's result; `aim` is printed and decides nothing."""
 
     name: str
-    keys: tuple[str, ...]  # of the result, from the outermost
+    keys: tuple[str | int, ...]  # of the result, from the outermost
     at_least: float | None = None
     at_most: float | None = None
     aim: float | None = None
 
     def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Return name, number, bounds and verdict, as they are in the JSON of the benchmark."""
+        """Return name, number, bounds and verdict, as they are in the JSON of the benchmark; raises KeyError if it was not measured."""
+        return judged(self.name, self._number_in(result), at_least=self.at_least, at_most=self.at_most, aim=self.aim)
+
+    def is_measured(self, result: Mapping[str, Any]) -> bool:
+        """Whether the result has the number."""
+        try:
+            self._number_in(result)
+        except KeyError:
+            return False
+        return True
+
+    def _number_in(self, result: Mapping[str, Any]) -> float:
         found: Any = result
         for key in self.keys:
             found = found[key]
-        return judged(self.name, found, at_least=self.at_least, at_most=self.at_most, aim=self.aim)
+        return float(found)
 
 
 def judged(

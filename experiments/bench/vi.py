@@ -176,7 +176,7 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
 
 
 def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
-    """Return what a curious agent of 81 states and 16 actions knows after so many transitions, and its next observations."""
+    """Return the model that a curious agent of 81 states and 16 actions has after so many transitions, and its next observations."""
     space = arm_space(neighbours=ACTIONS)
     agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
     agent.run(transitions)

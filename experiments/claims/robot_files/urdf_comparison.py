@@ -188,9 +188,9 @@ class UrdfPeer:
             columns[name] = joint.idx_q, joint.nq
             if name not in known and joint.nq == 1:
                 self._neutral[joint.idx_q] = self._model.lowerPositionLimit[joint.idx_q]
-        missing = known - set(columns)
-        if missing:
-            raise PeerFailed(f"Pinocchio: has no joint {sorted(missing)[0]}")
+        absent = known - set(columns)
+        if absent:
+            raise PeerFailed(f"Pinocchio: has no joint {sorted(absent)[0]}")
         return [columns[joint.name] for joint in self._robot.joints]
 
     def _configuration(self, angles: Array) -> Array:

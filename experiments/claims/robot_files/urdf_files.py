@@ -76,7 +76,7 @@ def read_all(path: Path) -> list[FileRecord]:
 
 
 def results(found: Sequence[FileRecord]) -> dict[str, Any]:
-    """Return the sums of each set of files, and what differs."""
+    """Return the sums of each set of files, and the differences."""
     sets = {set_name: [one for one in found if one.name.startswith(f"{set_name}/")] for set_name in dict.fromkeys(map(_set_of, found))}
     table = {set_name: numbers(some) for set_name, some in {**sets, "all": list(found)}.items()}
     whole = table["all"]
