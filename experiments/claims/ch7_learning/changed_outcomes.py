@@ -1,17 +1,16 @@
-"""Change: what does the curious agent do when its actions suddenly end elsewhere?
+"""Change the outcomes of some actions suddenly, and observe how agents with and without forgetting learn the new ones.
 
-Claim: when actions that had always ended in one state suddenly end in another, they become very interesting, their value shoots up, the
-agent tries them out a few times and so mends its model.  Ours: one that forgets old counts should mend it sooner.
-Source: thesis 7.2.6 (there the simulator's instabilities were the cause, and few runs were examined).  Published number: none.
+Claim: when actions that had always ended in one state suddenly end in another, their value shoots up; the agent tries them a few times and
+so corrects its model.  Ours: an agent that forgets old counts should correct it sooner.
+Source: thesis 7.2.6 (where instabilities of the simulator were the cause, and few runs were examined).  Published number: none.
 Run time: 3 minutes on 2 cores.
 
-The left arm on the lattice of rank 3.  After 3000 transitions a ball of 6 cm enters where the hand is in the middle state, or the
-friction of the elbow doubles, from 4 deg/s, with which it arrives, to 8, with which it sticks; 3000 more follow, from home.  With
-friction no action ever seems settled, for the controller goes on asking the motor: actions end after 8 s.  Which actions changed is
-measured by walks through both worlds.  The model's error is that of debiased counts, L1, where they changed; the remaining error, and
-how long half of it takes, are relative to the error at the change itself, before the first transition after it.  Forgetting bounds an
-action's counts, to 1 / (1 - forgetting), and so its reward from below: with 0.8 whatever has most outcomes stays the most interesting
-indefinitely, and a curious agent tries little else.
+The left arm on the lattice of rank 3. After 3000 transitions a ball of 6 cm enters where the hand is in the middle state; or the friction
+of the elbow doubles from 4 deg/s, with which it arrives, to 8, with which it sticks. 3000 more transitions follow, from home. With
+friction no action settles, because the controller continues to drive the motor: actions end after 8 s. Walks through both worlds measure
+which actions changed. The error of the model is the mean L1 error of its debiased counts over the actions that changed, relative to the
+error at the change, before the first transition after it. Forgetting limits an action's counts to 1 / (1 - forgetting), and so keeps its
+reward above a bound: with 0.8 the action with most outcomes keeps the highest reward, and a curious agent tries few others.
 """
 
 from __future__ import annotations
@@ -43,40 +42,53 @@ AGENTS = (("curious", 1.0), ("curious", 0.95), ("curious", 0.8), ("least_tried",
 BEFORE = 3_000  # transitions, and as many after the change
 QUICK = 0.3  # of the transitions
 EVERY = 50  # transitions between two checks of the model
-SOON = 500  # transitions after the change
-RELEARNED = 0.5  # of the error at the change
+SOON = 500  # transitions after the change, in which tries and values are measured
+RELEARNED = 0.5  # share of the error at the change, below which the change is relearned
 RADIUS = 0.06  # m, of the ball that enters where the hand is in the middle of the lattice
 MIDDLE = 40
 STICKY = "l_elbow"
 FRICTION = np.deg2rad(4.0)  # rad/s, before it doubles
-PATIENCE = 8.0  # s, timeout where friction is: a controller that goes on asking a motor that sticks never seems settled
-TRIES, WALK = 4, 9001  # of each action in a walk; its seed, which no run has
-LONGEST_WALK = 3_000  # actions, where not every state can be reached any more
-DIFFERENT, SAME = 1.0, 0.2  # L1 between an action's outcomes before and after
+TIMEOUT = 8.0  # s, of an action with friction: the controller continues to drive a motor that sticks, which never settles
+TRIES, WALK = 4, 9001  # tries of each action in a walk; its seed, which no run has
+MAX_WALK = 3_000  # actions of a walk where not every state can be reached any more
+DIFFERENT, SAME = 1.0, 0.2  # L1 distance between an action's outcomes before and after, from which or up to which it counts as such
 
-VALUE = Claim("thesis 7.2.6", "the value of actions that suddenly end elsewhere shoots up: over that before", "shot up")
-TRIED = Claim("thesis 7.2.6", "the agent becomes interested in them: tries over the mean of all in the next 500", "a few times")
-MENDED = Claim("thesis 7.2.6", "so it improves its model: error (L1) where they changed, at the end over that at the change", "qualitative")
-SOONER = Claim(
-    "aim of this reproduction", "a curious agent that forgets (0.95) relearns sooner: transitions until the error is halved", "sooner"
+VALUE = Claim(
+    "thesis 7.2.6",
+    "the value of actions whose outcome suddenly changes shoots up: highest value soon after over the value before",
+    "shot up",
 )
-FORGETTER = Claim("aim of this reproduction", "so does a least-tried agent that forgets (0.8)", "sooner")
-CLAIMS = (VALUE, TRIED, MENDED, SOONER, FORGETTER)
+TRIED = Claim(
+    "thesis 7.2.6",
+    f"the curious agent tries actions with changed outcomes more often: tries over the mean of all actions in the next {SOON} transitions",
+    "a few times",
+)
+CORRECTED = Claim(
+    "thesis 7.2.6",
+    "the curious agent corrects its model of changed outcomes: L1 error at the end over that at the change",
+    "qualitative",
+)
+_UNTIL = "transitions until the error of changed outcomes is halved"
+SOONER = Claim("aim of this reproduction", f"a curious agent that forgets old counts (factor 0.95) relearns sooner: {_UNTIL}", "sooner")
+FORGETTER = Claim(
+    "aim of this reproduction", f"a least-tried agent that forgets old counts (factor 0.8) relearns sooner: {_UNTIL}", "sooner"
+)
+CLAIMS = (VALUE, TRIED, CORRECTED, SOONER, FORGETTER)
 
 
 def plant_of(change: str, is_after: bool, seed: int) -> OfflinePlant:
-    """The left arm before or after an "object" has entered its space, or the elbow's "friction" has doubled; at home."""
+    """Return the left arm at home, before or after an "object" has entered its space, or the elbow's "friction" has doubled."""
     if change == "object":
         return arm_plant(seed, world=_ball() if is_after else None)
     published = Gains.published_2014()
     friction = np.zeros(len(robot().motors))
     friction[robot().motor_index(STICKY)] = FRICTION * (2.0 if is_after else 1.0)
-    gains = replace(published, settle=replace(published.settle, timeout=PATIENCE))
+    gains = replace(published, settle=replace(published.settle, timeout=TIMEOUT))
     return arm_plant(seed, gains=gains, motors=MotorParameters(friction=tuple(friction.tolist())))
 
 
 def _ball() -> World:
-    """A ball around the palm in the middle state."""
+    """Return a world with a ball around the palm in the middle state."""
     space, q = arm_space(), robot().home.copy()
     q[robot().part(space.part).slice] = space.target(MIDDLE)
     world = World()
@@ -86,22 +98,21 @@ def _ball() -> World:
 
 @cache
 def truths(change: str) -> tuple[Truth, Truth]:
-    """Outcomes before and after, by a walk through each world; the same in every process, which measures them once."""
+    """Measure outcomes before and after the change by a walk through each world; the walks are the same in every process."""
     before, after = (
-        truth_of(arm_space(), walk(arm_space(), partial(plant_of, change, is_after), TRIES, LONGEST_WALK, WALK))
-        for is_after in (False, True)
+        truth_of(arm_space(), walk(arm_space(), partial(plant_of, change, is_after), TRIES, MAX_WALK, WALK)) for is_after in (False, True)
     )
     return before, after
 
 
 def compare(before: Truth, after: Truth) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which actions (S, A) end elsewhere since the change, and which where they did; neither where that is not known."""
+    """Return which actions (S, A) have other outcomes since the change, and which the same; neither where that is not known."""
     difference: Array = np.where(before.tries > 0, l1(before, after), np.nan)
     return np.nan_to_num(difference) >= DIFFERENT, np.nan_to_num(difference, nan=2.0) <= SAME
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every change with every agent; the short version makes a third of the transitions."""
+    """Return every change with every agent; the short version makes a third of the transitions."""
     share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
     return [
         Condition(
@@ -115,13 +126,15 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore before and after the change.
 
-    Transitions (T, 3); at every check of the model error and value of what changed and of what did not, (checks, 4); and the error of
-    what changed at the change, before anything was tried after it.
+    Returns among others `seen`, the transitions (T, 3); `series` (checks, 4), at every check of the model the mean error of changed and of
+    unchanged actions, then their mean values; and `at_change`, the error of changed actions before the first transition after the change.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)
     if not changed.any():
-        raise InvalidValue(f"the change {change!r}: no action that could be tried before and after ends elsewhere; make it larger.")
+        raise InvalidValue(
+            f"the change {change!r}: no action that could be tried before and after has another outcome; make the change larger."
+        )
     agent = CuriousAgent(arm_space(), plant_of(change, False, seed), settings["explorer"], seed, forgetting=settings["forgetting"])
     seen, series = [], []
     for is_after in (False, True):
@@ -144,44 +157,44 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run, see `trial`."""
+    """One run; see `trial`."""
 
     seen: Ints
-    series: Array  # (checks, 4): errors then values, each of what changed and of what did not
-    at_change: float  # error of what changed, before the first transition after the change
+    series: Array  # (checks, 4): errors, then values, each of changed and of unchanged actions
+    at_change: float  # error of changed actions, before the first transition after the change
     changed: NDArray[np.bool_]
     same: NDArray[np.bool_]
 
     @property
     def checks_before(self) -> int:
-        """Checks of the model before the change, as many as after."""
+        """The number of checks before the change, as many as after."""
         return len(self.series) // 2
 
     @property
     def tries(self) -> Array:
-        """How often an action that changed was tried between two checks, over the mean of all actions, (checks,)."""
+        """Tries of changed actions between two checks, over the mean of all actions, (checks,)."""
         tried = self.changed[self.seen[:, 0], self.seen[:, 1]].reshape(len(self.series), -1).mean(axis=1)
         relative: Array = tried * arm_space().state_actions / self.changed.sum()
         return relative
 
     @property
-    def eagerness(self) -> float:
+    def tries_after(self) -> float:
         """The mean of `tries` soon after the change."""
         return float(self.tries[self.checks_before : self.checks_before + SOON // EVERY].mean())
 
     @property
-    def eagerness_before(self) -> float:
-        """The mean of `tries` as long before the change."""
+    def tries_before(self) -> float:
+        """The mean of `tries` in a time of the same length before the change."""
         return float(self.tries[self.checks_before - SOON // EVERY : self.checks_before].mean())
 
     @property
     def value_jump(self) -> float:
-        """The highest value of what changed soon after, over that just before."""
+        """The highest value of changed actions soon after the change, over their value just before."""
         return self._jump(self.checks_before)
 
     @property
     def value_jump_before(self) -> float:
-        """`value_jump` where nothing has changed: over the last transitions before."""
+        """The same in a time of the same length before the change."""
         return self._jump(self.checks_before - SOON // EVERY)
 
     def _jump(self, check: int) -> float:
@@ -190,7 +203,7 @@ class Run:
 
     @property
     def errors(self) -> Array:
-        """L1 where actions changed, after the change, over that at the change; (checks,)."""
+        """The error of changed actions after the change, over that at the change, (checks,)."""
         relative: Array = self.series[self.checks_before :, 0] / self.at_change
         return relative
 
@@ -201,22 +214,22 @@ class Run:
 
     @property
     def relearned(self) -> float:
-        """Transitions after the change until half of that error is gone; infinite if it never is."""
+        """Transitions after the change until the error is halved; infinite if it never is."""
         small = np.flatnonzero(self.errors <= RELEARNED)
         return float(EVERY * (small[0] + 1)) if len(small) else float("inf")
 
     @property
     def relearned_within(self) -> float:
-        """`relearned`, or the transitions that were made after the change, whichever is less."""
+        """The smaller of `relearned` and the number of transitions after the change."""
         return float(min(self.relearned, EVERY * (len(self.series) - self.checks_before)))
 
 
-Runs = Mapping[tuple[str, str, float], list[Run]]  # change, explorer, forgetting
+Runs = Mapping[tuple[str, str, float], list[Run]]  # by change, explorer and forgetting
 
 
 def runs_of(found: Cells) -> Runs:
-    """The finished runs of each condition."""
-    return {key: [_run(result) for result in mine] for key, mine in grouped_by(found, "change", "explorer", "forgetting").items()}
+    """Return the finished runs of each condition."""
+    return {key: [_run(result) for result in results] for key, results in grouped_by(found, "change", "explorer", "forgetting").items()}
 
 
 def _run(result: CellResult) -> Run:
@@ -226,35 +239,39 @@ def _run(result: CellResult) -> Run:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each condition; the claims if all were run in full."""
+    """Return a row for each condition; and the claims with numbers if all were run in full."""
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]
     whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * BEFORE // EVERY
-    rows = {"{}, {}, forgetting {:g}".format(*key): _row(runs[key]) for key in keys if key in runs}
+    rows = {
+        f"{CHANGES[change]}; {_agent(explorer, forgetting)}": _row(runs[change, explorer, forgetting])
+        for change, explorer, forgetting in keys
+        if (change, explorer, forgetting) in runs
+    }
     return {"agents": rows, "claims": [claim.record() for claim in (measured(runs) if whole else CLAIMS)]}
 
 
 def _row(runs: Sequence[Run]) -> dict[str, float]:
     return {
         "seeds": len(runs),
-        "changed_actions": mean_over(runs, lambda run: float(run.changed.sum())),
-        "tries_before": mean_over(runs, lambda run: run.eagerness_before),
-        "tries_after": mean_over(runs, lambda run: run.eagerness),
-        "value_jump": mean_over(runs, lambda run: run.value_jump),
-        "error_left": mean_over(runs, lambda run: run.error_left),
-        "relearned_after": mean_over(runs, lambda run: run.relearned_within),
+        "number_of_changed_actions": mean_over(runs, lambda run: float(run.changed.sum())),
+        "relative_tries_before": mean_over(runs, lambda run: run.tries_before),
+        "relative_tries_after": mean_over(runs, lambda run: run.tries_after),
+        "value_after_over_before": mean_over(runs, lambda run: run.value_jump),
+        "relative_error_at_end": mean_over(runs, lambda run: run.error_left),
+        "transitions_until_error_is_halved": mean_over(runs, lambda run: run.relearned_within),
     }
 
 
 def measured(runs: Runs) -> list[Claim]:
-    """The claims with our numbers, of the runs of all conditions."""
+    """Return the claims with our numbers, from the runs of all conditions."""
     curious, least = ({change: runs[change, explorer, 1.0] for change in CHANGES} for explorer in ("curious", "least_tried"))
-    left = {change: [run.error_left for run in mine] for change, mine in curious.items()}
-    text = ", ".join(f"{change} {estimate(mine)}" for change, mine in left.items())
+    left = {change: [run.error_left for run in group] for change, group in curious.items()}
+    text = ", ".join(f"{CHANGES[change]}: {estimate(errors)}" for change, errors in left.items())
     return [
-        _above(VALUE, curious, curious, lambda run: run.value_jump, lambda run: run.value_jump_before, "{} {}, as long before {}"),
-        _above(TRIED, curious, least, lambda run: run.eagerness, lambda run: run.eagerness, "{}: {}, least tried {}"),
-        MENDED.measured(text, all(interval(mine)[1] <= RELEARNED for mine in left.values())),
+        _above(VALUE, curious, curious, lambda run: run.value_jump, lambda run: run.value_jump_before, "{}: {}, without a change {}"),
+        _above(TRIED, curious, least, lambda run: run.tries_after, lambda run: run.tries_after, "{}: curious {}, least tried {}"),
+        CORRECTED.measured(text, all(interval(errors)[1] <= RELEARNED for errors in left.values())),
         _sooner(SOONER, runs, "curious", 0.95),
         _sooner(FORGETTER, runs, "least_tried", 0.8),
     ]
@@ -265,11 +282,11 @@ Number = Callable[[Run], float]
 
 
 def _above(claim: Claim, ours: ByChange, theirs: ByChange, number: Number, control: Number, text: str) -> Claim:
-    """Whether our number is above 1 and above the control in theirs, by the intervals, with both changes."""
+    """Judge whether a number of our runs is above 1 and above the control in theirs, by the intervals, with both changes."""
     parts, holds = [], True
     for change in CHANGES:
         here, there = [number(run) for run in ours[change]], [control(run) for run in theirs[change]]
-        parts.append(text.format(change, estimate(here), estimate(there)))
+        parts.append(text.format(CHANGES[change], estimate(here), estimate(there)))
         holds = holds and interval(here)[0] > max(1.0, interval(there)[1])
     return claim.measured("; ".join(parts), holds)
 
@@ -278,28 +295,32 @@ def _sooner(claim: Claim, runs: Runs, explorer: str, forgetting: float) -> Claim
     parts, holds = [], True
     for change in CHANGES:
         forgot, kept = runs[change, explorer, forgetting], runs[change, explorer, 1.0]
-        values = [[run.relearned_within for run in mine] for mine in (forgot, kept)]
-        never = [sum(np.isinf(run.relearned) for run in mine) for mine in (forgot, kept)]
-        forgetful, lasting = (f"{estimate(mine, 0)} (not within the run: {count})" for mine, count in zip(values, never, strict=True))
-        parts.append(f"{change}: {forgetful}, without forgetting {lasting}")
+        values = [[run.relearned_within for run in group] for group in (forgot, kept)]
+        never = [sum(np.isinf(run.relearned) for run in group) for group in (forgot, kept)]
+        with_, without = (f"{estimate(group, 0)} ({count} runs not relearned)" for group, count in zip(values, never, strict=True))
+        parts.append(f"{CHANGES[change]}: {with_}, without forgetting {without}")
         holds = holds and interval(values[0])[1] < interval(values[1])[0]
     return claim.measured("; ".join(parts), holds)
 
 
 STYLES = dict(zip(AGENTS, (("C3", "-"), ("C1", "--"), ("C3", ":"), ("C0", "-"), ("C0", ":")), strict=True))
-COLUMNS = ("tries of what changed, over the mean of all", "value of what changed [nats]", "L1 error where it changed")
+COLUMNS = ("relative tries of changed actions", "value of changed actions [nats]", "L1 error of changed actions")
+
+
+def _agent(explorer: str, forgetting: float) -> str:
+    return explorer.replace("_", " ") + ("" if forgetting == 1.0 else f", forgetting {forgetting:g}")
 
 
 def plot(found: Cells) -> Any:
-    """Tries, value and error of what changed, over time: a row a change."""
+    """Draw tries, value and error of changed actions over time: one row per change."""
     runs = runs_of(found)
     changes = [change for change in CHANGES if any(key[0] == change for key in runs)]
     drawing = new_figure(16.0, 4.0 * len(changes))
     for row, change in zip(drawing.subplots(len(changes), 3, squeeze=False), changes, strict=True):
         for (explorer, forgetting), style in STYLES.items():
-            if mine := runs.get((change, explorer, forgetting)):
-                _curves(row, mine, style, f"{explorer.replace('_', ' ')}, forgetting {forgetting:g}")
-        before = next(mine[0].checks_before for key, mine in runs.items() if key[0] == change)
+            if group := runs.get((change, explorer, forgetting)):
+                _curves(row, group, style, _agent(explorer, forgetting))
+        before = next(group[0].checks_before for key, group in runs.items() if key[0] == change)
         for axes, title in zip(row, COLUMNS, strict=True):
             axes.axvline(EVERY * before, color="k", linewidth=0.6)
             axes.set_title(f"{CHANGES[change]}: {title}", fontsize=9)
@@ -316,14 +337,14 @@ def _curves(row: Any, runs: list[Run], style: tuple[str, str], label: str) -> No
 
 
 def _smooth(rate: Array) -> Array:
-    """Means over the last four checks."""
+    """Return means over the last four checks."""
     padded = np.concatenate([np.full(3, rate[0]), rate])
     return np.convolve(padded, np.full(4, 0.25), mode="valid")
 
 
 EXPERIMENT = Experiment(
     name="changed-outcomes",
-    claim="actions that suddenly end elsewhere become interesting, and are tried until the model is right again; sooner with forgetting",
+    claim="actions whose outcome suddenly changes are tried until the model is correct again; sooner with forgetting",
     source="thesis 7.2.6",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

@@ -1,12 +1,12 @@
-"""Chapter 7: all its experiments one after the other, with their figures.
+"""Run all experiments of chapter 7 one after the other, with their figures.
 
-Claim: the thesis' experiments in model learning can be repeated, figures and all, by one command.  Source: thesis chapter 7, paper
+Claim: the thesis' experiments in model learning can be repeated, with all figures, by one command.  Source: thesis chapter 7, paper
 section 3.  Published number: the robot took over two days for the longest of them (7.4).
-Run time: 23 minutes on 2 cores; with --all, which adds what the works promise and our own studies, 45.
+Run time: 23 minutes on 2 cores; with --all, which adds experiments that thesis and paper propose and our own studies, 45.
 
-Every experiment has its own folder in the run's, as if it had been run alone; one that is interrupted goes on where it was, one
-that fails, whatever it raises, does not stop the others, and leaves failed.txt.  With --resume and more --seeds those that have
-results go on too.  Then `mobee experiment claims` reads what was found.
+Every experiment has its own folder in the folder of the run, as if it had been run alone.  An interrupted experiment continues; one that
+fails writes failed.txt and does not stop the others.  With --resume and more --seeds, finished experiments continue too.  Afterwards,
+`mobee experiment claims` reads the results.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _TIMES, _FAILURE = "seconds.json", "failed.txt"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options, of a sweep, for all experiments."""
+    """Add --only, --all, and the options of a sweep, which are passed on to all experiments."""
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join((*CHAPTER7, *BEYOND))}")
     parser.add_argument("--all", action="store_true", help=f"also {', '.join(BEYOND)}")
     parser.add_argument("--seeds", type=positive_whole, metavar="N", help="repetitions (default: each experiment's own)")
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run what has no results yet, and draw it."""
+    """Run the experiments that have no results yet, and draw their figures."""
     every = (*CHAPTER7, *BEYOND)
     names = [current_name(name) for name in arguments.only or (every if arguments.all else CHAPTER7)]
     for name in names:
@@ -58,14 +58,14 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw every part anew; returns the folder, in which each part has its own."""
+    """Draw the figures of all finished experiments again; returns the folder that has a folder for each of them."""
     for results in sorted(folder.glob(f"*/{RESULTS}")):
         load_experiment(read(results.parent / CONFIG)["experiment"]).method.figure(results.parent)
     return folder
 
 
 def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """One experiment in its own folder: how long it took in all, its figure, or why it failed."""
+    """Run one experiment in its own folder; returns its run time, and its figure or the reason why it failed."""
     begun = [folder / one for one in all_names(name) if (folder / one).exists()]  # an older run has it under its former name
     place, start = begun[0] if begun else folder / name, time.monotonic()
     place.mkdir(exist_ok=True)
@@ -81,8 +81,8 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
         (place / _FAILURE).unlink(missing_ok=True)
     except Exception as error:  # of the experiment's own code: it is reported, and the others go on
         (place / _FAILURE).write_text(traceback.format_exc())
-        told = str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"
-        return {"minutes": _spent(place, start), "failed": told}
+        reason = str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"
+        return {"minutes": _spent(place, start), "failed": reason}
     finally:
         spent = _spent(place, start)
         write(place / _TIMES, {"seconds": 60.0 * spent})
@@ -90,7 +90,7 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
 
 
 def _is_finished(place: Path, options: argparse.Namespace) -> bool:
-    """Whether there are results, of as many seeds as are asked for."""
+    """Return whether there are results of at least as many seeds as the options ask for."""
     return (place / RESULTS).exists() and getattr(options, "seeds", 0) <= read(place / CONFIG)["options"].get("seeds", 0)
 
 
@@ -102,13 +102,13 @@ def _drawn(name: str, place: Path) -> str:
 
 
 def _spent(place: Path, start: float) -> float:
-    """Minutes, those of interrupted runs too."""
+    """Return the minutes spent, with those of interrupted runs."""
     before = read(place / _TIMES)["seconds"] if (place / _TIMES).exists() else 0.0
     return float(before + time.monotonic() - start) / 60.0
 
 
 def options_of_part(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
-    """The experiment's own defaults, changed by what was given for all."""
+    """Return the experiment's own default options, changed by those given for all."""
     parser = argparse.ArgumentParser()
     load_experiment(name).method.add_arguments(parser)
     options = parser.parse_args([])

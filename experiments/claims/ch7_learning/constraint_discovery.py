@@ -1,13 +1,13 @@
-"""Lattice: what does the curious agent find out about the shoulder's constraints, and how does its planning show in its tries?
+"""Let the curious agent discover the shoulder's cable constraints on a lattice of 81 states, with different discounts and priors.
 
-Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (50-50) or 2651 (60-40); the states 24, 51
-and 78 are hard to get into because some actions that should lead there fail; the agent's tries of what can be done there dip, the
-less the farther it plans ahead; an agent that expects success (60-40) tries the failing actions most often.
-Source: thesis 7.2.2 to 7.2.5, figs. 7.4, 7.6 and 7.7; 5 runs a setting.  Run time: 1 minute on 2 cores.
+Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (prior 50-50) or 2651 (60-40).  The states 24,
+51 and 78 are hard to enter, because some actions towards them fail.  Actions from these states are tried less often; the difference is
+smaller for agents that plan farther ahead (larger discount).  An agent that expects success (60-40) tries the failing actions most often.
+Source: thesis 7.2.2 to 7.2.5, figs. 7.4, 7.6 and 7.7; 5 runs per setting.  Run time: 1 minute on 2 cores.
 
-The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both initialisations, until
-every state-action was tried 5 times.  A state-action fails when it does not end in its goal state.  Actions are named by source
-and goal state: the numbers of state-actions in the thesis leave their order open.
+The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both priors, until every
+state-action was tried 5 times.  A state-action fails when it does not end in its goal state.  Actions are written as source->goal, because
+the thesis numbers the state-actions without saying in which order.
 """
 
 from __future__ import annotations
@@ -44,35 +44,52 @@ from mobee.arrays import Array, Ints
 
 DISCOUNTS = (0.5, 0.9, 0.99)
 INITIAL = ("50-50", "60-40")
-LEAST = 5  # tries
-MOST = 20_000  # transitions, should an action be beyond reach
-PUBLISHED = {"50-50": 2987, "60-40": 2651}
+MIN_TRIES = 5  # of each action, after which a run ends
+MAX_TRANSITIONS = 20_000  # of a run in which an action is never possible
+PUBLISHED = {"50-50": 2987, "60-40": 2651}  # actions until each was tried 5 times
 TOLERANCE = 0.1  # of a published number of actions
-HARD = (24, 51, 78)  # the thesis' states that are hard to get into: pitch low, roll and yaw high, any elbow
+HARD = (24, 51, 78)  # the thesis' states that are hard to enter: pitch low, roll and yaw high, any elbow
 FAILING = ((15, 24), (42, 51), (69, 78))  # (source, goal), in red in fig. 7.4
 ENTERING = ((21, 24), (48, 51), (75, 78))  # actions into the same states that succeed
 
 NUMBERS = {
     initial: Claim(
-        f"thesis 7.2.2, fig. {figure}", f"{initial}: every state-action tried 5 times after so many actions, within 10 %", f"{actions}"
+        f"thesis 7.2.2, fig. {figure}",
+        f"prior {initial}: number of actions until every state-action was tried 5 times, within 10 %",
+        f"{actions}",
     )
     for (initial, actions), figure in zip(PUBLISHED.items(), ("7.6", "7.7"), strict=True)
 }
-SOONER = Claim("thesis 7.2.2, figs. 7.6, 7.7", "60-40 takes fewer actions than 50-50: their ratio", "0.89 (2651 / 2987)")
-LEAST_VISITED = Claim("thesis 7.2.5", "the least visited states are 24, 51 and 78", "those three")
-FAIL = Claim("thesis 7.2.5, fig. 7.4", "the actions 15->24, 42->51 and 69->78 fail: share of failures", "infeasible")
-ENTER = Claim("thesis 7.2.5", "other actions into the same states, as 21->24, succeed", "succeed")
+SOONER = Claim(
+    "thesis 7.2.2, figs. 7.6, 7.7",
+    "with the prior 60-40 fewer actions are needed until each was tried 5 times than with 50-50: their ratio",
+    "0.89 (2651 / 2987)",
+)
+LEAST_VISITED = Claim("thesis 7.2.5", "the least visited of the 81 states are 24, 51 and 78", "those three")
+FAIL = Claim(
+    "thesis 7.2.5, fig. 7.4", "the actions 15->24, 42->51 and 69->78 (from state -> to state) fail: share of failures", "infeasible"
+)
+ENTER = Claim("thesis 7.2.5", "other actions into the states 24, 51 and 78 succeed: share of failures", "succeed")
 SPIKES = Claim(
-    "thesis 7.2.5, fig. 7.6", "50-50: the actions that do enter them are tried more than others, the more the larger the discount", "spikes"
+    "thesis 7.2.5, fig. 7.6",
+    "prior 50-50: the actions that succeed in entering 24, 51 and 78 are tried more often than the average action, and more so with a "
+    "larger discount",
+    "spikes",
 )
 DIPS = Claim(
-    "thesis 7.2.5, fig. 7.6", "50-50: tries of actions from 24, 51, 78 are below the average, the less the larger the discount", "dips"
+    "thesis 7.2.5, fig. 7.6",
+    "prior 50-50: actions from 24, 51 and 78 are tried less often than the average action, and less so with a larger discount",
+    "dips",
 )
 PEAKS = Claim(
-    "thesis 7.2.5, fig. 7.7", "60-40: the failing actions into 24, 51, 78 stand out in tries at every discount", "peaks at 80, 230, 378"
+    "thesis 7.2.5, fig. 7.7",
+    "prior 60-40: the failing actions into 24, 51 and 78 are tried more often than the average action, at every discount",
+    "peaks at 80, 230, 378",
 )
-DEGREE = Claim("thesis 7.2.3", "states are visited the more often the more actions lead into them", "qualitative")
-UNIFORM = Claim("thesis 7.2.4", "tries over state-actions are fairly uniform, more so than visits over states", "qualitative")
+DEGREE = Claim(
+    "thesis 7.2.3", "states into which more actions lead are visited more often: correlation of visits and number of actions", "qualitative"
+)
+UNIFORM = Claim("thesis 7.2.4", "tries of state-actions are fairly uniform, more so than visits of states", "qualitative")
 STOCHASTIC = Claim(
     "thesis 7.2.5", "static constraints make outcomes uncertain: some actions sometimes fail and sometimes succeed", "qualitative"
 )
@@ -82,8 +99,8 @@ Action = tuple[int, int]  # source and goal state
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every initialisation and discount; the short version tries everything once."""
-    least, name = (1, "quick-") if arguments.quick else (LEAST, "")
+    """Return every prior and discount; the short version tries every action once."""
+    least, name = (1, "quick-") if arguments.quick else (MIN_TRIES, "")
     return [
         Condition(f"{name}{initial}-g{discount:g}", {"initial": initial, "discount": discount, "least": least})
         for initial, discount in product(INITIAL, DISCOUNTS)
@@ -91,11 +108,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until everything was tried often enough; transitions (T, 3), tries and values (81, 8) at the end."""
+    """Explore until every action was tried often enough; returns transitions (T, 3), tries and values (81, 8) at the end."""
     space, plant = arm_space(), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"], initial=settings["initial"])
-    seen = explore(agent, MOST, LeastTries(settings["least"], space.state_actions))
+    seen = explore(agent, MAX_TRANSITIONS, LeastTries(settings["least"], space.state_actions))
     return {
         "seen": seen.astype(np.uint16),
         "tries": agent.model.tries.astype(np.uint16),
@@ -129,25 +146,25 @@ class Run:
 
     @property
     def exists(self) -> NDArray[np.bool_]:
-        """Which entries of (81, 8) are state-actions."""
+        """The entries of (81, 8) that are state-actions."""
         return exists_in(self.space)
 
     @property
     def hard_visits(self) -> float:
-        """Visits of the hard states over those of all, means."""
+        """Mean visits of the hard states over those of all states."""
         return float(self.visits[list(HARD)].mean() / self.visits.mean())
 
     def share_failed(self, actions: Sequence[Action]) -> float:
-        """The share of failures in all tries of these actions."""
+        """Return the share of failures in all tries of these actions."""
         at = tuple(np.array([self.index(action) for action in actions]).T)
         return float(self.failures[at].sum() / self.tries[at].sum())
 
     def relative_tries(self, actions: Sequence[Action]) -> float:
-        """Tries of these actions over those of all, means."""
+        """Return the mean tries of these actions over those of all actions."""
         return float(np.mean([self.tries[self.index(action)] for action in actions]) / self.tries[self.exists].mean())
 
     def index(self, action: Action) -> tuple[int, int]:
-        """Row and column of an action in (81, 8)."""
+        """Return row and column of an action in (81, 8)."""
         return action[0], int(np.flatnonzero(self.space.actions(action[0]) == action[1])[0])
 
     @property
@@ -156,11 +173,11 @@ class Run:
         return [(state, int(goal)) for state in HARD for goal in self.space.actions(state)]
 
 
-Groups = Mapping[tuple[str, float], list[Run]]  # initialisation and discount
+Groups = Mapping[tuple[str, float], list[Run]]  # by prior and discount
 
 
 def groups(found: Cells) -> Groups:
-    """The runs of each setting, by seed."""
+    """Return the runs of each setting, by seed."""
     space = arm_space()
     return {
         key: [Run(space, *(result.values[name] for name in ("seen", "tries", "values"))) for result in results]
@@ -169,7 +186,7 @@ def groups(found: Cells) -> Groups:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each setting, and the claims if all settings were run."""
+    """Return a row for each setting, and the claims if all settings were run."""
     grouped = groups(found)
     rows = {f"{initial}, discount {discount:g}": _row(runs) for (initial, discount), runs in grouped.items()}
     complete = all(setting in grouped for setting in product(INITIAL, DISCOUNTS))
@@ -183,18 +200,18 @@ def _row(runs: list[Run]) -> dict[str, Any]:
         "actions": mean_over(runs, lambda run: run.transitions),
         "low": low,
         "high": high,
-        "hard_visits": mean_over(runs, lambda run: run.hard_visits),
-        "hard_tries": mean_over(runs, lambda run: run.relative_tries(run.out_of_hard)),
-        "failing_tries": mean_over(runs, lambda run: run.relative_tries(FAILING)),
-        "entering_tries": mean_over(runs, lambda run: run.relative_tries(ENTERING)),
-        "failing_fail": mean_over(runs, lambda run: run.share_failed(FAILING)),
-        "entering_fail": mean_over(runs, lambda run: run.share_failed(ENTERING)),
-        "value": mean_over(runs, lambda run: float(run.values[run.exists].mean())),
+        "relative_visits_of_24_51_78": mean_over(runs, lambda run: run.hard_visits),
+        "relative_tries_from_24_51_78": mean_over(runs, lambda run: run.relative_tries(run.out_of_hard)),
+        "relative_tries_of_failing_actions": mean_over(runs, lambda run: run.relative_tries(FAILING)),
+        "relative_tries_of_entering_actions": mean_over(runs, lambda run: run.relative_tries(ENTERING)),
+        "failing_actions_fail": mean_over(runs, lambda run: run.share_failed(FAILING)),
+        "entering_actions_fail": mean_over(runs, lambda run: run.share_failed(ENTERING)),
+        "mean_value": mean_over(runs, lambda run: float(run.values[run.exists].mean())),
     }
 
 
 def measured(grouped: Groups) -> list[Claim]:
-    """The claims with our numbers, of the runs of all settings."""
+    """Return the claims with our numbers, from the runs of all settings."""
     every = [run for runs in grouped.values() for run in runs]
     return [
         *(_number(grouped, initial) for initial in INITIAL),
@@ -216,12 +233,12 @@ def _actions(grouped: Groups, initial: str) -> list[float]:
 
 
 def _by_discounts(values: Mapping[float, list[float]], digits: int = 2) -> list[str]:
-    return [f"{estimate(mine, digits)} at discount {discount:g}" for discount, mine in values.items()]
+    return [f"{estimate(numbers, digits)} at discount {discount:g}" for discount, numbers in values.items()]
 
 
 def _number(grouped: Groups, initial: str) -> Claim:
     actions = {discount: [run.transitions for run in grouped[initial, discount]] for discount in DISCOUNTS}
-    strata = [discount for discount, mine in actions.items() for _ in mine]
+    strata = [discount for discount, counts in actions.items() for _ in counts]
     span = interval(_actions(grouped, initial), strata=strata)
     least, most = PUBLISHED[initial] * (1.0 - TOLERANCE), PUBLISHED[initial] * (1.0 + TOLERANCE)
     return NUMBERS[initial].measured("; ".join(_by_discounts(actions, 0)), decides(span, least, most))
@@ -235,34 +252,34 @@ def _least_visited(every: list[Run]) -> Claim:
     hits = [len(set(np.argsort(run.visits, kind="stable")[:3].tolist()) & set(HARD)) for run in every]
     together = np.argsort(sum(run.visits for run in every), kind="stable")[:3].tolist()
     text = (
-        f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a run; "
-        f"visits over the mean of all states {estimate([run.hard_visits for run in every])}"
+        f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a single run; "
+        f"their visits over the mean of all states: {estimate([run.hard_visits for run in every])}"
     )
     return LEAST_VISITED.measured(text, set(together) == set(HARD))
 
 
 def _share(claim: Claim, every: list[Run], actions: Sequence[Action], holds: Callable[[float, float], bool]) -> Claim:
-    """Whether the share of failures of each action holds, by its interval."""
+    """Judge the share of failures of each action by its interval."""
     shares = {action: [run.share_failed([action]) for run in every] for action in actions}
-    text = ", ".join(f"{source}->{goal} {estimate(mine)}" for (source, goal), mine in shares.items())
-    return claim.measured(f"fail {text}", all(holds(*interval(mine)) for mine in shares.values()))
+    text = ", ".join(f"{source}->{goal}: {estimate(values)}" for (source, goal), values in shares.items())
+    return claim.measured(text, all(holds(*interval(values)) for values in shares.values()))
 
 
 def _by_discount(claim: Claim, grouped: Groups, number: Callable[[Run], float], stands_out: Callable[[float, float], bool]) -> Claim:
-    """Whether the tries stand out at the smallest discount, and grow from each discount to the next; open where the ends do not differ."""
+    """Judge whether tries stand out at the smallest discount, and grow with the discount; open where the ends do not differ."""
     values = {discount: [number(run) for run in grouped["50-50", discount]] for discount in DISCOUNTS}
     first, *_, last = values.values()
-    means = [interquartile_mean(mine) for mine in values.values()]
+    means = [interquartile_mean(numbers) for numbers in values.values()]
     holds = stands_out(*interval(first)) and means == sorted(means)
     grows = decides(ratio_interval(last, first), least=1.0)
-    return claim.measured("tries over the mean of all: " + ", ".join(_by_discounts(values)), grows if holds else False)
+    return claim.measured("tries over the mean of all actions: " + ", ".join(_by_discounts(values)), grows if holds else False)
 
 
 def _peaks(grouped: Groups) -> Claim:
     values = {discount: [run.relative_tries(FAILING) for run in grouped["60-40", discount]] for discount in DISCOUNTS}
     even = [run.relative_tries(FAILING) for discount in DISCOUNTS for run in grouped["50-50", discount]]
-    text = "tries over the mean of all: " + ", ".join(_by_discounts(values)) + f"; 50-50: {estimate(even)}"
-    return PEAKS.measured(text, all(interval(mine)[0] > 1.0 for mine in values.values()))
+    text = "tries over the mean of all actions: " + ", ".join(_by_discounts(values)) + f"; prior 50-50: {estimate(even)}"
+    return PEAKS.measured(text, all(interval(numbers)[0] > 1.0 for numbers in values.values()))
 
 
 def _degree(every: list[Run]) -> Claim:
@@ -280,12 +297,12 @@ def _uniform(every: list[Run]) -> Claim:
 
 def _stochastic(every: list[Run]) -> Claim:
     counts = [float(uncertain_in(run.space, run.seen)) for run in every]
-    text = f"{estimate(counts, 1)} of 432 actions a run fail in 10 to 90 % of their tries"
+    text = f"{estimate(counts, 1)} of 432 actions per run fail in 10 to 90 % of their tries"
     return STOCHASTIC.measured(text, interval(counts)[0] >= 1.0)
 
 
 def plot(found: Cells) -> Any:
-    """Tries and values of every state-action, as in figs. 7.6 and 7.7: a row an initialisation and discount, a colour a run."""
+    """Draw tries and values of every state-action as in figs. 7.6 and 7.7: one row per prior and discount, one colour per run."""
     grouped = groups(found)
     drawing = new_figure(15.0, 2.3 * len(grouped))
     for row, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):
@@ -295,18 +312,18 @@ def plot(found: Cells) -> Any:
         _bars(row[1], runs, [np.maximum(run.values, 0.0) for run in runs])
         row[1].set_title(f"values, {initial}, discount {discount:g}", fontsize=9)
     for axes in row:
-        axes.set_xlabel("state-action; grey: those of states 24, 51, 78; triangles: the failing 15->24, 42->51, 69->78")
+        axes.set_xlabel("state-action; grey: from states 24, 51, 78; triangles: the failing 15->24, 42->51, 69->78")
     return drawing
 
 
 def _bars(axes: Any, runs: list[Run], given: Sequence[Any]) -> None:
-    """A bar for each state-action, by source state, with the hard states and the failing actions marked."""
+    """Draw a bar for each state-action, by source state, and mark the hard states and the failing actions."""
     exists = runs[0].exists
     number = np.cumsum(exists.ravel()).reshape(exists.shape) - 1
     heights = draw_stacked_bars(axes, [values[exists].astype(float) for values in given])
     for state in HARD:
-        mine = number[state][exists[state]]
-        axes.axvspan(mine[0] - 0.5, mine[-1] + 0.5, color="0.8", zorder=0)
+        actions = number[state][exists[state]]
+        axes.axvspan(actions[0] - 0.5, actions[-1] + 0.5, color="0.8", zorder=0)
     at = [number[runs[0].index(action)] for action in FAILING]
     axes.plot(at, heights[at] + 0.04 * heights.max(), "kv", markersize=4)
     axes.set_xlim(-0.5, len(heights) - 0.5)
@@ -314,8 +331,8 @@ def _bars(axes: Any, runs: list[Run], given: Sequence[Any]) -> None:
 
 EXPERIMENT = Experiment(
     name="constraint-discovery",
-    claim="81 states: three are hard to enter, since actions into them fail; who looks farther ahead minds less, "
-    "who expects success goes there",
+    claim="three of 81 states are hard to enter, because actions into them fail; agents that plan farther ahead or expect success "
+    "try more there",
     source="thesis 7.2.2-7.2.5",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

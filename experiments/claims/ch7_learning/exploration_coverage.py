@@ -1,14 +1,16 @@
-"""Coverage: how soon has an agent tried everything that it can do?
+"""Measure after how many transitions an explorer has tried every state-action.
 
-Claim: the curious agent (AC) has tried all state-actions in about half the time of the agent that takes the action least tried
-(LT), the random one (RAND) is far behind; early on AC and LT try only what is new.  Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
+Claim: the curious agent (AC in the paper) has tried all state-actions in about half the time of the agent that takes the action least
+tried (LT); the random agent (RAND) needs far longer.  At first, AC and LT try only new actions.
+Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
 Published number: AC/LT about 1/2, on the lattice of 81 states and their 16 nearest neighbours.
 Run time: 2 minutes on 2 cores.
 
-The left arm, with its cable constraints and self-contacts and without both (free), on the published graph and on that of the
-equidistant neighbours; ties among the 16 nearest are drawn anew for every seed, the same for all explorers.  Floor: the fewest
-actions that try every action if all succeed (the open Chinese postman's walk).  A run ends unfinished after 20 000 transitions.
-Beside the published explorers: the path to the nearest untried action, and curiosity that depletes along its own plan.
+The left arm, with its cable constraints and self-contacts ("constrained") and without both ("free"), on the published graph of the 16
+nearest neighbours and on that of the equidistant neighbours; ties among the 16 nearest are drawn anew for every seed, the same for all
+explorers.  The shortest walk has the fewest actions that try every action if all succeed (the open Chinese postman's walk).  A run stops
+after 20 000 transitions.  Besides the published explorers there are two of ours: the one that goes to the nearest untried action
+("nearest untried"), and curiosity whose rewards are used up along its own plan ("depleting").
 """
 
 from __future__ import annotations
@@ -55,34 +57,50 @@ LABELS = {
 EXPLORED_BY = tuple(name for name in LABELS if name in EXPLORERS)
 GRAPHS: dict[str, Neighbours] = {"nearest": ARM_NEIGHBOURS, "equidistant": "equidistant"}
 WORLDS = ("constrained", "free")
-MOST = 20_000  # transitions: half of the random walks against constraints take longer
-COST = {"random": 30.0, "least_tried": 5.0}
+MAX_TRANSITIONS = 20_000  # half of the random walks in the constrained world need more
+COST = {"random": 30.0, "least_tried": 5.0}  # relative computing time of a run; 1 for the other explorers
 EARLY = 220  # transitions, before which the published figure shows no difference in actions
 ABOUT_HALF = (0.4, 0.6)
-FLOORS = {"free": 1.05, "constrained": 1.08}  # times the postman's walk
-SLACK = 0.01  # of nearest-untried
+FLOORS = {"free": 1.05, "constrained": 1.08}  # our aims: transitions over those of the shortest walk
+SLACK = 0.01  # share by which "depleting" may need more transitions than "nearest untried"
 
 _WHERE = "paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5"
 RATIO = {
-    world: Claim(_WHERE, f"AC has tried every action in about half the time of LT ({text})", "about 1/2")
-    for world, text in (("constrained", "16 nearest, cable rows and self-contacts"), ("free", "16 nearest, nothing in the way"))
+    world: Claim(
+        _WHERE, f"the curious agent has tried every action in about half the transitions of the least-tried agent ({text})", "about 1/2"
+    )
+    for world, text in (("constrained", "arm with cable constraints and self-contacts"), ("free", "arm without constraints and contacts"))
 }
-BEST = Claim(_WHERE, "AC produces, by far, the best explorer of AC, LT and RAND", "figure only")
-NOVEL = Claim(_WHERE, "early on AC and LT try only novel actions, RAND repeats", "up to about 220 transitions")
-AGGRESSIVE = Claim(_WHERE, f"before {EARLY} transitions AC visits novel states more aggressively than LT", "figure only")
+BEST = Claim(_WHERE, "the curious agent tries every action far sooner than the least-tried and the random agent", "figure only")
+NOVEL = Claim(
+    _WHERE,
+    f"in the first {EARLY} transitions the curious and the least-tried agent try only new actions; the random agent repeats actions",
+    "up to about 220 transitions",
+)
+AGGRESSIVE = Claim(
+    _WHERE, f"in the first {EARLY} transitions the curious agent visits more new states than the least-tried agent", "figure only"
+)
 FLOOR = {
-    world: Claim("aim of this reproduction", f"AC needs at most {most} x the Chinese postman's walk ({world})", f"at most {most}")
+    world: Claim(
+        "aim of this reproduction",
+        f"to try every action the curious agent needs at most {most} times the transitions of the shortest possible walk ({world} arm)",
+        f"at most {most}",
+    )
     for world, most in FLOORS.items()
 }
-DEPLETES = Claim("aim of this reproduction", "curiosity that depletes along its plan covers no worse than nearest-untried", "at most 1.01")
+DEPLETES = Claim(
+    "aim of this reproduction",
+    "curiosity that uses up rewards along its plan needs no more transitions than going to the nearest untried action: their ratio",
+    "at most 1.01",
+)
 CLAIMS = (*RATIO.values(), BEST, NOVEL, AGGRESSIVE, *FLOOR.values(), DEPLETES)
 
-Runs = Sequence[Mapping[str, Any]]  # the values of the seeds of a condition
-Published = Mapping[tuple[str, str], Runs]  # of the published graph, by world and explorer
+Runs = Sequence[Mapping[str, Any]]  # values by seed, of one condition
+Published = Mapping[tuple[str, str], Runs]  # runs on the published graph, by world and explorer
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every explorer on every graph in both worlds; the short version has the equidistant graph only."""
+    """Return every explorer on every graph in both worlds; the short version has only the equidistant graph."""
     return [
         Condition(
             f"{graph}-{world}-{explorer}",
@@ -94,16 +112,19 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until everything was tried; `new_actions`, `new_states`: the transitions, from 1, that tried or reached something new."""
+    """Explore until every action was tried.
+
+    Returns among others `new_actions` and `new_states`, the transitions, counted from 1, that tried a new action or reached a new state.
+    """
     space = arm_space(neighbours=GRAPHS[settings["graph"]], tie_seed=seed)
     plant = arm_plant(seed, free=settings["world"] == "free")
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)
     start = agent.state
-    seen = explore(agent, MOST, LeastTries(1, space.state_actions))
+    seen = explore(agent, MAX_TRANSITIONS, LeastTries(1, space.state_actions))
     return {
         "state_actions": space.state_actions,
-        "floor": postman_floor(space.goals),
+        "floor": shortest_walk(space.goals),
         "new_actions": first_tries(space, seen),
         "new_states": first_places([start, *seen[:, 2]]),
         "transitions": len(seen),
@@ -112,12 +133,12 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def postman_floor(goals: Ints) -> int:
-    """The length of the shortest walk over every action of a graph, from any state to any, if all actions succeed.
+def shortest_walk(goals: Ints) -> int:
+    """Return the length of the shortest walk over every action of a graph, between any two states, if all actions succeed.
 
-    Where more actions lead into a state than out of it, the walk has to leave it again along actions it has taken before: it takes
-    shortest paths to states with the opposite lack.  A minimal assignment pairs them; one pair may stay apart, the walk's ends.
-    This is the open directed Chinese postman's walk.
+    Where more actions lead into a state than out of it, the walk has to leave it along actions that it has taken before: it takes a
+    shortest path to a state that more actions leave than enter.  A minimal assignment pairs these states; one pair may stay unconnected,
+    the walk's ends.  This is the open directed Chinese postman's walk.
 
     `goals`: (S, A), -1 where there is no action.  Raises InvalidValue unless every state can be reached from every other.
     """
@@ -141,12 +162,12 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
 
 
 def groups(found: Cells) -> dict[tuple[str, str, str], Runs]:
-    """The values of the runs of each graph, world and explorer."""
+    """Return the values of the runs of each graph, world and explorer."""
     return {key: [result.values for result in results] for key, results in grouped_by(found, "graph", "world", "explorer").items()}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each condition, and the claims about the published graph."""
+    """Return a row for each condition, and the claims about the published graph."""
     grouped = groups(found)
     results: dict[str, Any] = {"runs": {" ".join(key): _row(runs) for key, runs in sorted(grouped.items())}}
     published = {key[1:]: runs for key, runs in grouped.items() if key[0] == "nearest"}
@@ -156,24 +177,24 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def covered(runs: Runs) -> Array:
-    """Transitions until everything was tried, one a seed; those that were made, if it never was."""
+    """Return the transitions until every action was tried, by seed; all transitions of a run that ended before."""
     return np.array([run["transitions"] for run in runs], dtype=np.float64)
 
 
 def unfinished(runs: Runs) -> int:
-    """How many runs ended before everything was tried."""
+    """Return the number of runs that ended before every action was tried."""
     return sum(len(run["new_actions"]) < run["state_actions"] for run in runs)
 
 
 def first_repeat(run: Mapping[str, Any]) -> int:
-    """The first transition whose action had been tried before, counted from 1."""
+    """Return the first transition whose action had been tried before, counted from 1."""
     new = run["new_actions"]
     gaps = np.flatnonzero(new != np.arange(1, len(new) + 1))
     return int(gaps[0]) + 1 if len(gaps) else len(new) + 1
 
 
 def states_seen(run: Mapping[str, Any], transitions: int) -> int:
-    """How many states had been visited after so many transitions."""
+    """Return the number of states that were visited in the first `transitions`."""
     return int((run["new_states"] <= transitions).sum())
 
 
@@ -185,15 +206,15 @@ def _row(runs: Runs) -> dict[str, Any]:
         "transitions": round(mean_over(runs, lambda run: run["transitions"])),
         "low": round(low),
         "high": round(high),
-        "times_the_floor": mean_over(runs, lambda run: run["transitions"] / run["floor"]),
+        "over_shortest_walk": mean_over(runs, lambda run: run["transitions"] / run["floor"]),
         "first_repeat": mean_over(runs, first_repeat),
-        f"states_at_{EARLY}": mean_over(runs, lambda run: states_seen(run, EARLY)),
-        "failed": mean_over(runs, lambda run: run["failed"]),
+        f"states_seen_after_{EARLY}": mean_over(runs, lambda run: states_seen(run, EARLY)),
+        "share_of_failed_actions": mean_over(runs, lambda run: run["failed"]),
     }
 
 
 def measured(published: Published) -> list[Claim]:
-    """The claims with our numbers, of the runs on the published graph."""
+    """Return the claims with our numbers, from the runs on the published graph."""
     times = {key: covered(runs) for key, runs in published.items()}
     return [
         *(_half(claim, times[world, "curious"], times[world, "least_tried"]) for world, claim in RATIO.items()),
@@ -217,19 +238,20 @@ def _best(times: Mapping[tuple[str, str], Array], unfinished_random: int) -> Cla
     )
     by_random = ratio(times["constrained", "curious"], times["constrained", "random"])
     bound = "at most " if unfinished_random else ""
-    return BEST.measured(f"probability that AC is sooner at least {worst:.2f}; AC/RAND {bound}{by_random:.2f}", worst > 0.95)
+    text = f"probability that a curious run is sooner: at least {worst:.2f}; transitions over the random agent's: {bound}{by_random:.2f}"
+    return BEST.measured(text, worst > 0.95)
 
 
 def _novel(published: Published) -> Claim:
     repeats = {name: [first_repeat(run) for run in published["constrained", name]] for name in ("curious", "least_tried", "random")}
     holds = all(interval(repeats[name])[0] >= EARLY for name in ("curious", "least_tried")) and interval(repeats["random"])[1] < EARLY
-    text = ", ".join(f"{label} {estimate(mine, 0)}" for label, mine in zip(("AC", "LT", "RAND"), repeats.values(), strict=True))
-    return NOVEL.measured(f"first repeat at {text} transitions", holds)
+    text = ", ".join(f"{name.replace('_', ' ')} {estimate(firsts, 0)}" for name, firsts in repeats.items())
+    return NOVEL.measured(f"transition of the first repeated action: {text}", holds)
 
 
 def _aggressive(published: Published) -> Claim:
     curious, least = ([states_seen(run, EARLY) for run in published["constrained", name]] for name in ("curious", "least_tried"))
-    text = f"states of 81 seen at {EARLY}: AC {estimate(curious, 1)}, LT {estimate(least, 1)}"
+    text = f"of 81 states visited: curious {estimate(curious, 1)}, least tried {estimate(least, 1)}"
     return AGGRESSIVE.measured(text, interval(curious)[0] > interval(least)[1])
 
 
@@ -239,7 +261,7 @@ def _near_floor(claim: Claim, runs: Runs, most: float) -> Claim:
 
 
 def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
-    """Open where an interval does not decide, or a world was not run."""
+    """Compare the two explorers in both worlds; open where an interval does not decide, or a world was not run."""
     pairs = [(times.get((world, "depleting")), times.get((world, "nearest_untried"))) for world in FLOORS]
     parts, each = [], []
     for world, (ours, theirs) in zip(FLOORS, pairs, strict=True):
@@ -252,11 +274,11 @@ def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
 
 COLORS = dict(zip(LABELS, ("tab:red", "tab:blue", "0.5", "tab:green", "tab:purple"), strict=True))
 TITLES = {"nearest": "16 nearest neighbours", "equidistant": "equidistant neighbours"}
-LEAST_DETOUR = 1e-3  # that is drawn
+MIN_DETOUR = 1e-3  # that is drawn
 
 
 def plot(found: Cells) -> Any:
-    """Untried state-actions against transitions, as in fig. 4: a row a graph; constrained, free, early states, and each run's detour."""
+    """Draw untried state-actions over transitions (fig. 4), states seen early, and each run's detour: one row per graph."""
     grouped = groups(found)
     graphs = [graph for graph in TITLES if any(key[0] == graph for key in grouped)]
     drawing = new_figure(16.0, 3.8 * len(graphs))
@@ -265,14 +287,14 @@ def plot(found: Cells) -> Any:
             _untried(axes, {key[2]: runs for key, runs in grouped.items() if key[:2] == (graph, world)})
             axes.set_title(f"{TITLES[graph]}, {world}", fontsize=10)
         _states(row[2], {key[2]: runs for key, runs in grouped.items() if key[:2] == (graph, "constrained")})
-        row[2].set_title("states seen early, constrained", fontsize=10)
+        row[2].set_title("states visited at first, constrained", fontsize=10)
         _detours(row[3], {key[1:]: runs for key, runs in grouped.items() if key[0] == graph})
         row[0].legend(fontsize=7)
     return drawing
 
 
 def _untried(axes: Any, mine: Mapping[str, Runs]) -> None:
-    """Median and range over the seeds; the time axis ends a little behind LT, RAND runs out of it."""
+    """Draw median and range over the seeds; the axis ends shortly after the least-tried agent, before the random one."""
     ends = [covered(mine[name]) for name in ("least_tried", "curious") if name in mine]
     last = 1.15 * max((float(end.max()) for end in ends), default=1000.0)
     times = np.linspace(0.0, last, 600)
@@ -281,7 +303,7 @@ def _untried(axes: Any, mine: Mapping[str, Runs]) -> None:
         axes.plot(times, np.median(left, axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
         axes.fill_between(times, left.min(axis=0), left.max(axis=0), color=COLORS[name], alpha=0.15, linewidth=0.0)
     floor = np.median([run["floor"] for runs in mine.values() for run in runs])
-    axes.axvline(floor, color="k", linestyle=":", linewidth=0.8, label="the postman's walk")
+    axes.axvline(floor, color="k", linestyle=":", linewidth=0.8, label="shortest walk")
     axes.set(xlabel="transitions", ylabel="state-actions never tried", xlim=(0.0, last), ylim=(0.0, None))
     axes.grid(alpha=0.2)
 
@@ -292,30 +314,30 @@ def _states(axes: Any, mine: Mapping[str, Runs]) -> None:
         seen = np.array([np.searchsorted(run["new_states"], times, side="right") for run in mine[name]])
         axes.plot(times, seen.mean(axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
     axes.axvline(EARLY, color="k", linestyle=":", linewidth=0.8)
-    axes.set(xlabel="transitions", ylabel="states seen, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
+    axes.set(xlabel="transitions", ylabel="states visited, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
     axes.grid(alpha=0.2)
 
 
 def _detours(axes: Any, mine: Mapping[tuple[str, ...], Runs]) -> None:
-    """A dot for each run: how much longer it took than the shortest walk."""
+    """Draw a dot for each run: how much longer it was than the shortest walk."""
     names = [name for name in COLORS if any(key[1] == name for key in mine)]
     for shift, (world, marker) in zip((-0.12, 0.12), (("constrained", "o"), ("free", "^")), strict=True):
         for place, name in enumerate(names):
             runs = mine.get((world, name), [])
-            detours = 100.0 * np.maximum(covered(runs) / [run["floor"] for run in runs] - 1.0, LEAST_DETOUR)
+            detours = 100.0 * np.maximum(covered(runs) / [run["floor"] for run in runs] - 1.0, MIN_DETOUR)
             label = world if place == 0 else None
             axes.plot(np.full(len(detours), place + shift), detours, marker, color=COLORS[name], markersize=4.0, alpha=0.6, label=label)
     axes.set_yscale("log")
     axes.set_yticks(ticks := (0.1, 1, 10, 100, 1000), [f"{tick:g} %" for tick in ticks])
     axes.set_xticks(range(len(names)), ["\n".join(LABELS[name].rsplit(" ", 1)) for name in names], fontsize=7)
-    axes.set_title("longer than the postman's walk", fontsize=10)
+    axes.set_title("transitions beyond the shortest walk", fontsize=10)
     axes.legend(fontsize=7)
     axes.grid(alpha=0.2)
 
 
 EXPERIMENT = Experiment(
     name="exploration-coverage",
-    claim="the curious agent tries every action in about half the time of the least-tried strategy",
+    claim="the curious agent tries every action in about half the transitions of the least-tried agent",
     source="paper 3.1 and fig. 4, thesis 7.2.1 and fig. 7.5",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

@@ -1,12 +1,12 @@
-"""Uniformity: how evenly do three explorers visit states and try actions, and do failing actions stand out?
+"""Measure how uniformly three explorers visit states and try actions, and how often they try failing actions.
 
-Claim: after 4000 transitions the curious agent's visits over states and tries over state-actions are more uniform than those of
-random and least-tried exploration, but for spikes at the actions that run into constraints.
-Source: paper 3.1, fig. 5 (one run of the real robot an explorer).  No numbers are published.  Run time: 2 minutes on 2 cores.
+Claim: after 4000 transitions the curious agent's visits of states and tries of state-actions are more uniform than those of random and
+least-tried exploration, except for spikes at the actions that run into constraints.
+Source: paper 3.1, fig. 5 (one run of the real robot per explorer).  No numbers are published.  Run time: 2 minutes on 2 cores.
 
-The left arm with its cable constraints and self-contacts; 81 states with actions to their 16 nearest neighbours (ties drawn once, with
-one seed: all runs share that graph, and the numbers may be its own), and for comparison to their equidistant ones.  Actions at
-constraints are those that fail in more than half of all explorers' tries together, those of the run that is judged left out.
+The left arm with its cable constraints and self-contacts; 81 states with actions to their 16 nearest neighbours, and for comparison to
+their equidistant ones.  Ties among the 16 nearest are drawn once: all runs share that graph, and the numbers may depend on it.  Actions at
+constraints are those that fail in more than half of the tries of all explorers together, without the tries of the run that is judged.
 """
 
 from __future__ import annotations
@@ -41,35 +41,43 @@ from mobee import CuriousAgent, Lattice
 EXPLORERS = ("curious", "least_tried", "random")
 GRAPHS = ("nearest", "equidistant")
 TRANSITIONS, FEW = 4000, 1500
-SPIKE = 1.5  # times the tries of the others
-AS_EVEN = 1.1  # times the Gini coefficient: no less even
+SPIKE = 1.5  # ratio of tries at constraints to tries of other actions that counts as a spike
+AS_UNIFORM = 1.1  # ratio of Gini coefficients up to which one counts as no less uniform
 
 VISITS = Claim(
-    "paper 3.1, fig. 5", "visits over states are more uniform than with least-tried and random exploration (one graph)", "qualitative"
+    "paper 3.1, fig. 5",
+    "the curious agent visits states more uniformly than the least-tried and the random explorer (one graph)",
+    "qualitative",
 )
 TRIES = Claim(
-    "paper 3.1, fig. 5", "tries over state-actions are more uniform than with least-tried and random exploration (one graph)", "qualitative"
+    "paper 3.1, fig. 5",
+    "the curious agent tries state-actions more uniformly than the least-tried and the random explorer (one graph)",
+    "qualitative",
 )
 SPIKES = Claim(
     "paper 3.1, fig. 5",
-    "the curious agent tries actions at constraints more often than the others: ratio of mean tries (one graph)",
+    "the curious agent tries actions that run into constraints more often than other actions: ratio of mean tries (one graph)",
     "spikes",
 )
-NONE = Claim("paper 3.1, fig. 5", "least-tried and random exploration have no such spikes", "none visible")
+NONE = Claim(
+    "paper 3.1, fig. 5", "the least-tried and the random explorer do not try actions that run into constraints more often", "none visible"
+)
 SAME = Claim(
-    "aim of this reproduction", "with equidistant neighbours least-tried tries as evenly as curiosity: fig. 5 depends on its graph", "-"
+    "aim of this reproduction",
+    "fig. 5 depends on its graph: with equidistant neighbours the least-tried explorer tries actions as uniformly as the curious one",
+    "-",
 )
 CLAIMS = (VISITS, TRIES, SPIKES, NONE, SAME)
 
 
 @cache
 def space_of(graph: str) -> Lattice:
-    """The lattice of a graph."""
+    """Return the lattice of a graph."""
     return arm_space(neighbours=ARM_NEIGHBOURS if graph == "nearest" else "equidistant")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every explorer on every graph; the short version makes fewer transitions."""
+    """Return every explorer on every graph; the short version makes fewer transitions."""
     count = FEW if arguments.quick else TRANSITIONS
     return [
         Condition(f"{graph}-{explorer}-n{count}", {"graph": graph, "explorer": explorer, "transitions": count})
@@ -78,7 +86,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; the transitions (T, 3)."""
+    """Explore; returns the transitions (T, 3)."""
     space, plant = space_of(settings["graph"]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)
@@ -86,12 +94,12 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def groups(found: Cells) -> Groups:
-    """The runs of each graph and explorer, by seed."""
+    """Return the runs of each graph and explorer, by seed."""
     return explored(found, space_of, "graph", "explorer")
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each graph and explorer, and the claims."""
+    """Return a row for each graph and explorer, and the claims."""
     grouped = groups(found)
     rows = {f"{graph}, {explorer}": _row(grouped, graph, explorer) for graph, explorer in grouped}
     complete = all((graph, explorer) in grouped for graph in GRAPHS for explorer in EXPLORERS)
@@ -102,13 +110,13 @@ def _row(grouped: Groups, graph: str, explorer: str) -> dict[str, Any]:
     runs, spikes = grouped[graph, explorer], _spikes(grouped, graph, explorer)
     return {
         "seeds": len(runs),
-        "tries_spread": mean_over(runs, lambda run: relative_spread(run.tries)),
-        "tries_gini": mean_over(runs, lambda run: gini(run.tries)),
-        "fewest": min(int(run.tries.min()) for run in runs),
-        "most": max(int(run.tries.max()) for run in runs),
-        "visits_spread": mean_over(runs, lambda run: relative_spread(run.visits)),
-        "at_constraints": interquartile_mean(spikes) if spikes else None,
-        "constraint_actions": int(constraint_actions(_all_runs(grouped, graph)).sum()),
+        "relative_spread_of_tries": mean_over(runs, lambda run: relative_spread(run.tries)),
+        "gini_coefficient_of_tries": mean_over(runs, lambda run: gini(run.tries)),
+        "fewest_tries": min(int(run.tries.min()) for run in runs),
+        "most_tries": max(int(run.tries.max()) for run in runs),
+        "relative_spread_of_visits": mean_over(runs, lambda run: relative_spread(run.visits)),
+        "tries_at_constraints_over_others": interquartile_mean(spikes) if spikes else None,
+        "actions_at_constraints": int(constraint_actions(_all_runs(grouped, graph)).sum()),
     }
 
 
@@ -117,48 +125,50 @@ def _all_runs(grouped: Groups, graph: str) -> list[Explored]:
 
 
 def _spikes(grouped: Groups, graph: str, explorer: str) -> list[float]:
-    """Mean tries of actions at constraints over those of the others, of each run: those that fail in all the other runs' tries."""
+    """Return for each run the mean tries of actions at constraints, as the other runs found them, over those of other actions."""
     return relative_tries_of(grouped[graph, explorer], _all_runs(grouped, graph))
 
 
 def measured(grouped: Groups) -> list[Claim]:
-    """The claims with our numbers, of the runs of all explorers on both graphs."""
+    """Return the claims with our numbers, from the runs of all explorers on both graphs."""
     visits = {e: [relative_spread(run.visits) for run in grouped["nearest", e]] for e in EXPLORERS}
     tries = {e: [gini(run.tries) for run in grouped["nearest", e]] for e in EXPLORERS}
-    even = {e: [gini(run.tries) for run in grouped["equidistant", e]] for e in EXPLORERS}
+    other = {e: [gini(run.tries) for run in grouped["equidistant", e]] for e in EXPLORERS}
     return [
         VISITS.measured(f"standard deviation over mean: {_each(visits)}", _is_least(visits)),
         TRIES.measured(f"Gini coefficient: {_each(tries)}", _is_least(tries)),
         *_spike_claims({e: _spikes(grouped, "nearest", e) for e in EXPLORERS}),
-        SAME.measured(f"Gini coefficient: {_each(even)}", decides(ratio_interval(even["least_tried"], even["curious"]), most=AS_EVEN)),
+        SAME.measured(
+            f"Gini coefficient: {_each(other)}", decides(ratio_interval(other["least_tried"], other["curious"]), most=AS_UNIFORM)
+        ),
     ]
 
 
 def _spike_claims(spikes: Mapping[str, list[float]]) -> list[Claim]:
-    """Open where no action fails, so that there is nothing to compare."""
+    """Judge tries at constraints; open where no action fails."""
     if not all(spikes.values()):
         return [claim.measured("no action fails in more than half of its tries", None) for claim in (SPIKES, NONE)]
-    others = "; ".join(f"{e} {estimate(spikes[e])}" for e in EXPLORERS[1:])
+    others = "; ".join(f"{e.replace('_', ' ')} {estimate(spikes[e])}" for e in EXPLORERS[1:])
     return [
         SPIKES.measured(estimate(spikes["curious"]), interval(spikes["curious"])[0] > SPIKE),
-        NONE.measured(others, all(interval(spikes[e])[1] < SPIKE for e in EXPLORERS[1:])),
+        NONE.measured(f"ratio of mean tries: {others}", all(interval(spikes[e])[1] < SPIKE for e in EXPLORERS[1:])),
     ]
 
 
 def _is_least(values: Mapping[str, list[float]]) -> bool:
-    """Whether the ratio of the curious agent's to each of the others', its interval included, is below 1."""
+    """Return whether the ratio of the curious agent's numbers to those of each other explorer is below 1, with its interval."""
     return all(ratio_interval(values["curious"], values[e])[1] < 1.0 and ratio(values["curious"], values[e]) < 1.0 for e in EXPLORERS[1:])
 
 
 def _each(values: Mapping[str, list[float]]) -> str:
-    return ", ".join(f"{explorer} {estimate(values[explorer])}" for explorer in EXPLORERS)
+    return ", ".join(f"{explorer.replace('_', ' ')} {estimate(values[explorer])}" for explorer in EXPLORERS)
 
 
 TITLES = {"curious": "curious (AC)", "least_tried": "least tried (LT)", "random": "random (RAND)"}
 
 
 def plot(found: Cells) -> Any:
-    """Visits and tries of one run of each explorer, as in fig. 5: a row an explorer."""
+    """Draw visits and tries of one run of each explorer, as in fig. 5: one row per explorer."""
     grouped = groups(found)
     shown = [explorer for explorer in EXPLORERS if ("nearest", explorer) in grouped]
     drawing = new_figure(13.0, 2.4 * len(shown))
@@ -182,7 +192,7 @@ def plot(found: Cells) -> Any:
 
 EXPERIMENT = Experiment(
     name="exploration-uniformity",
-    claim="curious exploration is more uniform than random and least-tried, but for spikes at the actions that meet constraints",
+    claim="curious exploration is more uniform than random and least-tried, except for spikes at actions that run into constraints",
     source="paper 3.1, fig. 5",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

@@ -1,4 +1,4 @@
-"""Hypercube: does the curious agent work as expected where every action succeeds?
+"""Explore a hypercube of 16 states, in which every action succeeds, with the curious agent.
 
 Claim: on the hypercube of 16 states and 64 actions all actions succeed, every action is tried at least 5 times after about the
 fewest transitions possible, tries and values become uniform, and the values grow with the discount factor.
@@ -6,9 +6,9 @@ Source: thesis 7.1, figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Pub
 Run time: 10 seconds on 2 cores.
 
 The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, 50-50 initialisation.
-Tries and values are recorded after 50 transitions and at the end.  Uniformity of early tries: their variance over that of a
-uniformly random choice among 64 actions, 1 for a random choice and 0 for equal tries (spread_early, spread_end).  uneven_value:
-standard deviation over mean of the values; value_of_limit: their mean over what earning the mean reward indefinitely is worth.
+Tries and values are recorded after 50 transitions and at the end.  The relative variance of tries is their variance divided by that of a
+uniformly random choice among 64 actions: 1 for a random choice, 0 for equal tries.  The limit of the value is mean reward / (1 - discount),
+the value of earning the mean reward indefinitely.
 """
 
 from __future__ import annotations
@@ -30,38 +30,45 @@ from mobee import CuriousAgent, value_iteration
 from mobee.arrays import Array
 
 DISCOUNTS = (0.5, 0.9, 0.99)
-EARLY, LEAST = 50, 5  # transitions, tries
-MOST = 5_000  # transitions, should an action be beyond reach
-TOLERANCE = 1e-9  # nats
-PUBLISHED = 320
-ALIKE = (0.5, 2.0)  # times the variance of a uniform choice: like it
+EARLY = 50  # transitions after which tries and values are recorded for the first time
+MIN_TRIES = 5  # of each action, after which a run ends
+MAX_TRANSITIONS = 5_000  # of a run in which an action is never possible
+TOLERANCE = 1e-9  # nats, of values
+PUBLISHED = 320  # actions
+LIKE_RANDOM = (0.5, 2.0)  # relative variances of tries that count as those of a random choice
 
-SUCCEED = Claim("thesis 7.1", "all actions of the hypercube bring the agent to their goal state", "all")
-ACTIONS = Claim("thesis 7.1, fig. 7.3", "every state-action has been tried at least 5 times after 320 actions", "320 (= 64 x 5)")
-UNIFORM = Claim(
-    "thesis 7.1, figs. 7.2, 7.3", "action selection is noisy like uniform sampling early, and becomes increasingly uniform", "figures only"
+SUCCEED = Claim("thesis 7.1", "on a hypercube of 16 states, all actions bring the arm to their goal state", "all")
+ACTIONS = Claim(
+    "thesis 7.1, fig. 7.3", "on the hypercube, every state-action has been tried at least 5 times after 320 actions", "320 (= 64 x 5)"
 )
-FLAT = Claim("thesis 7.1, figs. 7.2, 7.3", "the value function becomes uniform", "figures only")
-PROPORTIONAL = Claim("thesis 7.1, figs. 7.2, 7.3", "value is roughly proportional to the discount factor", "figures only")
+UNIFORM = Claim(
+    "thesis 7.1, figs. 7.2, 7.3",
+    "on the hypercube, tries of actions vary like those of a random choice at first, and become increasingly equal",
+    "figures only",
+)
+FLAT = Claim("thesis 7.1, figs. 7.2, 7.3", "on the hypercube, the values of all actions become equal", "figures only")
+PROPORTIONAL = Claim(
+    "thesis 7.1, figs. 7.2, 7.3", "on the hypercube, values are roughly proportional to the discount factor", "figures only"
+)
 CLAIMS = (SUCCEED, ACTIONS, UNIFORM, FLAT, PROPORTIONAL)
 
-Groups = Mapping[float, list[dict[str, Any]]]  # the values of the runs of each discount
+Groups = Mapping[float, list[dict[str, Any]]]  # values of the runs by discount
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every discount; there is no shorter version."""
+    """Return one condition per discount; there is no shorter version."""
     return [Condition(f"g{discount:g}", {"discount": discount}) for discount in DISCOUNTS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until every action was tried 5 times; tries and values (16, 4) early and at the end."""
+    """Explore until every action was tried 5 times; returns tries and values (16, 4), early and at the end."""
     space, plant = arm_space(HYPERCUBE), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"])
-    enough = LeastTries(LEAST, space.state_actions)
+    enough = LeastTries(MIN_TRIES, space.state_actions)
     early = explore(agent, EARLY, enough)
     values: dict[str, Any] = {"early_tries": agent.model.tries.copy(), "early_values": _values(agent)}
-    seen = np.concatenate([early, explore(agent, MOST, enough)])
+    seen = np.concatenate([early, explore(agent, MAX_TRANSITIONS, enough)])
     new = first_tries(space, seen)
     return values | {
         "tries": agent.model.tries.copy(),
@@ -75,12 +82,12 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _values(agent: CuriousAgent) -> Array:
-    """Of the actions, with a smaller tolerance than the agent's own."""
+    """Return the values of the actions, with a smaller tolerance than the agent's own."""
     return value_iteration(agent.model, agent.model.reward, agent.discount, TOLERANCE)[1]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each discount, and the claims."""
+    """Return a row for each discount, and the claims."""
     groups = grouped(found, "discount", DISCOUNTS)
     rows = {f"discount {discount:g}": _row(discount, runs) for discount, runs in groups.items()}
     return {"runs": rows, "claims": [claim.record() for claim in measured(groups)]}
@@ -91,21 +98,21 @@ def _row(discount: float, runs: list[dict[str, Any]]) -> dict[str, Any]:
     low, high = interval(actions)
     return {
         "seeds": len(runs),
-        "actions": interquartile_mean(actions),
+        "actions_until_all_tried_5_times": interquartile_mean(actions),
         "low": low,
         "high": high,
-        "all_once": mean_over(runs, lambda run: run["all_once"] or run["transitions"]),
-        "spread_early": mean_over(runs, lambda run: dispersion(run["early_tries"])),
-        "spread_end": mean_over(runs, lambda run: dispersion(run["tries"])),
-        "uneven_value": mean_over(runs, lambda run: relative_spread(run["values"])),
-        "value_of_limit": mean_over(runs, lambda run: _share_of_limit(discount, run)),
-        "value": mean_over(runs, _mean_value),
-        "failed": sum(run["failed"] for run in runs),
+        "actions_until_all_tried_once": mean_over(runs, lambda run: run["all_once"] or run["transitions"]),
+        "relative_variance_of_tries_early": mean_over(runs, lambda run: relative_variance(run["early_tries"])),
+        "relative_variance_of_tries_at_end": mean_over(runs, lambda run: relative_variance(run["tries"])),
+        "relative_spread_of_values": mean_over(runs, lambda run: relative_spread(run["values"])),
+        "mean_value_over_its_limit": mean_over(runs, lambda run: _share_of_limit(discount, run)),
+        "mean_value": mean_over(runs, _mean_value),
+        "failed_actions": sum(run["failed"] for run in runs),
     }
 
 
-def dispersion(tries: Array) -> float:
-    """Variance of tries over that of a uniformly random choice of state-actions: 1 for a random choice, 0 for equal tries."""
+def relative_variance(tries: Array) -> float:
+    """Return the variance of tries over that of a uniformly random choice of state-actions: 1 if random, 0 if all are equal."""
     count, total = tries.size, tries.sum()
     return float(tries.var() / (total / count * (1.0 - 1.0 / count)))
 
@@ -115,41 +122,42 @@ def _mean_value(run: Mapping[str, Any]) -> float:
 
 
 def _share_of_limit(discount: float, run: Mapping[str, Any]) -> float:
-    """1 where the value is that of earning the mean reward indefinitely."""
+    """Return the mean value over its limit, the value of earning the mean reward indefinitely."""
     return float(run["values"].mean() * (1.0 - discount) / run["rewards"].mean())
 
 
 def measured(groups: Groups) -> list[Claim]:
-    """The claims with our numbers."""
+    """Return the claims with our numbers."""
     every = [run for runs in groups.values() for run in runs]
     return [_succeed(every), _actions(groups), _uniform(every), _flat(every), _proportional(groups)]
 
 
 def _succeed(every: list[dict[str, Any]]) -> Claim:
     failed, total = (sum(run[name] for run in every) for name in ("failed", "transitions"))
-    return SUCCEED.measured(f"{total - failed} of {total}", failed == 0)
+    return SUCCEED.measured(f"{total - failed} of {total} actions", failed == 0)
 
 
 def _actions(groups: Groups) -> Claim:
     actions = {discount: [run["transitions"] for run in runs] for discount, runs in groups.items()}
-    text = "; ".join(f"{estimate(mine, 0)} at discount {discount:g}" for discount, mine in actions.items())
-    return ACTIONS.measured(text, all(interval(mine)[1] <= 1.05 * PUBLISHED for mine in actions.values()))
+    text = "; ".join(f"{estimate(counts, 0)} at discount {discount:g}" for discount, counts in actions.items())
+    return ACTIONS.measured(text, all(interval(counts)[1] <= 1.05 * PUBLISHED for counts in actions.values()))
 
 
 def _uniform(every: list[dict[str, Any]]) -> Claim:
-    early, end = ([dispersion(run[name]) for run in every] for name in ("early_tries", "tries"))
+    early, end = ([relative_variance(run[name]) for run in every] for name in ("early_tries", "tries"))
     (low, high), (_, end_high) = interval(early), interval(end)
-    text = f"variance of tries over a uniform choice's: {estimate(early)} after {EARLY}, {estimate(end)} at the end"
-    return UNIFORM.measured(text, ALIKE[0] <= low and high <= ALIKE[1] and end_high < low)
+    text = f"variance of tries over that of a random choice: {estimate(early)} after {EARLY} actions, {estimate(end)} at the end"
+    return UNIFORM.measured(text, LIKE_RANDOM[0] <= low and high <= LIKE_RANDOM[1] and end_high < low)
 
 
 def _flat(every: list[dict[str, Any]]) -> Claim:
     early, end = (max(relative_spread(run[name]) for run in every) for name in ("early_values", "values"))
-    return FLAT.measured(f"standard deviation / mean at most {early:.2f} after {EARLY}, {end:.3f} at the end", end < min(0.1, early))
+    text = f"standard deviation over mean at most {early:.2f} after {EARLY} actions, {end:.3f} at the end"
+    return FLAT.measured(text, end < min(0.1, early))
 
 
 def _proportional(groups: Groups) -> Claim:
-    """In the limit it is the mean reward / (1 - discount), which grows much faster than the discount."""
+    """Compare the growth of the values with that of the discount; their limit, mean reward / (1 - discount), grows much faster."""
     means = {discount: mean_over(runs, _mean_value) for discount, runs in groups.items()}
     shares = [interquartile_mean([_share_of_limit(discount, run) for run in runs]) for discount, runs in groups.items()]
     of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
@@ -157,16 +165,21 @@ def _proportional(groups: Groups) -> Claim:
     grown = means[high] / means[low]
     text = (
         f"mean value {', '.join(f'{1e3 * value:.3g}' for value in means.values())} x 1e-3 nats at {', '.join(f'{d:g}' for d in means)}: "
-        f"{of_limit} of mean reward / (1 - discount), proportional to that"
+        f"{of_limit} of mean reward / (1 - discount), to which they are proportional"
     )
     return PROPORTIONAL.measured(text, abs(grown / (high / low) - 1.0) < 0.5)
 
 
-COLUMNS = (("early_tries", f"tries after {EARLY} actions"), ("early_values", "value"), ("tries", "tries at the end"), ("values", "value"))
+COLUMNS = (
+    ("early_tries", f"tries after {EARLY} actions"),
+    ("early_values", f"values after {EARLY} actions"),
+    ("tries", "tries at the end"),
+    ("values", "values at the end"),
+)
 
 
 def plot(found: Cells) -> Any:
-    """Tries and values of every state-action, early and at the end, as in figs. 7.2 and 7.3: a row a discount, a colour a run."""
+    """Draw tries and values of every state-action as in figs. 7.2 and 7.3: one row per discount, one colour per run."""
     groups = grouped(found, "discount", DISCOUNTS)
     drawing = new_figure(14.0, 2.6 * len(groups))
     for row, (discount, runs) in zip(drawing.subplots(len(groups), 4, squeeze=False), groups.items(), strict=True):

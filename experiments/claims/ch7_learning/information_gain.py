@@ -1,12 +1,13 @@
-"""Kail: what is gained by counting outcomes in bins of variable number instead of over all states?
+"""Compare two information gains as rewards: the thesis' 'Kail' divergence, and the KL divergence from a uniform prior over all states.
 
-Claim: with plain KL divergence from a uniform prior every first try is equally interesting, so that it takes many tries to tell
-failing actions from sound ones, and small state spaces are numerically more interesting than large ones; 'Kail' divergence has
-neither problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
+'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.
+Claim: with plain KL divergence from a uniform prior every first try has the same reward, so that many tries are needed to distinguish
+failing actions from reliable ones, and rewards are larger in small state spaces than in large ones; 'Kail' divergence has neither
+problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
 
-On paper: the rewards of a sound, a failing and an uncertain action, try by try.  On the robot: the left arm, 81 states with 16
-neighbours and its constraints, for 4000 transitions, and the torso, 27 states with 8 neighbours, for 900; both
-divergences, all runs on one graph.  Failing actions are those that fail in more than half of the tries of all runs but the judged one.
+Computed: the rewards of a reliable, a failing and an uncertain action, try by try.  On the robot: the left arm with its constraints, 81
+states with 16 neighbours, for 4000 transitions, and the torso, 27 states with 8 neighbours, for 900; both divergences, all runs on one
+graph.  Failing actions are those that fail in more than half of the tries of all runs except the judged one.
 """
 
 from __future__ import annotations
@@ -34,38 +35,51 @@ DIVERGENCES = {"kail": "'Kail'", "kl": "plain KL, uniform prior"}
 PARTS = {"left_arm": "arm, 81 states", "torso": "torso, 27 states"}
 TRANSITIONS = {"left_arm": 4000, "torso": 900}
 FEW = {"left_arm": 1000, "torso": 300}
-EARLY = 100  # transitions, whose mean pay is compared between the parts
-TRIES, REPEATS = 30, 400  # on paper
+EARLY = 100  # transitions whose mean reward is compared between the parts
+TRIES, REPEATS = 30, 400  # of the computed actions
+SAME_REWARD = 1.05  # ratio of rewards up to which they count as the same
 
-FIRST = Claim("thesis 6.4.2, 6.4.3", "tries until a failing action is told from a sound one: 'Kail' against plain KL", "many with KL")
-SECOND = Claim("thesis 6.4.2", "tries until an uncertain action is told from a sound one: 'Kail' against plain KL", "many with KL")
+FIRST = Claim(
+    "thesis 6.4.2, 6.4.3",
+    "with 'Kail' divergence fewer tries are needed to prefer a failing action to a reliable one than with plain KL divergence",
+    "many with KL",
+)
+SECOND = Claim(
+    "thesis 6.4.2",
+    "with 'Kail' divergence fewer tries are needed to prefer an uncertain action to a reliable one than with plain KL divergence",
+    "many with KL",
+)
 SPIKES = Claim(
-    "thesis 6.4.3", "with 'Kail' the agent tries failing actions more than sound ones, more so than with plain KL", "qualitative"
+    "thesis 6.4.3",
+    "with 'Kail' divergence the agent tries failing actions more often than others, and more so than with plain KL divergence",
+    "qualitative",
 )
 SIZE = Claim(
     "thesis 6.4.2",
-    "plain KL pays a 27-state learner more than an 81-state one: ratio of what the first tries pay",
+    "with plain KL divergence a learner with 27 states receives more reward than one with 81: ratio for the first transitions",
     "eqs. 6.6-6.9: falls with size",
 )
-COMPARABLE = Claim("thesis 6.4.3", "with 'Kail' rewards of learners of different size are comparable: the same ratio", "1")
+COMPARABLE = Claim(
+    "thesis 6.4.3", "with 'Kail' divergence learners with 27 and 81 states receive comparable rewards: ratio for the first transitions", "1"
+)
 CLAIMS = (FIRST, SECOND, SPIKES, SIZE, COMPARABLE)
 
 
 @cache
 def space_of(part: str) -> Lattice:
-    """81 states with 16 neighbours, or 27 with 8."""
+    """Return the lattice of a part: 81 states with 16 neighbours, or 27 with 8."""
     return torso_space() if part == "torso" else arm_space(neighbours=ARM_NEIGHBOURS)
 
 
 def plant_of(part: str, seed: int) -> OfflinePlant:
-    """The part's own motors, the rest of the body rigid, no objects."""
+    """Return a plant in which only the part's motors move, without objects."""
     if part == "torso":
         return OfflinePlant(Model(robot()), seed, Gains.published_2014(), dt=DT, active=TORSO)
     return arm_plant(seed)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Both parts with both divergences; the short version makes fewer transitions."""
+    """Return both parts with both divergences; the short version makes fewer transitions."""
     counts = FEW if arguments.quick else TRANSITIONS
     return [
         Condition(f"{part}-{divergence}-n{counts[part]}", {"part": part, "divergence": divergence, "transitions": counts[part]})
@@ -74,78 +88,78 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; the transitions (T, 3), what each of them paid (T,), and what every action promises before anything was tried."""
+    """Explore; returns the transitions (T, 3), their rewards (T,), and the expected reward of an action before any try."""
     part, divergence = settings["part"], settings["divergence"]
     space, plant = space_of(part), plant_of(part, seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed, divergence=divergence)
-    paid: list[float] = []
-    seen = explore(agent, settings["transitions"], lambda agent: _record_pay(agent, paid))
-    _record_pay(agent, paid)
+    received: list[float] = []
+    seen = explore(agent, settings["transitions"], lambda agent: _record_reward(agent, received))
+    _record_reward(agent, received)
     first = float(TransitionModel(space, divergence=divergence).reward.max())
-    return {"seen": seen.astype(np.uint16), "paid": np.array(paid, dtype=np.float32), "first_reward": first}
+    return {"seen": seen.astype(np.uint16), "rewards": np.array(received, dtype=np.float32), "first_reward": first}
 
 
-def _record_pay(agent: CuriousAgent, paid: list[float]) -> bool:
-    if agent.last is not None and agent.last.n > len(paid):
-        paid.append(agent.last.reward)
+def _record_reward(agent: CuriousAgent, received: list[float]) -> bool:
+    if agent.last is not None and agent.last.n > len(received):
+        received.append(agent.last.reward)
     return False
 
 
-Outcome = Callable[[np.random.Generator, int], int]  # draws the outcome of an action with this goal
+Outcome = Callable[[np.random.Generator, int], int]  # draws the state in which an action with this goal ends
 
 
-def sound(rng: np.random.Generator, goal: int) -> int:
-    """The goal."""
+def reliable(rng: np.random.Generator, goal: int) -> int:
+    """End in the goal."""
     return goal
 
 
 def failing(rng: np.random.Generator, goal: int) -> int:
-    """One other state."""
+    """End always in the same other state."""
     return (goal + 7) % 27
 
 
 def uncertain(rng: np.random.Generator, goal: int) -> int:
-    """The goal or one of two other states, equally likely."""
+    """End in the goal or in one of two other states, with equal probability."""
     return (goal, (goal + 7) % 27, (goal + 11) % 27)[int(rng.integers(3))]
 
 
-KINDS: dict[str, Outcome] = {"sound": sound, "failing": failing, "uncertain": uncertain}
+KINDS: dict[str, Outcome] = {"reliable": reliable, "failing": failing, "uncertain": uncertain}
 
 
 def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS) -> Array:
-    """What each of 30 tries of one action pays, (repeats, 30)."""
+    """Return the rewards of 30 tries of one action, (repeats, 30)."""
     space, rng = space_of(part), np.random.default_rng(0)
     goal = int(space.goals[0, 0])
-    paid = np.empty((repeats, TRIES))
-    for row in paid:
+    received = np.empty((repeats, TRIES))
+    for row in received:
         model = TransitionModel(space, divergence=divergence)
         for number in range(TRIES):
             row[number] = model.observe(0, 0, outcome(rng, goal))
-    return paid
+    return received
 
 
 def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
-    """After how many tries of each a greedy agent prefers the other action to a sound one, by what each paid last: mean.
+    """Return the mean number of tries of both actions until one of this kind had a larger last reward than a reliable one.
 
-    Infinite where 30 tries do not suffice on average.
+    Infinite if 30 tries do not suffice in some repetition.
     """
     other = rewards(part, divergence, KINDS[kind])
-    plain = rewards(part, divergence, sound, repeats=1)[0]
-    dearer = other > 1.05 * plain  # rewards within 5 % are the same
-    first = np.where(dearer.any(axis=1), dearer.argmax(axis=1) + 1, np.inf)
+    plain = rewards(part, divergence, reliable, repeats=1)[0]
+    larger = other > SAME_REWARD * plain
+    first = np.where(larger.any(axis=1), larger.argmax(axis=1) + 1, np.inf)
     return float(first.mean())
 
 
 def groups(found: Cells) -> Groups:
-    """The runs of each part and divergence, by seed."""
+    """Return the runs of each part and divergence, by seed."""
     return explored(found, space_of, "part", "divergence")
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each part and divergence, and the claims."""
+    """Return a row for each part and divergence, and the claims."""
     grouped = groups(found)
-    rows = {f"{part}, {divergence}": _row(runs) for (part, divergence), runs in grouped.items()}
+    rows = {f"{PARTS[part]}, {DIVERGENCES[divergence]}": _row(runs) for (part, divergence), runs in grouped.items()}
     complete = all(key in grouped for key in product(PARTS, DIVERGENCES))
     return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
 
@@ -153,19 +167,19 @@ def findings(found: Cells) -> dict[str, Any]:
 def _row(runs: list[Explored]) -> dict[str, Any]:
     return {
         "seeds": len(runs),
-        "promised_first": round(runs[0].values["first_reward"], 5),
-        "paid_first_100": round(mean_over(runs, _early_pay), 5),
-        "paid_last_100": round(mean_over(runs, lambda run: float(run.values["paid"][-EARLY:].mean())), 5),
-        "untried": mean_over(runs, lambda run: float((run.tries == 0).sum())),
+        "expected_reward_before_any_try": round(runs[0].values["first_reward"], 5),
+        "mean_reward_of_first_100": round(mean_over(runs, _early_reward), 5),
+        "mean_reward_of_last_100": round(mean_over(runs, lambda run: float(run.values["rewards"][-EARLY:].mean())), 5),
+        "untried_actions": mean_over(runs, lambda run: float((run.tries == 0).sum())),
     }
 
 
-def _early_pay(run: Explored) -> float:
-    return float(run.values["paid"][:EARLY].mean())
+def _early_reward(run: Explored) -> float:
+    return float(run.values["rewards"][:EARLY].mean())
 
 
 def measured(grouped: Groups) -> list[Claim]:
-    """The claims with our numbers, of the runs of both parts with both divergences."""
+    """Return the claims with our numbers, from the runs of both parts with both divergences."""
     ratios = {divergence: _size_ratios(grouped, divergence) for divergence in DIVERGENCES}
     kl_ratio, kail_ratio = interval(ratios["kl"]), interval(ratios["kail"])
     return [
@@ -181,18 +195,18 @@ def _of_arm(grouped: Groups) -> list[Explored]:
     return [run for divergence in DIVERGENCES for run in grouped.get(("left_arm", divergence), [])]
 
 
-def _spikes(dearer: Mapping[str, list[float]]) -> Claim:
-    """Of mean tries of failing actions over those of the others, of each run of the arm."""
-    if not all(dearer.values()):
+def _spikes(ratios: Mapping[str, list[float]]) -> Claim:
+    """Judge mean tries of failing actions over those of other actions, by divergence, of each run of the arm."""
+    if not all(ratios.values()):
         return SPIKES.measured("no action fails in more than half of its tries", None)
-    text = f"tries over those of the others: {estimate(dearer['kail'])}, plain KL {estimate(dearer['kl'])}"
-    return SPIKES.measured(text, interval(dearer["kail"])[0] > max(interval(dearer["kl"])[1], 1.0))
+    text = f"tries of failing actions over those of others: 'Kail' {estimate(ratios['kail'])}, plain KL {estimate(ratios['kl'])}"
+    return SPIKES.measured(text, interval(ratios["kail"])[0] > max(interval(ratios["kl"])[1], 1.0))
 
 
 def _apart(claim: Claim, kind: str) -> Claim:
-    """Tries on paper, in the arm's space."""
+    """Judge the computed numbers of tries, in the arm's space."""
     kail, plain = tries_to_prefer("left_arm", "kail", kind), tries_to_prefer("left_arm", "kl", kind)
-    return claim.measured(f"{_tries(kail)} against {_tries(plain)}", kail < plain)
+    return claim.measured(f"tries with 'Kail' {_tries(kail)}, with plain KL {_tries(plain)}", kail < plain)
 
 
 def _tries(count: float) -> str:
@@ -200,8 +214,8 @@ def _tries(count: float) -> str:
 
 
 def _size_ratios(grouped: Groups, divergence: str) -> list[float]:
-    """What the torso's first tries pay over what the arm's do, of each seed that both have."""
-    torso, arm = ({run.seed: _early_pay(run) for run in grouped[part, divergence]} for part in ("torso", "left_arm"))
+    """Return the rewards of the torso's first transitions over those of the arm's, for each seed that both have."""
+    torso, arm = ({run.seed: _early_reward(run) for run in grouped[part, divergence]} for part in ("torso", "left_arm"))
     return [torso[seed] / arm[seed] for seed in sorted(torso.keys() & arm.keys())]
 
 
@@ -209,22 +223,25 @@ SMOOTH = 50  # transitions
 
 
 def plot(found: Cells) -> Any:
-    """A row for each divergence: rewards on paper, pay of both parts over time, and tries of failing actions."""
+    """Draw computed rewards, rewards of both parts over time, and tries of failing actions: one row per divergence."""
     grouped = groups(found)
     drawing = new_figure(14.0, 6.0)
     panels = drawing.subplots(2, 3, squeeze=False)
-    for (paper, paid, tried), (divergence, title) in zip(panels, DIVERGENCES.items(), strict=True):
+    for (computed, received, tried), (divergence, title) in zip(panels, DIVERGENCES.items(), strict=True):
         for kind, outcome in KINDS.items():
-            paper.plot(np.arange(1, TRIES + 1), rewards("left_arm", divergence, outcome, repeats=100).mean(axis=0), marker=".", label=kind)
-        paper.set(title=f"{title}: one action of 81 states", xlabel="try", ylabel="reward [nats]", yscale="log")
+            mean = rewards("left_arm", divergence, outcome, repeats=100).mean(axis=0)
+            computed.plot(np.arange(1, TRIES + 1), mean, marker=".", label=f"{kind} action")
+        computed.set(title=f"{title}: one action, 81 states (computed)", xlabel="try", ylabel="reward [nats]", yscale="log")
         for part, label in PARTS.items():
             if (part, divergence) in grouped:
-                pay = np.mean([run.values["paid"] for run in grouped[part, divergence]], axis=0)
-                paid.plot(np.convolve(pay, np.full(SMOOTH, 1.0 / SMOOTH), mode="valid"), label=label)
-        paid.set(title="what the agents' transitions paid", xlabel="transition", ylabel="reward [nats]", yscale="log")
+                mean = np.mean([run.values["rewards"] for run in grouped[part, divergence]], axis=0)
+                received.plot(np.convolve(mean, np.full(SMOOTH, 1.0 / SMOOTH), mode="valid"), label=label)
+        received.set(
+            title=f"rewards of the agents, mean over {SMOOTH} transitions", xlabel="transition", ylabel="reward [nats]", yscale="log"
+        )
         if ("left_arm", divergence) in grouped:
             _tries_of_arm(tried, grouped["left_arm", divergence][0].tries, constraint_actions(_of_arm(grouped)))
-        for axes in (paper, paid, tried):
+        for axes in (computed, received, tried):
             axes.legend(fontsize=8)
             axes.grid(alpha=0.2)
     return drawing
@@ -239,7 +256,7 @@ def _tries_of_arm(axes: Any, tries: Ints, chosen: NDArray[np.bool_]) -> None:
 
 EXPERIMENT = Experiment(
     name="information-gain",
-    claim="'Kail' divergence tells failing from sound actions in fewer tries than plain KL, whatever the size of the state space",
+    claim="'Kail' divergence distinguishes failing from reliable actions in fewer tries than plain KL, in state spaces of any size",
     source="thesis 6.4.2, 6.4.3",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

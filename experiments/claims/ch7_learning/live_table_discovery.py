@@ -1,13 +1,14 @@
-"""Live table: do the live agents at the table learn what offline agents learn?
+"""Compare what three live agents learn at the table with what offline agents learn.
 
-Claim: the three agents of the table experiment, each a process of its own on the live system in lockstep, come to transition
-models that are statistically those of the same agents on the offline plant.  Source: aim of this reproduction (thesis 7.4 was done
+Claim: the three agents of the table experiment, each a process of its own in the live system in lockstep, learn transition models
+that are statistically those of the same agents on the offline plant.  Source: aim of this reproduction (thesis 7.4 was done
 live).  Published number: none.  Run time: 20 minutes on 2 cores, of which the live system takes two thirds.
 
 The robot `icub` on its motor model (no physics), the published gains and graphs, whole-tree forces.  Test: the total variation
-between the outcomes seen live and those of all offline seeds but one, a state-action that both tried at least twice, on average; its rank
-among the same number of each offline seed.  Equal means that the live run is not among the farthest 5 %, so 19 seeds are needed;
-with the same encoder noise both plants make the same run to the last bit (`mobee bench agree`), here they have different seeds.
+between the outcomes observed live and those of all offline seeds but one, mean over the state-actions that both tried at least twice; then
+the rank of this number among the same numbers of the offline seeds.  The models are equal if the live run is not among the farthest 5 %, so
+19 seeds are needed.  With the same encoder noise both plants make the same run to the last bit (`mobee bench agree`); here they have
+different seeds.
 """
 
 from __future__ import annotations
@@ -31,21 +32,21 @@ ALIKE = Claim(
     "rank test against offline seeds, p above .05",
 )
 TASK, ROBOT = "published", "kinematic"
-TRANSITIONS, FEW = 2000, 20  # a part
-LEAST = 2  # tries of a state-action that is compared
-PIECE = 1000  # transitions a part between two launches
-SEEDS = 19  # offline, which a test at the 5 % level needs
-LIVE_SEED = 900  # apart from those offline
+TRANSITIONS, FEW = 2000, 20  # per part
+MIN_TRIES = 2  # of a state-action that is compared
+PIECE = 1000  # transitions per part between two launches
+SEEDS = 19  # offline runs, as many as a test at the 5 % level needs
+LIVE_SEED = 900  # different from those of the offline runs
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options of a sweep, and --transitions."""
     sweep_arguments(parser, seeds=SEEDS)
-    parser.add_argument("--transitions", type=positive_whole, metavar="N", help=f"of each part (default: {TRANSITIONS})")
+    parser.add_argument("--transitions", type=positive_whole, metavar="N", help=f"per part (default: {TRANSITIONS})")
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """The offline seeds."""
+    """Return the offline seeds."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{TASK}-n{number}-s{seed}", seed, {"task": TASK, "transitions": number}) for seed in seeds]
@@ -61,29 +62,32 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
         learn_live(TASK, ROBOT, LIVE_SEED, number, folder / TASK / ROBOT, report, PIECE)
     run_cells(learn_offline, cells(arguments), folder, arguments)
-    found = compared(folder, TASK, LEAST)
+    found = compared(folder, TASK, MIN_TRIES)
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     return {
         "transitions": {part: number for part in TASKS[TASK].parts},
-        "variation": {"live": round(one.variation, 4), "offline_low": round(min(offline), 4), "offline_high": round(max(offline), 4)},
-        "agree": {"live": round(one.agree, 4), "offline_mean": round(float(np.mean([seed.agree for seed in found.offline])), 4)},
-        "compared": one.compared,
+        "total variation": {"live": round(one.variation, 4), "offline_low": round(min(offline), 4), "offline_high": round(max(offline), 4)},
+        "share with the same most frequent outcome": {
+            "live": round(one.agree, 4),
+            "offline_mean": round(float(np.mean([seed.agree for seed in found.offline])), 4),
+        },
+        "state-actions compared": one.compared,
         "p": round(p_value(found), 4),
         "claims": [measured(found).record()],
     }
 
 
 def p_value(found: Compared) -> float:
-    """How likely an offline seed is as far from the others as the live run: its rank among them."""
+    """Return the probability that an offline run is as far from the others as the live run, by its rank among them."""
     farther = sum(seed.variation >= found.live[ROBOT].variation for seed in found.offline)
     return (1 + farther) / (1 + len(found.offline))
 
 
 def measured(found: Compared) -> Claim:
-    """The claim with our numbers; open with fewer offline seeds than the test needs."""
+    """Return the claim with our numbers; open with fewer offline seeds than the test needs."""
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     text = (
-        f"total variation {one.variation:.4f} over {one.compared} state-actions, offline seeds {min(offline):.4f} to {max(offline):.4f}: "
+        f"total variation {one.variation:.4f} over {one.compared} state-actions, of offline runs {min(offline):.4f} to {max(offline):.4f}: "
         f"p = {p_value(found):.2f}"
     )
     decidable = len(found.offline) >= SEEDS and one.compared > 0
@@ -91,9 +95,9 @@ def measured(found: Compared) -> Claim:
 
 
 def figure(folder: Path) -> Path:
-    """How far the live run and every offline seed are from the others, and how often actions reach their goals."""
+    """Draw the distances of the live run and every offline run from the others, and how often actions reach their goals."""
     path = folder / "figure.png"
-    draw_distances({TASK: compared(folder, TASK, LEAST)}, LEAST).savefig(path, dpi=130)
+    draw_distances({TASK: compared(folder, TASK, MIN_TRIES)}, MIN_TRIES).savefig(path, dpi=130)
     return path
 
 

@@ -1,27 +1,26 @@
-"""The learned MDP as a planner: its state-actions, and its plans around a table that comes, or comes and goes.
+"""Plan with the learned MDP, without obstacles, around a table that enters, and around one that moves up and down.
 
-Claim: most learned state-actions reliably take the arm where they aim, a few lead elsewhere, always or sometimes (fig. 7); no static
-workspace is needed, which a PRM planner cannot do without; and a planner trained with dynamic obstacles plans around the regions
-where they tend to be.
+Claim: most learned state-actions reliably take the arm to their goal, a few end elsewhere, always or sometimes (fig. 7).  The MDP needs no
+static workspace, while a PRM planner does.  A planner trained with dynamic obstacles plans around the regions where they tend to be.
 Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.
 Run time: two minutes on 2 cores.
 
-The left arm of the published robot, 81 states with 16 neighbours, 4000 curious transitions: without the table, or with one that
-is set up or down at random after every ten actions; or 2000 without it, then it enters.  Plans are made from debiased counts, anew
-after each action, and learn nothing from the 60 queries; in the straight path between start and goal, and there only, is the raised table.
-Beside them: the lattice as a roadmap that was verified without the table, planned once or repaired when a motion fails.
+The left arm of the published robot, 81 states with 16 neighbours.  The agent makes 4000 curious transitions without the table, or with a
+table that moves up or down at random after every ten actions; or 2000 without it before the table enters.  Plans use debiased counts, are
+made anew after each action, and learn nothing from the 60 queries.  In each query the raised table blocks the straight path between start
+and goal, but neither of them.  For comparison the same lattice is a roadmap that was verified without the table; it is planned once, or
+repaired when a motion fails, for this query ("repairs") or for all later ones too ("remembers").
 The seeds draw noise and queries; all runs share one graph.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch7_learning.model_arrows import draw_arrows
 from experiments.claims.ch7_learning.planned_queries import TESTS, UP, Queries, TablePlant, roadmaps
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
@@ -29,49 +28,65 @@ from experiments.kit.learning.exploration import explore
 from experiments.kit.plots import draw_curve, draw_points, new_figure
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
-from mobee import CuriousAgent, TransitionModel
-from mobee.arrays import Array
+from mobee import CuriousAgent, Lattice, TransitionModel
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
+from mobee.learning.neighbours import NO_ACTION
 
 LEARNED, BEFORE = 4000, 2000  # transitions, in all and before the table enters
-AFTER = (0, 250, 500, 1000, 2000, 4000)  # transitions with the table that has entered
+AFTER = (0, 250, 500, 1000, 2000, 4000)  # transitions after the table has entered
 QUERIES = 60
-ENTERS = (1.0, 0.9)  # forgetting of the model while a table enters
+ENTERS = (1.0, 0.9)  # factors of forgetting of the models for which a table enters
 ROADMAPS = ("planned once", "repairs", "remembers")
 PLANNERS = {  # condition and mode: name
     ("still", "plans"): "MDP, trained without the table",
-    ("moving", "plans"): "MDP, trained while it moved",
+    ("moving", "plans"): "MDP, trained with the moving table",
     **{("roadmap", mode): f"roadmap, {mode}" for mode in ROADMAPS},
 }
-OF_ALL = ("success", "actions", "touched", "met")  # measures of roadmaps too
-MEASURES = (*OF_ALL, "promised", "kept", "through")
-TRIES, SURE = 2, 0.8  # tries from which a state-action counts, and probability from which an outcome is certain
-OPERABLE = 0.9  # success of a planner that works
+ROADMAP_MEASURES = {
+    "success": "share of queries that succeed",
+    "actions": "actions per query",
+    "touched": "share of actions that end at the table",
+    "met": "share of queries that meet the table",
+}
+MEASURES = ROADMAP_MEASURES | {
+    "promised": "predicted probability that the plan is followed",
+    "kept": "share of plans that are followed",
+    "through": "share of states on the path in which the raised table is",
+}
+MIN_TRIES, CERTAIN = 2, 0.8  # tries from which a state-action counts, and probability from which an outcome is certain
+OPERABLE = 0.9  # success from which a planner works
 
 FATES = Claim(
     "paper 3.1, fig. 7",
-    "most state-actions take the arm where they aim; of the few that do not, some lead elsewhere always and some sometimes",
+    "most state-actions of the learned model end in their goal; of the few that do not, some always end elsewhere, some sometimes",
     "7 lead elsewhere: 4 always, 3 sometimes",
 )
-ADAPTS = Claim("paper 2, 3.2", "no static workspace is required: the learned planner adapts to a table that enters", "no number")
-INOPERABLE = Claim("paper 3.2", "a non-static environment renders the PRM planner inoperable", "no number")
+ADAPTS = Claim("paper 2, 3.2", "the learned MDP planner needs no static workspace: it adapts to a table that enters", "no number")
+INOPERABLE = Claim("paper 3.2", "a PRM planner does not work in an environment that moves", "no number")
 PREDICTABLE = Claim(
-    "paper 3.2.1, thesis 7.4.1", "trained with dynamic obstacles, the planner avoids unpredictable state-actions", "no number"
+    "paper 3.2.1, thesis 7.4.1",
+    "an MDP planner trained with a moving obstacle avoids unpredictable state-actions: it needs fewer actions per query",
+    "no number",
 )
-AROUND = Claim("paper 3.2.1, thesis 7.4.1", "trained with dynamic obstacles, the planner plans around where they tend to be", "no number")
+AROUND = Claim(
+    "paper 3.2.1, thesis 7.4.1",
+    "an MDP planner trained with a moving obstacle plans around the region where it tends to be: fewer queries meet it",
+    "no number",
+)
 CLAIMS = (FATES, ADAPTS, INOPERABLE, PREDICTABLE, AROUND)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Learned without the table, with one that moves, and one that enters, with and without forgetting; and the roadmaps."""
+    """Return learning without the table, with one that moves, and with one that enters (with and without forgetting); and roadmaps."""
     settings: dict[str, Any] = {"queries": 10, "share": 0.25} if arguments.quick else {"queries": QUERIES, "share": 1.0}
-    lasting = [Condition(condition, settings | {"way": condition}) for condition in ("still", "moving", "roadmap")]
-    return lasting + [Condition(f"enters-{f:g}", settings | {"way": "enters", "forgetting": f}, 2.0) for f in ENTERS]
+    lasting = [Condition(condition, settings | {"training": condition}) for condition in ("still", "moving", "roadmap")]
+    return lasting + [Condition(f"enters-{f:g}", settings | {"training": "enters", "forgetting": f}, 2.0) for f in ENTERS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn, and follow plans; the means over the queries by name."""
-    condition, share, space = settings["way"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
+    """Learn, and follow plans; returns means over the queries."""
+    condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
     queries = Queries.of_seed(plant, space, settings["queries"], seed)
     if condition == "roadmap":
@@ -103,54 +118,54 @@ def _entered(agent: CuriousAgent, plant: TablePlant, queries: Queries, share: fl
 
 
 def fates(model: TransitionModel) -> dict[str, int]:
-    """The numbers of state-actions that reach their goal, or something else, always or sometimes, among those tried TRIES times."""
+    """Count the state-actions, among those tried often enough, that always reach their goal, always another state, or vary."""
     beliefs, space = model.debiased(), model.space
-    tried = model.tries >= TRIES
+    tried = model.tries >= MIN_TRIES
     probabilities = np.array(beliefs.probabilities)
     at_goal = (probabilities * (beliefs.outcomes == space.goals[..., None])).sum(axis=-1)
     likeliest = probabilities.max(axis=-1)
-    always = tried & (at_goal >= SURE)
-    elsewhere = tried & ~always & (likeliest >= SURE)
+    always = tried & (at_goal >= CERTAIN)
+    elsewhere = tried & ~always & (likeliest >= CERTAIN)
     counted = {"tried": tried, "goal": always, "elsewhere": elsewhere, "sometimes": tried & ~always & ~elsewhere}
     return {name: int(which.sum()) for name, which in counted.items()}
 
 
-Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # the values by condition and forgetting, if it has one
+Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # values by condition, and by forgetting if it has one
 
 
 def runs_of(found: Cells) -> Runs:
-    """The values of the finished runs of each condition, by seed."""
+    """Return the values of the finished runs of each condition, by seed."""
     runs: dict[tuple[str, float | None], list[dict[str, Any]]] = {}
-    for (condition,), results in grouped_by(found, "way").items():
+    for (condition,), results in grouped_by(found, "training").items():
         for result in results:
             runs.setdefault((condition, result.cell.settings.get("forgetting")), []).append(result.values)
     return runs
 
 
 def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "plans") -> Array:
-    """A measure of each seed; `mode`: "plans" of the MDP, or one of the ROADMAPS."""
+    """Return a measure of each seed; `mode`: "plans" of the MDP, or one of the ROADMAPS."""
     return np.array([run["tests"][mode][test][measure] for run in runs[condition, None]])
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
-    """Transitions since the table entered, and each measure (seeds, points)."""
-    mine = runs["enters", forgetting]
-    return list(mine[0]["after"]), {m: np.array([[point[m] for point in run["rows"]] for run in mine]) for m in MEASURES}
+    """Return the transitions since the table entered, and each measure then (seeds, points)."""
+    group = runs["enters", forgetting]
+    return list(group[0]["after"]), {m: np.array([[point[m] for point in run["rows"]] for run in group]) for m in MEASURES}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The claims, and the tables of plans that were carried out."""
+    """Return the claims, and the tables of plans that were executed."""
     runs = runs_of(found)
     return {"claims": [claim.record() for claim in measured(runs)], **tables(runs)}
 
 
 def tables(runs: Runs) -> dict[str, Any]:
-    """A row for each planner and world, and for each time since the table entered."""
-    tried = [
-        {
-            "who": name,
-            "table": test,
-            **{m: estimate(tested(runs, condition, test, m, mode)) for m in (OF_ALL if condition == "roadmap" else MEASURES)},
+    """Return a row for each planner and world, and for each time since the table entered."""
+    executed = [
+        {"planner": name, "table": test}
+        | {
+            label: estimate(tested(runs, condition, test, measure, mode))
+            for measure, label in (ROADMAP_MEASURES if condition == "roadmap" else MEASURES).items()
         }
         for (condition, mode), name in PLANNERS.items()
         for test in TESTS
@@ -159,20 +174,21 @@ def tables(runs: Runs) -> dict[str, Any]:
     for forgetting in ENTERS:
         after, rows = entering(runs, forgetting)
         entered += [
-            {"forgetting": forgetting, "transitions since": n, **{m: estimate(rows[m][:, i]) for m in MEASURES}}
+            {"forgetting": forgetting, "transitions since the table entered": n}
+            | {label: estimate(rows[measure][:, i]) for measure, label in MEASURES.items()}
             for i, n in enumerate(after)
         ]
-    return {"carried out": tried, "since the table entered": entered}
+    return {"plans executed": executed, "after the table entered": entered}
 
 
 def measured(runs: Runs) -> list[Claim]:
-    """The claims with our numbers, of the runs of all conditions."""
+    """Return the claims with our numbers, from the runs of all conditions."""
     return [
         _fates(runs),
         _adapts(runs),
         _inoperable(runs),
-        _less(PREDICTABLE, runs, "actions", "actions a query"),
-        _less(AROUND, runs, "met", "share of queries that meet it"),
+        _less(PREDICTABLE, runs, "actions"),
+        _less(AROUND, runs, "met"),
     ]
 
 
@@ -180,8 +196,8 @@ def _fates(runs: Runs) -> Claim:
     counts = [run["fates"] for run in runs["still", None]]
     share = np.array([c["goal"] / c["tried"] for c in counts])
     elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
-    text = f"{estimate(share)} of those tried {TRIES} times reach their goal, "
-    text += f"{estimate(elsewhere)} lead elsewhere, {estimate(sometimes)} sometimes"
+    text = f"of the state-actions tried {MIN_TRIES} times or more a share of {estimate(share)} reaches its goal; "
+    text += f"{estimate(elsewhere)} state-actions always end elsewhere, {estimate(sometimes)} sometimes"
     return FATES.measured(text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0)
 
 
@@ -190,7 +206,7 @@ def _adapts(runs: Runs) -> Claim:
     success, actions = rows["success"], rows["actions"]
     text = (
         f"success {estimate(success[:, 0])} when it enters, {estimate(success[:, -1])} {after[-1]} transitions later;"
-        f" actions a query {estimate(actions[:, 0])} and {estimate(actions[:, -1])}"
+        f" actions per query {estimate(actions[:, 0])} and {estimate(actions[:, -1])}"
     )
     return ADAPTS.measured(text, interval(success[:, -1] - success[:, 0])[0] > 0.0 and interval(actions[:, 0] - actions[:, -1])[0] > 0.0)
 
@@ -198,30 +214,35 @@ def _adapts(runs: Runs) -> Claim:
 def _inoperable(runs: Runs) -> Claim:
     once, repairs = (tested(runs, "roadmap", "moving", "success", mode) for mode in ("planned once", "repairs"))
     text = (
-        f"success with the moving table: planned once {estimate(once)}, repaired when a motion fails {estimate(repairs)};"
-        f" the MDP trained while it moved {estimate(tested(runs, 'moving', 'moving', 'success'))}"
+        f"success with the moving table: roadmap planned once {estimate(once)}, repaired when a motion fails {estimate(repairs)};"
+        f" MDP trained with the moving table {estimate(tested(runs, 'moving', 'moving', 'success'))}"
     )
     low, high = interval(repairs)
     return INOPERABLE.measured(text, False if low > OPERABLE else True if high < OPERABLE else None)
 
 
-def _less(claim: Claim, runs: Runs, measure: str, what: str) -> Claim:
-    """Whether an arm that learned with the moving table has less of something there than one that learned without."""
+def _less(claim: Claim, runs: Runs, measure: str) -> Claim:
+    """Judge whether a measure with the moving table is smaller for the MDP trained with that table than for the one without."""
     moving, still = (tested(runs, condition, "moving", measure) for condition in ("moving", "still"))
     low, high = interval(still - moving)
-    text = f"{what} with the moving table: {estimate(moving)}, trained without it {estimate(still)}; less by {estimate(still - moving)}"
+    text = f"{MEASURES[measure]}, trained with the moving table {estimate(moving)}, without it {estimate(still)}; "
+    text += f"difference {estimate(still - moving)}"
     return claim.measured(text, True if low > 0.0 else False if high < 0.0 else None)
 
 
 COLORS = dict(zip(PLANNERS, ("tab:gray", "tab:red", "0.75", "tab:cyan", "tab:blue"), strict=True))
-TITLES = {"still": "learned without the table", "moving": "learned while the table goes up and down"}
+TITLES = {"still": "model learned without the table", "moving": "model learned while the table moves up and down"}
+
+BLOCK_DISTANCE = 4.6  # between blocks of states, in units of the distance of states in a block
+COLOURED, SHOWN = 0.3, 0.08  # probabilities of unexpected states: from which a state-action is coloured, and an arrow drawn
+LEVEL_NAMES = ("123", "abc", ("I", "II", "III"), "ABC")  # of pitch, roll, yaw and elbow, as in the paper
 
 
 def plot(found: Cells) -> Any:
-    """The learned models as in fig. 7, the plans with a moving table, and how they recover when it has entered."""
+    """Draw the learned models as in fig. 7, the plans with a moving table, and their recovery after a table has entered."""
     runs = runs_of(found)
     if not runs.keys() >= {*((condition, None) for condition in ("still", "moving", "roadmap")), *(("enters", f) for f in ENTERS)}:
-        raise InvalidValue("some conditions lack finished cells: go on with --resume.")
+        raise InvalidValue("some cells are not finished: continue the run with --resume.")
     drawing = new_figure(19.0, 13.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(2.0, 1.0))
     for axes, (condition, title) in zip(above.subplots(1, 2), TITLES.items(), strict=True):
@@ -229,36 +250,103 @@ def plot(found: Cells) -> Any:
         draw_arrows(axes, arm_space(RANK3, ARM_NEIGHBOURS), values["outcomes"], values["probabilities"])
         axes.set_title(title, fontsize=10)
     success, met, recovering, plans = below.subplots(1, 4)
-    _moving(success, runs, "success", "share of queries that succeed")
+    _moving(success, runs, "success")
     success.legend(fontsize=7)
-    _moving(met, runs, "met", "share of queries that meet the table")
-    _entering(recovering, runs, "success", "share of queries that succeed")
-    _entering(plans, runs, "actions", "actions a query")
+    _moving(met, runs, "met")
+    _entering(recovering, runs, "success")
+    _entering(plans, runs, "actions")
     return drawing
 
 
-def _moving(axes: Any, runs: Runs, measure: str, label: str) -> None:
+def _moving(axes: Any, runs: Runs, measure: str) -> None:
     for number, ((condition, mode), name) in enumerate(PLANNERS.items()):
         values = [tested(runs, condition, test, measure, mode) for test in TESTS]
         style = {"fmt": "o", "color": COLORS[condition, mode], "capsize": 3, "markersize": 5}
         draw_points(axes, np.arange(3) + 0.1 * (number - 2), values, label=name, **style)
-    axes.set_xticks(range(3), [f"table {test}" for test in TESTS])
-    axes.set(ylabel=label, xlabel="while plans are carried out")
+    axes.set_xticks(range(3), TESTS)
+    axes.set(ylabel=MEASURES[measure], xlabel="table while the plans are executed")
     axes.grid(alpha=0.2)
 
 
-def _entering(axes: Any, runs: Runs, measure: str, label: str) -> None:
+def _entering(axes: Any, runs: Runs, measure: str) -> None:
     for forgetting, color in zip(ENTERS, ("tab:blue", "tab:orange"), strict=True):
         after, rows = entering(runs, forgetting)
-        draw_curve(axes, after, rows[measure], color, "all is remembered" if forgetting == 1.0 else f"counts fade by {forgetting:g}")
-    axes.set(xlabel="transitions since the table entered", ylabel=label)
+        draw_curve(axes, after, rows[measure], color, "no forgetting" if forgetting == 1.0 else f"forgetting {forgetting:g}")
+    axes.set(xlabel="transitions since the table entered", ylabel=MEASURES[measure])
     axes.legend(fontsize=8)
     axes.grid(alpha=0.2)
 
 
+def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array) -> None:
+    """Draw the transition model of a rank 3 arm, `outcomes` and `probabilities` (S, A, B), as in fig. 7 of the paper.
+
+    Pitch and elbow vary within a block, roll and yaw from block to block.  Each arrow is a probability.  Grey: state-actions that end in
+    their goal, or where they start; each colour: one state-action that ends in another state.
+    """
+    from matplotlib import colormaps
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import FancyArrowPatch
+
+    places = _places(len(space))
+    states, actions = np.nonzero(space.goals != NO_ACTION)
+    goals = space.goals[states, actions]
+    axes.add_collection(
+        LineCollection(list(np.stack([places[states], places[goals]], axis=1)), colors="0.5", linewidths=0.3, alpha=0.18, zorder=1)
+    )
+    colors = colormaps["turbo"]
+    coloured = list(_unexpected(space, outcomes, probabilities))
+    for number, (state, action) in enumerate(coloured):
+        color = colors((number * 0.618) % 1.0)  # distant colours for neighbours in the list
+        for outcome, probability in zip(outcomes[state, action], probabilities[state, action], strict=True):
+            if probability >= SHOWN and outcome != state:
+                arrow = FancyArrowPatch(
+                    places[state],
+                    places[outcome],
+                    connectionstyle="arc3,rad=0.15",
+                    arrowstyle="-|>",
+                    mutation_scale=4.0 + 5.0 * probability,
+                    linewidth=2.0 * probability,
+                    color=color,
+                    shrinkA=2.0,
+                    shrinkB=2.0,
+                    zorder=3,
+                )
+                axes.add_patch(arrow)
+    axes.plot(*places.T, "o", color="0.2", markersize=2.2, zorder=2)
+    _label(axes, places)
+    axes.set(xlim=(-1.3, 2.0 * BLOCK_DISTANCE + 3.0), ylim=(-1.6, 2.0 * BLOCK_DISTANCE + 2.6))
+    axes.set_axis_off()
+    axes.text(BLOCK_DISTANCE + 1.0, -1.55, f"{len(coloured)} coloured of {len(states)} state-actions", ha="center", fontsize=8)
+
+
+def _unexpected(space: Lattice, outcomes: Ints, probabilities: Array) -> Iterator[tuple[int, int]]:
+    """Yield state-actions with a likely outcome that is neither their goal nor where they start."""
+    for state in range(len(space)):
+        for action, goal in enumerate(space.actions(state)):
+            other = (outcomes[state, action] != goal) & (outcomes[state, action] != state)
+            if probabilities[state, action][other].max(initial=0.0) >= COLOURED:
+                yield state, action
+
+
+def _places(count: int) -> Array:
+    """Return drawing positions (S, 2): pitch and roll to the right, elbow and yaw up; tilted, so that arrows do not cover each other."""
+    pitch, roll, yaw, elbow = (np.arange(count)[:, None] // 3 ** np.arange(4) % 3).T
+    x = BLOCK_DISTANCE * roll + pitch + 0.18 * (elbow - 1)
+    y = BLOCK_DISTANCE * yaw + elbow + 0.18 * (pitch - 1)
+    return np.stack([x, y], axis=1)
+
+
+def _label(axes: Any, places: Array) -> None:
+    for level in range(3):
+        axes.text(BLOCK_DISTANCE * level + 1.0, -1.1, f"roll {LEVEL_NAMES[1][level]}", ha="center", fontsize=8)
+        axes.text(-0.9, BLOCK_DISTANCE * level + 1.0, f"yaw {LEVEL_NAMES[2][level]}", ha="center", va="center", rotation=90, fontsize=8)
+        axes.text(places[level, 0], places[level, 1] - 0.45, LEVEL_NAMES[0][level], ha="center", fontsize=6, color="0.4")
+        axes.text(places[27 * level, 0] - 0.4, places[27 * level, 1], LEVEL_NAMES[3][level], va="center", fontsize=6, color="0.4")
+
+
 EXPERIMENT = Experiment(
     name="mdp-planner",
-    claim="the learned planner needs no static workspace, and trained with a moving obstacle it plans around where that tends to be",
+    claim="the learned MDP planner needs no static workspace; trained with a moving obstacle, it plans around where that tends to be",
     source="paper 3.1, 3.2.1, fig. 7; thesis 7.4.1",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

@@ -1,15 +1,15 @@
-"""Accuracy: how true is what an agent has learnt of its actions?
+"""Measure the error of learned transition models, for several explorers, with and without imagined outcomes.
 
-Claim: curiosity learns the stochastic actions better than least-tried exploration, and counts without the imagined ones are about ten
-times truer than the thesis' counts.  Source: aims of this reproduction; the thesis claims exploration that is "data-efficient" (7.2.1)
-without measuring the model.  No numbers are published.  Run time: 3 minutes on 2 cores.
+Claim: curiosity learns the stochastic actions better than least-tried exploration, and the error of counts without imagined outcomes
+(debiased counts) is about a tenth of that of the thesis' counts.  Source: aims of this reproduction; the thesis calls the exploration
+"data-efficient" (7.2.1) without measuring the model.  No numbers are published.  Run time: 3 minutes on 2 cores.
 
-The error of a state-action is the L1 distance, 0 to 2, between the believed and the true distribution over outcomes.  The left arm on
-81 and on 256 states (20-80 %), equidistant neighbours, and a table, known exactly, in which a plane cuts off three of 81 states.  The
-arm's truth is that of walks which try every action 80 or 40 times, from starts that are reached as an agent reaches them.  Stochastic
-are actions whose most likely outcome has less than .9: none of 432 on the arm with 81 states, some 25 of 1536 with 256, 13 of 432 of
-the table.  A truth of so few tries has an error of its own, some .1 for an even chance: a floor to what is measured, which makes
-ratios on the stochastic actions of the arm too small.
+The error of a state-action is the L1 distance, 0 to 2, between the believed and the true distribution of outcomes.  There are three worlds:
+the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant neighbours, and a tabular world, whose outcomes are known
+exactly, in which a plane separates three of 81 states from the others ("half-space").  The arm's true outcomes are estimated by walks that
+try every action 80 or 40 times.  An action is stochastic if its most likely outcome has a probability below .9: none of 432 on the arm with
+81 states, some 25 of 1536 with 256, 13 of 432 in the half-space.  An estimate from so few tries has an error of its own, some .1 for two
+equally likely outcomes.  It is a lower bound of measured errors, and makes the ratios for stochastic actions of the arm too small.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from mobee.learning.value_iteration import OutcomeModel
 
 @dataclass(frozen=True)
 class World:
-    """A lattice, the explorers on it, and their transitions.  `tries`: of each action in each walk; 0: the truth is a table."""
+    """A lattice, its explorers and their transitions.  `tries`: of each action in each walk; 0: the true outcomes are a table."""
 
     text: str
     levels: tuple[float, ...]
@@ -53,48 +53,59 @@ WORLDS = {
     "rank4": World("arm, 256 states", RANK4, ("curious", "least_tried", "depleting"), 8000, tries=20),
 }
 WALK, WALKS = "walk", (9001, 9002)  # in place of an explorer; seeds that no explorer has
-LONGEST_WALK = 40_000  # actions; rank 4 has states that no walk reaches
+MAX_WALK = 40_000  # actions; rank 4 has states that no walk reaches
 SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0)  # of a world's transitions, after which the error of its models is measured
-MOST, BETTER, AIM, TEN = 0.04, 1.6, 2.0, 8.0  # L1; times; times; times
+MAX_ERROR = 0.04  # L1
+CURIOUS_RATIO, DEPLETING_RATIO, DEBIASED_RATIO = 1.6, 2.0, 8.0  # our aims: the larger error over the smaller one
 
 _AIM = "aim of this reproduction"
 OVERALL = {
-    world: Claim(_AIM, f"L1 of the model at most {MOST} after 4000 curious transitions with debiased counts ({text})", f"at most {MOST}")
+    world: Claim(
+        _AIM,
+        f"after 4000 curious transitions the L1 error of the model with debiased counts is at most {MAX_ERROR} ({text})",
+        f"at most {MAX_ERROR}",
+    )
     for world, text in (("half-space", "half-space"), ("rank3", "arm, 81 states"))
 }
 STOCHASTIC = {
     (world, explorer): Claim(
-        _AIM, f"on stochastic actions the {explorer} agent's model is truer than least-tried's ({text})", f"at least {times} x"
+        _AIM,
+        f"on stochastic actions the {explorer} agent's model has a smaller error than the least-tried agent's: ratio ({text})",
+        f"at least {times} x",
     )
     for world, text in (("half-space", "half-space"), ("rank4", "arm, 256 states"))
-    for explorer, times in (("curious", BETTER), ("depleting", AIM))
+    for explorer, times in (("curious", CURIOUS_RATIO), ("depleting", DEPLETING_RATIO))
 }
-WITHOUT = Claim(_AIM, "without the imagined counts the model is many times truer (arm, 81 states)", f"at least {TEN:.0f} x")
+WITHOUT = Claim(
+    _AIM,
+    "without imagined outcomes the error of the model is many times smaller: ratio (arm, 81 states)",
+    f"at least {DEBIASED_RATIO:.0f} x",
+)
 CLAIMS = (*OVERALL.values(), *STOCHASTIC.values(), WITHOUT)
 
-COLUMNS = ("counts", "counts_stochastic", "debiased", "debiased_stochastic")
+COLUMNS = ("L1_with_imagined", "L1_with_imagined_stochastic", "L1_debiased", "L1_debiased_stochastic")
 COUNTS, DEBIASED, DEBIASED_STOCHASTIC = 0, 2, 3
 
 
 @cache
 def space_of(world: str) -> Lattice:
-    """The lattice of a world, with equidistant neighbours."""
+    """Return the lattice of a world, with equidistant neighbours."""
     return arm_space(WORLDS[world].levels)
 
 
 def plant_of(world: str) -> Callable[[int], Plant]:
-    """The function that makes the world's plant of a seed."""
+    """Return the function that makes the world's plant from a seed."""
     return arm_plant if WORLDS[world].tries else half_space_plant
 
 
 def half_space_plant(seed: int) -> TabularPlant:
-    """The half-space in which states 24, 51 and 78 are cut off."""
+    """Return the half-space in which the states 24, 51 and 78 are separated from the others."""
     space = space_of("half-space")
     return TabularPlant(space, *half_space(space), seed)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """The walks that find the truth of the arm, and every explorer in its worlds; the short version has the half-space only."""
+    """Return the walks that measure the arm's true outcomes, and every explorer in its worlds; --quick: only the half-space."""
     worlds = {name: world for name, world in WORLDS.items() if not (arguments.quick and world.tries)}
     walks = [
         Condition(f"truth-{name}", {"world": name, "explorer": WALK}, cost=8.0, seeds=WALKS)
@@ -110,18 +121,18 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; the transitions (T, 3)."""
+    """Explore; returns the transitions (T, 3)."""
     name, explorer = settings["world"], settings["explorer"]
     space, world, plant = space_of(name), WORLDS[name], plant_of(name)
     if explorer == WALK:
-        return {"seen": walk(space, plant, world.tries, LONGEST_WALK, seed).astype(np.uint16)}
+        return {"seen": walk(space, plant, world.tries, MAX_WALK, seed).astype(np.uint16)}
     own = plant(seed)
     begin_nearby(space, own, seed)
     return {"seen": explore(CuriousAgent(space, own, explorer, seed), world.transitions).astype(np.uint16)}
 
 
 def truths(found: Cells) -> dict[str, OutcomeModel]:
-    """The truth of each world that has one: the half-space's own table, the arm's by the walks among the cells."""
+    """Return the true outcomes of each world: the half-space's own table, and the arm's as far as its walks are finished."""
     known: dict[str, OutcomeModel] = {"half-space": half_space_plant(0)}
     for (world, explorer), walks in grouped_by(found, "world", "explorer").items():
         if explorer == WALK:
@@ -130,21 +141,21 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
 
 
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
-    """The error curves of every explorer in every world whose truth is known, (seeds, times, columns)."""
+    """Return the error curves of every explorer in every world whose true outcomes are known, (seeds, times, columns)."""
     return {
-        (world, explorer): np.array([error_curve(world, known[world], one.values["seen"]) for one in mine])
-        for (world, explorer), mine in grouped_by(found, "world", "explorer").items()
+        (world, explorer): np.array([error_curve(world, known[world], one.values["seen"]) for one in results])
+        for (world, explorer), results in grouped_by(found, "world", "explorer").items()
         if explorer != WALK and world in known
     }
 
 
 def times(world: str) -> list[int]:
-    """The transitions after which the error of a world's models is measured."""
+    """Return the transitions after which the error of a world's models is measured."""
     return [round(share * WORLDS[world].transitions) for share in SHARES]
 
 
 def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
-    """Learn again from transitions (T, 3); the errors, shape (times, columns), NaN beyond the last transition."""
+    """Learn again from transitions (T, 3); returns the errors, shape (times, columns), NaN beyond the last transition."""
     model, at = TransitionModel(space_of(world)), times(world)
     beliefs = (model, model.debiased())
     curve = np.full((len(at), len(COLUMNS)), np.nan)
@@ -156,16 +167,19 @@ def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each world and explorer at the last time, and the claims."""
+    """Return a row for each world and explorer at the last time, and the claims."""
     known = truths(found)
     last = {key: curves[:, -1] for key, curves in errors(found, known).items()}
     floors = {world: truth_error(truth) for world, truth in known.items()}
-    rows = {" ".join(key): _row(mine, known[key[0]], floors[key[0]]) for key, mine in last.items()}
+    rows = {
+        f"{WORLDS[world].text}; {explorer.replace('_', ' ')}": _row(errors, known[world], floors[world])
+        for (world, explorer), errors in last.items()
+    }
     return {"runs": rows, "claims": [claim.record() for claim in measured(last, floors)]}
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """The error of the truth itself on the stochastic actions, a floor to measured errors: 0 for a table; None without any."""
+    """Return the error of the true outcomes' estimate on stochastic actions: 0 for a table; None if no action is stochastic."""
     stochastic = most_likely(truth) < CERTAIN
     if not stochastic.any():
         return None
@@ -176,11 +190,12 @@ def _row(last: Array, truth: OutcomeModel, floor: float | None) -> dict[str, Any
     numbers = {
         name: interquartile_mean(column) if np.isfinite(column).all() else None for name, column in zip(COLUMNS, last.T, strict=True)
     }
-    return {"seeds": len(last), "stochastic_actions": int((most_likely(truth) < CERTAIN).sum()), **numbers, "truth_stochastic": floor}
+    stochastic = int((most_likely(truth) < CERTAIN).sum())
+    return {"seeds": len(last), "stochastic_actions": stochastic, **numbers, "error_of_estimated_truth_stochastic": floor}
 
 
 def measured(last: Mapping[tuple[str, str], Array], floors: Mapping[str, float | None]) -> list[Claim]:
-    """The claims with our numbers as far as their runs were made, of the errors (seeds, columns) at the last time."""
+    """Return the claims, with our numbers as far as their runs are finished, from the errors (seeds, columns) at the last time."""
 
     def column(world: str, explorer: str, number: int) -> Array | None:
         rows = last.get((world, explorer))
@@ -188,19 +203,20 @@ def measured(last: Mapping[tuple[str, str], Array], floors: Mapping[str, float |
 
     claims = []
     for world, claim in OVERALL.items():
-        mine = column(world, "curious", DEBIASED)
-        claims.append(claim if mine is None else claim.measured(estimate(mine, 4), decides(interval(mine), most=MOST)))
+        ours = column(world, "curious", DEBIASED)
+        claims.append(claim if ours is None else claim.measured(estimate(ours, 4), decides(interval(ours), most=MAX_ERROR)))
     for (world, explorer), claim in STOCHASTIC.items():
-        least = BETTER if explorer == "curious" else AIM
-        rival, mine = (column(world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
+        least = CURIOUS_RATIO if explorer == "curious" else DEPLETING_RATIO
+        rival, ours = (column(world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
         floor = floors.get(world)
-        claims.append(_ratio(claim, rival, mine, least, f"; the truth's own error, a floor to both, is {floor:.3f}" if floor else ""))
-    claims.append(_ratio(WITHOUT, column("rank3", "curious", COUNTS), column("rank3", "curious", DEBIASED), TEN))
+        note = f"; the estimate of the true outcomes has itself an error of {floor:.3f}" if floor else ""
+        claims.append(_ratio(claim, rival, ours, least, note))
+    claims.append(_ratio(WITHOUT, column("rank3", "curious", COUNTS), column("rank3", "curious", DEBIASED), DEBIASED_RATIO))
     return claims
 
 
 def _ratio(claim: Claim, above: Array | None, below: Array | None, least: float, note: str = "") -> Claim:
-    """Whether what is above is that many times what is below; open if one is not known, or the interval holds the number."""
+    """Judge whether the ratio of two errors is at least `least`; open if one is not known, or the interval contains `least`."""
     if above is None or below is None:
         return claim
     factor = ratio_estimate(above, below).replace(" ", " x ", 1)
@@ -209,7 +225,7 @@ def _ratio(claim: Claim, above: Array | None, below: Array | None, least: float,
 
 
 def plot(found: Cells) -> Any:
-    """Error against transitions, a column a world: all actions, counts dashed and debiased solid; below the stochastic ones, debiased."""
+    """Draw errors over transitions, one column per world: above all actions (dashed with imagined outcomes), below stochastic ones."""
     curves = errors(found, truths(found))
     worlds = [world for world in WORLDS if any(key[0] == world for key in curves)]
     drawing = new_figure(4.6 * len(worlds), 6.4)
@@ -221,20 +237,20 @@ def plot(found: Cells) -> Any:
                 above.plot(times(world), counts, "--", color=f"C{number}", linewidth=0.9)
                 above.plot(times(world), debiased, color=f"C{number}", label=label)
                 below.plot(times(world), stochastic, color=f"C{number}", label=label)
-        above.set(title=WORLDS[world].text, ylabel="L1, all actions", yscale="log")
+        above.set(title=WORLDS[world].text, ylabel="L1 error, all actions", yscale="log")
         above.title.set_fontsize(9)
-        below.set(xlabel="transitions", ylabel="L1, stochastic actions", ylim=(0.0, None))
+        below.set(xlabel="transitions", ylabel="L1 error, stochastic actions", ylim=(0.0, None))
         if not any(np.isfinite(curves[key][:, :, DEBIASED_STOCHASTIC]).any() for key in curves if key[0] == world):
-            below.text(0.5, 0.5, "there is none", transform=below.transAxes, ha="center")
+            below.text(0.5, 0.5, "no action is stochastic", transform=below.transAxes, ha="center")
         above.grid(alpha=0.2)
         below.grid(alpha=0.2)
-    drawing.axes[0].legend(fontsize=7, title="debiased; dashed: with imagined counts", title_fontsize=7)
+    drawing.axes[0].legend(fontsize=7, title="debiased; dashed: with imagined outcomes", title_fontsize=7)
     return drawing
 
 
 EXPERIMENT = Experiment(
     name="model-accuracy",
-    claim="curiosity learns the stochastic actions best, and counts without the imagined ones are ten times truer",
+    claim="curiosity learns stochastic actions best, and without imagined outcomes the model's error is a tenth",
     source="aims of this reproduction, to thesis 7.2.1",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

@@ -1,13 +1,13 @@
-"""Connectivity: how many actions should a state have?
+"""Compare graphs with different numbers of neighbours per state, by learning time and by the plans of the learned models.
 
-Claim: the 16 neighbours a state of the published experiments were denser than necessary; fewer connections would shorten the time
-it takes to learn.  Source: paper 4.1 (an impression, no numbers).  Run time: 4 minutes on 2 cores.
+Claim: the published 16 neighbours per state are more than necessary; fewer connections would shorten the learning time.
+Source: paper 4.1 (an impression, no numbers).  Run time: 4 minutes on 2 cores.
 
 The left arm with its cable constraints and self-contacts; 81 states with actions to their 4 to 32 nearest neighbours (ties drawn anew
-for every seed) or to the equidistant ones.  The curious agent learns; at fixed numbers of transitions its model is frozen, and
-60 random pairs of states, the same for all graphs, become tasks: follow the plan until the part is in the goal state, for at
-most 12 actions, on the same kind of robot with other noise.  A path is direct if no other could be shorter were every action to
-succeed.  Learning time: transitions until every state-action was tried once.
+for every seed) or to the equidistant ones.  The curious agent learns.  After fixed numbers of transitions, its model is tested in 60 tasks,
+random pairs of states, which are the same for all graphs: follow the plan until the arm is in the goal state, with at most 12 actions, on a
+robot with other noise.  A task is solved directly if it takes the fewest actions that its graph allows.  The learning time is the number of
+transitions until every state-action was tried once.
 """
 
 from __future__ import annotations
@@ -29,32 +29,32 @@ from mobee.errors import InvalidValue
 
 GRAPHS: tuple[int | str, ...] = (4, 6, 8, 12, 16, 24, 32, "equidistant")
 BUDGETS = (250, 500, 1000, 2000, 4000)  # transitions
-JUDGED = 1000  # the budget of the verdict
-TASKS, MOST_ACTIONS = 60, 12
+JUDGED = 1000  # transitions after which the graphs are compared
+TASKS, MAX_ACTIONS = 60, 12
 DISCOUNT, TOLERANCE = 0.9, 1e-6  # of plans
-PUBLISHED = 16
-MARGIN = 0.02  # of success, within which two graphs plan as well
+PUBLISHED = 16  # neighbours
+MARGIN = 0.02  # of success: a share at most this much lower counts as equal
 
-SOONER = Claim("paper 4.1", "fewer neighbours shorten the time to learn: transitions until everything was tried once", "qualitative")
+SOONER = Claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
 DENSER = Claim(
     "paper 4.1",
-    "16 neighbours are more than necessary: a sparser graph reaches its goals as surely and as directly after 1000 transitions",
+    "16 neighbours are more than necessary: after 1000 transitions plans in a sparser graph succeed as often and as directly",
     "an impression",
 )
-LENGTH = Claim("paper 4.1", "what fewer neighbours cost: actions on the way, after the last budget", "-")
+LENGTH = Claim("paper 4.1", "with fewer neighbours plans are longer: actions per solved task, after the last transition", "-")
 CLAIMS = (SOONER, DENSER, LENGTH)
 
-Groups = Mapping[int | str, list[dict[str, Any]]]  # the values of the runs of each graph, with their budgets
+Groups = Mapping[int | str, list[dict[str, Any]]]  # values of the runs, with their budgets, by graph
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every graph; the short version stops learning early."""
+    """Return one condition per graph; the short version learns less."""
     budgets = list(BUDGETS[:3] if arguments.quick else BUDGETS)
     return [Condition(f"k{graph}-n{budgets[-1]}", {"graph": graph, "budgets": budgets, "tasks": TASKS}) for graph in GRAPHS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn, and solve the tasks after each budget: success, and actions of those that succeeded, both (budgets, tasks)."""
+    """Learn, and try the tasks after each budget of transitions; returns `reached` and `actions` (budgets, tasks)."""
     space, plant = arm_space(neighbours=settings["graph"], tie_seed=seed), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed)
@@ -67,7 +67,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
             covered = agent.transitions if agent.model.tries[space.goals >= 0].all() else None
         explore(agent, budget - agent.transitions)
         other = arm_plant(seed + 1000)
-        attempts = [attempt(agent.model, other, start, goal, MOST_ACTIONS) for start, goal in tasks]
+        attempts = [attempt(agent.model, other, start, goal, MAX_ACTIONS) for start, goal in tasks]
         reached.append([one.reached for one in attempts])
         actions.append([one.actions for one in attempts])
     return {
@@ -80,13 +80,13 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def drawn_tasks(space: Space, count: int, seed: int) -> list[tuple[int, int]]:
-    """Random pairs of different states: start and goal."""
+    """Return random pairs of different states, start and goal."""
     rng = np.random.default_rng(seed)
     return [(int(a), int(b)) for a, b in (rng.choice(len(space), 2, replace=False) for _ in range(count))]
 
 
 def fewest_actions(space: Space, start: int, goal: int) -> int:
-    """The number of actions from one state to another if each succeeds; raises InvalidValue if none lead there."""
+    """Return the number of actions from one state to another if each succeeds; raises InvalidValue if there is no path."""
     reached, count = {start}, 0
     while goal not in reached:
         further = {int(to) for state in reached for to in space.actions(state)} | reached
@@ -97,14 +97,14 @@ def fewest_actions(space: Space, start: int, goal: int) -> int:
 
 
 class Attempt(NamedTuple):
-    """Whether the goal was reached, with how many actions."""
+    """Whether the goal was reached, and the number of actions."""
 
     reached: bool
     actions: int
 
 
 def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, most: int) -> Attempt:
-    """Go to `start` directly, then by the plan to `goal` with at most that many actions; the model stays as it is.
+    """Go to `start` directly, then follow the plan to `goal` with at most `most` actions; the model does not change.
 
     The plan maximises the discounted probability of coming into the goal state, by the debiased counts.
     """
@@ -124,7 +124,7 @@ def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, 
 
 
 def groups(found: Cells) -> Groups:
-    """The values of the runs of each graph, by seed, with their budgets."""
+    """Return the values of the runs of each graph, by seed, with their budgets."""
     cells = grouped_by(found, "graph")
     return {
         graph: [{**result.values, "budgets": result.cell.settings["budgets"]} for result in cells[graph,]]
@@ -134,28 +134,28 @@ def groups(found: Cells) -> Groups:
 
 
 def success(run: Mapping[str, Any], budget: int) -> float:
-    """Share of the tasks that succeeded after a budget."""
+    """Return the share of the tasks that were solved after a budget of transitions."""
     return float(np.mean(run["reached"][run["budgets"].index(budget)]))
 
 
 def direct(run: Mapping[str, Any], budget: int) -> float:
-    """Share of the tasks that were solved with the fewest actions that the graph allows."""
+    """Return the share of the tasks that were solved with the fewest actions that the graph allows."""
     place = run["budgets"].index(budget)
     return float(np.mean(run["reached"][place] & (run["actions"][place] <= run["fewest"])))
 
 
 def length(run: Mapping[str, Any]) -> float:
-    """Mean number of actions of the tasks that succeeded, after the last budget."""
+    """Return the mean number of actions of the solved tasks, after the last budget."""
     return float(run["actions"][-1][run["reached"][-1]].mean())
 
 
 def learning_times(runs: list[dict[str, Any]]) -> list[int]:
-    """Transitions until every state-action was tried once, of the runs that got so far."""
+    """Return the transitions until every state-action was tried once, of the runs in which all were tried."""
     return [run["covered"] for run in runs if run["covered"] is not None]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each graph, and the claims if all graphs were run."""
+    """Return a row for each graph, and the claims if all graphs were run."""
     grouped = groups(found)
     rows = {f"{graph} neighbours": _row(runs) for graph, runs in grouped.items()}
     complete = all(graph in grouped for graph in GRAPHS)
@@ -165,37 +165,37 @@ def findings(found: Cells) -> dict[str, Any]:
 def _row(runs: list[dict[str, Any]]) -> dict[str, Any]:
     times = learning_times(runs)
     row: dict[str, Any] = {"seeds": len(runs), "state_actions": runs[0]["state_actions"]}
-    row["learned_after"] = round(interquartile_mean(times)) if times else None
+    row["transitions_until_all_tried"] = round(interquartile_mean(times)) if times else None
     for budget in runs[0]["budgets"]:
-        row[f"success_{budget}"] = interquartile_mean([success(run, budget) for run in runs])
-        row[f"direct_{budget}"] = interquartile_mean([direct(run, budget) for run in runs])
-    return row | {"actions": mean_over(runs, length)}
+        row[f"solved_after_{budget}"] = interquartile_mean([success(run, budget) for run in runs])
+        row[f"solved_directly_after_{budget}"] = interquartile_mean([direct(run, budget) for run in runs])
+    return row | {"actions_per_solved_task": mean_over(runs, length)}
 
 
 def measured(grouped: Groups) -> list[Claim]:
-    """The claims with our numbers, of the runs of all graphs."""
+    """Return the claims with our numbers, from the runs of all graphs."""
     fewer = {graph: runs for graph, runs in grouped.items() if isinstance(graph, int) and graph <= PUBLISHED}
     return [
         _sooner({graph: learning_times(runs) for graph, runs in fewer.items()}, len(grouped[PUBLISHED])),
         _denser(fewer),
-        LENGTH.measured(", ".join(f"{graph}: {estimate([length(run) for run in runs])}" for graph, runs in fewer.items()), None),
+        LENGTH.measured(", ".join(f"{graph} neighbours: {estimate([length(run) for run in runs])}" for graph, runs in fewer.items()), None),
     ]
 
 
 def _sooner(times: Mapping[int, list[int]], seeds: int) -> Claim:
-    """Open while a run has not tried everything: those that have are the quicker ones."""
+    """Compare learning times; open if a run did not try everything, because those that did are the quicker ones."""
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}
-    text = ", ".join(f"{graph}: {time:.0f}" for graph, time in middle.items())
+    text = ", ".join(f"{graph} neighbours: {time:.0f}" for graph, time in middle.items())
     unfinished = sum(seeds - len(found) for found in times.values())
     if unfinished:
-        return SOONER.measured(f"{text}; {unfinished} runs had not tried everything", None)
+        return SOONER.measured(f"{text}; {unfinished} runs had not tried every action", None)
     fewest, *_, most = times.values()
     ordered = list(middle.values())
     return SOONER.measured(text, decides(ratio_interval(fewest, most), most=1.0) if ordered == sorted(ordered) else False)
 
 
 def _denser(fewer: Mapping[int, list[dict[str, Any]]]) -> Claim:
-    """Whether a sparser graph succeeds as often, and as directly, as the published one."""
+    """Judge whether plans in a sparser graph succeed as often, and as directly, as in the published one."""
     shares = {graph: [success(run, JUDGED) for run in runs] for graph, runs in fewer.items()}
     straight = {graph: [direct(run, JUDGED) for run in runs] for graph, runs in fewer.items()}
     enough = any(
@@ -203,11 +203,12 @@ def _denser(fewer: Mapping[int, list[dict[str, Any]]]) -> Claim:
         for graph in fewer
         if graph < PUBLISHED
     )
-    return DENSER.measured(", ".join(f"{graph}: {estimate(shares[graph])}, direct {estimate(straight[graph])}" for graph in fewer), enough)
+    each = (f"{graph} neighbours: solved {estimate(shares[graph])}, directly {estimate(straight[graph])}" for graph in fewer)
+    return DENSER.measured("; ".join(each), enough)
 
 
 def plot(found: Cells) -> Any:
-    """Success, length of the path and learning time against the number of neighbours."""
+    """Draw success, length of the paths and learning time over the number of neighbours."""
     grouped = groups(found)
     budgets = next(iter(grouped.values()))[0]["budgets"]
     drawing = new_figure(13.0, 4.0)
@@ -217,13 +218,13 @@ def plot(found: Cells) -> Any:
     for budget in budgets:
         shares = [[100.0 * direct(run, budget) for run in runs] for runs in grouped.values()]
         draw_points(left, names, shares, label=f"after {budget} transitions", **style)
-    left.set(ylabel="tasks solved as directly as can be [%]", xlabel="neighbours", ylim=(None, 100.5))
+    left.set(ylabel="tasks solved directly [%]", xlabel="neighbours per state", ylim=(None, 100.5))
     lengths = [[length(run) for run in runs] for runs in grouped.values()]
     draw_points(middle, names, lengths, label=f"after {budgets[-1]} transitions", **style)
-    middle.set(ylabel="actions on the way", xlabel="neighbours")
+    middle.set(ylabel="actions per solved task", xlabel="neighbours per state")
     times = {name: mine for name, runs in zip(names, grouped.values(), strict=True) if (mine := learning_times(runs))}
-    draw_points(right, list(times), list(times.values()), label="until everything was tried once", **style)
-    right.set(ylabel="transitions", xlabel="neighbours")
+    draw_points(right, list(times), list(times.values()), label="until every action was tried once", **style)
+    right.set(ylabel="transitions", xlabel="neighbours per state")
     for axes in (left, middle, right):
         axes.legend(fontsize=8)
         axes.grid(alpha=0.2)
@@ -233,7 +234,7 @@ def plot(found: Cells) -> Any:
 
 EXPERIMENT = Experiment(
     name="neighbour-count",
-    claim="16 neighbours a state are more than are needed: with fewer the robot learns sooner and plans as well",
+    claim="16 neighbours per state are more than necessary: with fewer the robot learns sooner and plans as well",
     source="paper 4.1",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),

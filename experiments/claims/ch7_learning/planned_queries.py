@@ -1,4 +1,4 @@
-"""Queries of an arm around a table that goes up and down, and the outcome of plans that are carried out for them."""
+"""Queries of an arm around a table that moves up and down, and the execution of plans for them."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from mobee.robot.robot import Robot
 Paths = Sequence[tuple[int, ...]]  # the states of each query, from start to end
 
 SIZE, PLACE = (0.3, 0.4, 0.12), (-0.45, -0.45)  # m: edges; x and y of the table's middle
-DOWN, UP = -0.5, 0.31  # m, its top: out of reach, and at the height of the chest, where many a straight path of the arm ends in it
-PERIOD = 10  # actions after which the table of a moving world is set anew
-TESTS = ("down", "moving", "up")  # worlds: the table down, set anew for every query, up
-LIMIT = 20  # actions
-ALONG = np.linspace(0.0, 1.0, 41)  # where the straight path between two samples is checked
+DOWN, UP = -0.5, 0.31  # m, height of its top: out of reach, and at the height of the chest, where it blocks many paths of the arm
+PERIOD = 10  # actions after which a moving table is moved
+TESTS = ("down", "moving", "up")  # position of the table while plans are executed; "moving": drawn for every query
+LIMIT = 20  # actions of a query
+ALONG = np.linspace(0.0, 1.0, 41)  # shares of the straight path between two samples at which it is checked
 
 
 class TablePlant:
-    """The arm's plant with the table, as a Plant; `moves`: the table is set up or down at random after every PERIOD actions."""
+    """A Plant of the arm with the table; `moves`: the table is moved up or down at random after every PERIOD actions."""
 
     def __init__(self, seed: int, moves: bool = False) -> None:
         world = World()
@@ -41,7 +41,7 @@ class TablePlant:
         self._moves, self._rng, self._actions = moves, np.random.default_rng([seed, 741]), 0
 
     def set_top(self, height: float) -> None:
-        """Put the table's top at that height [m]."""
+        """Move the table's top to a height [m]."""
         self.world.move("table", position=_middle(height))
 
     @property
@@ -66,7 +66,7 @@ def _middle(top: float) -> tuple[float, float, float]:
 
 
 class FrozenModel:
-    """A Rival that plans by a transition model anew after each action, and does not learn."""
+    """A Rival that replans with a transition model after each action, and does not learn."""
 
     repairs = 0
 
@@ -88,7 +88,7 @@ class FrozenModel:
 
 
 def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
-    """The lattice as a roadmap, verified with the table down: planned once, repaired for a query, repaired for good."""
+    """Return the lattice as a roadmap, verified with the table down: planned once, or repaired for one query or permanently."""
     plant.set_top(DOWN)
     belief = Belief(plant.inner.model, np.zeros(len(space.joints)), arm_clauses())
     roadmap = make_roadmap("lattice", belief, space, plant.inner.motors.seed)
@@ -99,7 +99,7 @@ def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Queries:
-    """The queries of a seed: pairs of states, start and goal; and the states (S,) in which the raised table is."""
+    """The queries of a seed: pairs of states, start and goal; `blocked` (S,): the states whose samples touch the raised table."""
 
     space: Lattice
     pairs: list[tuple[int, int]]
@@ -108,18 +108,18 @@ class Queries:
 
     @classmethod
     def of_seed(cls, plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries:
-        """That many queries; leaves the table down."""
+        """Draw queries; leaves the table down."""
         blocked = touched_states(plant, space, UP) & ~touched_states(plant, space, DOWN)
         return cls(space, drawn_pairs(plant, space, count, seed), blocked, seed)
 
     def of_model(self, beliefs: OutcomeModel, test: str) -> dict[str, float]:
-        """Numbers of plans made with a transition model, in one world."""
+        """Return the measures of plans made with a transition model, in one of the TESTS."""
         followed = self._followed(FrozenModel(self.space, beliefs), test)
         promised, kept = promises(self.space, beliefs, self.pairs, followed.paths)
         return followed.numbers() | {"promised": promised, "kept": kept, "through": through(followed.paths, self.blocked)}
 
     def in_all_worlds(self, rival: Rival) -> dict[str, dict[str, float]]:
-        """Numbers of a rival in one world after the other."""
+        """Return the measures of a rival in each of the TESTS."""
         return {test: self._followed(rival, test).numbers() for test in TESTS}
 
     def _followed(self, rival: Rival, test: str) -> Followed:
@@ -129,13 +129,13 @@ class Queries:
 
 
 def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
-    """Which states' samples (S,) are not clear of contacts and cables with the table at that height."""
+    """Return which states' samples (S,) are not clear of contacts and cables with the table's top at a height [m]."""
     plant.set_top(top)
     return ~clear(plant.inner.model, space.samples, arm_clauses())
 
 
 def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tuple[int, int]]:
-    """Pairs of states between which the raised table is in the straight path, and nothing else; it is in neither."""
+    """Draw pairs of states whose straight path is blocked by the raised table and by nothing else; the table is in neither state."""
     free = np.flatnonzero(~touched_states(plant, space, UP))
     every = list(permutations(free.tolist(), 2))
     rng = np.random.default_rng([seed, 742])
@@ -157,22 +157,22 @@ class Followed:
     """Means over the queries."""
 
     success: float
-    """Share that arrived within LIMIT actions."""
+    """Share of queries that reached their goal within LIMIT actions."""
     actions: float
-    """A query, LIMIT where it did not arrive."""
+    """Actions per query, LIMIT for queries that failed."""
     touched: float
     """Share of actions that ended in the table's field."""
     met: float
-    """Share of queries in which one did: one that is stuck at the table counts once."""
+    """Share of queries with at least one such action: a query that is stuck at the table counts once."""
     paths: Paths
 
     def numbers(self) -> dict[str, float]:
-        """All but the paths, by name."""
+        """Return all fields but the paths, by name."""
         return {"success": self.success, "actions": self.actions, "touched": self.touched, "met": self.met}
 
 
 def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops: Sequence[float], seed: int) -> Followed:
-    """Send a rival from rest at one state's sample to another state, each time with the table's top at its height [m]."""
+    """Send a rival from rest at one state's sample to another state, for each query with the table's top at the given height [m]."""
     plant = TablePlant(seed + 900)
     touched = met = 0
     paths: list[tuple[int, ...]] = []
@@ -199,14 +199,14 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, int]], paths: Paths) -> tuple[float, float]:
-    """The believed probability that a plan is followed as it stands, and the share that were, means over the queries; 0 without a plan."""
+    """Return the predicted probability that a plan is followed exactly, and the share of plans that were; 0 without a plan."""
     plans = [_plan(space, beliefs, start, goal) for start, goal in pairs]
     kept = [plan is not None and plan.path == path for plan, path in zip(plans, paths, strict=True)]
     return float(np.mean([plan.success if plan else 0.0 for plan in plans])), float(np.mean(kept))
 
 
 def _plan(space: Lattice, beliefs: OutcomeModel, start: int, goal: int) -> Plan | None:
-    """None where no path is known."""
+    """Return the plan, or None where no path is known."""
     try:
         return Planner(space, beliefs, [goal]).plan(start)
     except MobeeError:
@@ -214,6 +214,6 @@ def _plan(space: Lattice, beliefs: OutcomeModel, start: int, goal: int) -> Plan 
 
 
 def through(paths: Paths, blocked: NDArray[np.bool_]) -> float:
-    """Share of the states on the paths, those between start and end, in which the raised table is."""
+    """Return the share of the states on the paths, without start and end, that the raised table blocks."""
     passed = [bool(blocked[state]) for path in paths for state in path[1:-1]]
     return float(np.mean(passed)) if passed else 0.0

@@ -1,16 +1,16 @@
-"""Transfer: is what is learned on the offline plant true of a robot with physics?
+"""Compare the transition model learned on the offline plant with that learned on PyBullet's robot.
 
 Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of
-PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) names the robot's time as what limits learning.
+PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) says that the robot's time limits learning.
 Published: no number.  Run time: about ten minutes on 2 cores for the arms; the table as much again.
 
-Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at once; with --table those of torso and
-arms at the table.  Live: all services in lockstep, with PyBullet, and with the motor model alone as control.  Offline: the same
-agents with five other seeds.  How far each of them is from the four others is the noise that even a perfect twin would show, so a
-live robot is held against four of them at a time too.  It passes within what one more seed would do with 95 %, or within 0.01.
-That is the claim's verdict only where that bound is less than 0.02 above the offline mean, the margin of equivalence; else the
-offline seeds differ too much for a verdict, and it is open.
-PyBullet has masses, contacts of solids and hard stops; the offline plant has motors and fields.
+Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at the same time; with --table also those of
+torso and arms at the table.  Live: all services in lockstep, with PyBullet, and for control with the motor model alone.  Offline: the same
+agents with five other seeds.  Each of them is compared with the other four; this distance is the noise that a perfect copy would show too.
+So a live robot is also compared with four of them at a time.  It is equal if its distance is below the 95 % prediction bound of one more
+offline seed, or below 0.01.  If that bound is more than 0.02 (the margin of equivalence) above the offline mean, the offline seeds differ
+too much for a verdict, and the claim is open.
+PyBullet simulates masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
 """
 
 from __future__ import annotations
@@ -34,28 +34,27 @@ from experiments.kit.sweep import run_cells, sweep_arguments
 
 ALIKE = Claim(
     "aim of this reproduction",
-    "the transition model learned offline with identified motors is that of PyBullet's robot in lockstep",
+    "the transition model learned offline with identified motors is that learned on PyBullet's robot: distance from offline runs",
     "as near as another offline seed",
 )
-MARGIN = 0.02  # of equivalence: a larger difference would have to be found
-NEAR = 0.01  # what is nearer than that is the same, whatever the spread
+MARGIN = 0.02  # of equivalence: the test must be able to detect a larger difference
+NEAR = 0.01  # distance below which models count as equal, independent of the spread
 LIVE_SEED = 100  # added to the seed: the live agents are not those of an offline seed
 LEAST_FILE = "least.json"
-TRANSITIONS, LEAST = 800, 2  # a part; tries of a state-action that is compared
+TRANSITIONS, MIN_TRIES = 800, 2  # per part; of a state-action that is compared
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the experiment."""
+    """Add the options of a sweep, --transitions, --least and --table."""
     sweep_arguments(parser, seeds=5)
-    parser.add_argument(
-        "--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"of each part (default: {TRANSITIONS})"
-    )
-    parser.add_argument("--least", type=positive_whole, default=LEAST, metavar="N", help=f"tries, to be compared (default: {LEAST})")
-    parser.add_argument("--table", action="store_true", help="torso and arms at the table too")
+    parser.add_argument("--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"per part (default: {TRANSITIONS})")
+    text = f"tries from which a state-action is compared (default: {MIN_TRIES})"
+    parser.add_argument("--least", type=positive_whole, default=MIN_TRIES, metavar="N", help=text)
+    parser.add_argument("--table", action="store_true", help="also torso and arms at the table")
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """The offline seeds of each task."""
+    """Return the offline seeds of each task."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{task}-s{seed}", seed, {"task": task, "transitions": number}) for task in _tasks(arguments) for seed in seeds]
@@ -79,7 +78,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Distances to the offline seeds together, and how often actions reach their goals."""
+    """Draw distances from the offline seeds, and how often actions reach their goals."""
     least = int(read(folder / LEAST_FILE)["least"])
     names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
     path = folder / "figure.png"
@@ -88,21 +87,25 @@ def figure(folder: Path) -> Path:
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
-    """The distances of each live robot, and of the offline seeds."""
+    """Return the distances of each live robot, and of the offline seeds."""
     variation, agree = (np.array([getattr(one, name) for one in found.offline]) for name in ("variation", "agree"))
     number = int(np.median([one.compared for one in found.offline]))
     rows = {robot: _plain(one) for robot, one in found.live.items()}
-    for name, pick in (("least", np.min), ("median", np.median), ("most", np.max)):
+    for name, pick in (("smallest", np.min), ("median", np.median), ("largest", np.max)):
         rows[f"offline seeds, {name}"] = _plain(Distance(float(pick(variation)), float(pick(agree)), number))
     return rows
 
 
 def _plain(one: Distance) -> dict[str, Any]:
-    return {"variation": round(one.variation, 4), "agree": round(one.agree, 4), "compared": one.compared}
+    return {
+        "total variation": round(one.variation, 4),
+        "share with the same most frequent outcome": round(one.agree, 4),
+        "state-actions compared": one.compared,
+    }
 
 
 def measured(tasks: Mapping[str, Compared]) -> Claim:
-    """The claim with our numbers, of all tasks."""
+    """Return the claim with our numbers, from all tasks."""
     texts, verdicts = [], []
     for task, found in tasks.items():
         one = found.live["pybullet"]
@@ -111,14 +114,14 @@ def measured(tasks: Mapping[str, Compared]) -> Claim:
         detectable = max(prediction_bound(values) - float(np.mean(values)) for values in (apart, differ))
         texts.append(
             f"{task}: total variation {one.variation:.3f} (another offline seed: up to {prediction_bound(apart):.3f}),"
-            f" same most frequent outcome {one.agree:.3f} (from {1.0 - prediction_bound(differ):.3f}), {one.compared} state-actions;"
-            f" a difference of {detectable:.3f} would have been found (margin {MARGIN})"
+            f" share with the same most frequent outcome {one.agree:.3f} (another: at least {1.0 - prediction_bound(differ):.3f}),"
+            f" {one.compared} state-actions; differences from {detectable:.3f} on are detectable (margin {MARGIN})"
         )
     return ALIKE.measured("; ".join(texts), False if False in verdicts else None if None in verdicts else True)
 
 
 def _as_near(value: float, offline: Sequence[float]) -> bool | None:
-    """Whether a robot is as near as another offline seed; None where nothing was compared, or a seed could be anywhere."""
+    """Return whether a robot is as near as another offline seed; None where nothing was compared, or the seeds differ too much."""
     most = prediction_bound(offline)
     if not np.isfinite([value, most]).all():
         return None
@@ -128,7 +131,7 @@ def _as_near(value: float, offline: Sequence[float]) -> bool | None:
 
 
 def prediction_bound(values: Sequence[float]) -> float:
-    """The value below which one more of the same kind is with 95 %, if they are normally distributed."""
+    """Return the bound below which one more value lies with 95 % probability, if the values are normally distributed."""
     n = len(values)
     return float(np.mean(values) + stdtrit(n - 1, 0.95) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
 
@@ -143,7 +146,7 @@ def _transitions(arguments: argparse.Namespace) -> int:
 
 EXPERIMENT = Experiment(
     name="simulation-transfer",
-    claim="what is learned on the offline plant, with identified motors, is what PyBullet's robot does",
+    claim="the transition model learned on the offline plant, with identified motors, is that of PyBullet's robot",
     source="aim of this reproduction; paper 4.1",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

@@ -1,16 +1,15 @@
-"""Table: do three agents that know nothing of each other become interested in the table, which only two of them together can touch?
+"""Let three independent agents, of torso and arms, explore near a table that an arm reaches only when the torso bends forward.
 
-Claim: over time the agents of torso and arms bend forward, put the arms low and touch the table ever more often, in a cyclic manner;
-what they try most are the actions whose outcomes depend on another part, both arms the same ones; an outcome that depends on
-others spreads over a handful of states.
+Claim: over time the agents bend forward, put the arms low and touch the table more and more often, in cycles.  They try most often the
+actions whose outcomes depend on another part, both arms the same ones; such an action ends in a handful of states.
 Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more
 than two full days".  Run time: 9 minutes on 2 cores, more than as much again with --part.
 
-Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries
-alone say little, for a graph of 16 neighbours has favourites of its own, and all runs share one: each explorer also runs with a
-ghost of the table, which exerts no force.  An arm action touches if at its end a field of the arm is within 2 cm of the table, or
-in the ghost.
---part: contact forces end at the root of a part, as in the original program, so that the torso never feels the table.
+Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries alone say
+little, because a graph of 16 neighbours has preferred actions of its own, and all runs share one graph.  So each explorer also runs with a
+ghost of the table, which exerts no force, and tries are compared with those at the ghost.  An action of an arm touches the table if a field
+of the arm is within 2 cm of the table, or of the ghost, when it ends.
+--part: contact forces act only up to the root of a part, as in the original program, so that the table exerts no force on the torso.
 """
 
 from __future__ import annotations
@@ -22,34 +21,32 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch7_learning.table_interest import (
+from experiments.claims.ch7_learning.table_measures import (
+    ARMS,
+    EXPLORERS,
+    FORWARD_STATES,
     LEARNERS,
+    PARTS,
+    PROPAGATIONS,
     SCORES,
+    WINDOW,
+    WORLDS,
+    Run,
+    Runs,
     agreement,
     at_second_peak,
     autocorrelation,
     by_goal,
     correlations,
     is_cyclic,
-    judged,
-    of_arms,
-    second_peak,
-    share_of_top,
-)
-from experiments.claims.ch7_learning.table_runs import (
-    ARMS,
-    EXPLORERS,
-    FORWARD_STATES,
-    PARTS,
-    PROPAGATIONS,
-    WINDOW,
-    WORLDS,
-    Run,
-    Runs,
     is_forward,
+    judged,
     low,
     near_table,
+    of_arms,
     runs_of,
+    second_peak,
+    share_of_top,
     spaces,
     with_ghosts,
 )
@@ -62,42 +59,60 @@ from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 
-TRANSITIONS, QUICK = 18_000, 2_000  # a learner
+TRANSITIONS, QUICK = 18_000, 2_000  # per learner
 HANDFUL = 5  # states
-SIMILAR = 0.3  # rank correlation
-DAYS = (1.0, 3.0)  # of the plant's time, for "a little more than two"
+SIMILAR = 0.3  # rank correlation from which the arms' choices are similar
+DAYS = (1.0, 3.0)  # of plant time that count as "a little more than two"
 
 PAPER = "paper 3.2, thesis 7.4"
-TOUCH = Claim(PAPER, "the agents begin to touch the table frequently: share of arm actions, second half", "qualitative")
-GROWS = Claim(PAPER, "this emerges over time: touch rate of the last third less that of the first", "qualitative")
-FORWARD = Claim("paper 3.2, fig. 10", "the torso's most frequent actions lean forward: tries over the others', second half", "qualitative")
-LOW = Claim("paper 3.2, fig. 10", "the arms' most frequent actions put the arm low: tries over the others', second half", "qualitative")
+TOUCH = Claim(
+    PAPER,
+    "three curious agents of torso and arms begin to touch the table frequently: share of the arms' actions that end at it, second half",
+    "qualitative",
+)
+GROWS = Claim(
+    PAPER, "contact with the table becomes more frequent over time: contact rate of the last third minus that of the first", "qualitative"
+)
+FORWARD = Claim(
+    "paper 3.2, fig. 10",
+    "the torso tries actions that lean forward most: mean tries over those of other actions, second half",
+    "qualitative",
+)
+LOW = Claim(
+    "paper 3.2, fig. 10", "the arms try actions with low goals most: mean tries over those of other actions, second half", "qualitative"
+)
 SIMILAR_ARMS = Claim(
-    "paper 3.2, fig. 10", "the two arms choose very similar actions: rank correlation of tries beside the ghost's, by goal", "qualitative"
+    "paper 3.2, fig. 10",
+    "the two arms choose very similar actions: rank correlation of their tries at the table over those at a ghost of it, by goal",
+    "qualitative",
 )
 CYCLES = Claim(
     PAPER,
-    "periods of exploring, of static constraints and of touching come in a cyclic manner: second peak of the touch rate's autocorrelation",
+    "contact with the table alternates in cycles with other exploration: second peak of the contact rate's autocorrelation",
     "cyclic",
 )
-RICHER = Claim("paper fig. 9, thesis 7.4", "outcomes are richer than by static constraints: actions with 3 or more", "qualitative")
-FEW = Claim("thesis 6.4", "never more than a handful of outcomes (5) an action", "a handful")
-DETECTOR = Claim(
-    "paper 4.4",
-    "the most tried actions are those that interact with other parts: precision and recall, beside the ghost's tries",
+RICHER = Claim(
+    "paper fig. 9, thesis 7.4",
+    "at the table actions have more outcomes than static constraints cause: number of actions with 3 or more",
     "qualitative",
 )
-TIME = Claim("paper 3.2", "18 000 transitions take so many days of the robot's time", "a little more than 2")
+FEW = Claim("thesis 6.4", "at the table no action has more than a handful (5) of outcomes", "a handful")
+DETECTOR = Claim(
+    "paper 4.4",
+    "the actions whose tries at the table most exceed those at a ghost of it depend on other parts: precision, equal to recall",
+    "qualitative",
+)
+TIME = Claim("paper 3.2", "18 000 transitions per learner at the table take so many days of robot time", "a little more than 2")
 CLAIMS = (TOUCH, GROWS, FORWARD, LOW, SIMILAR_ARMS, CYCLES, RICHER, FEW, DETECTOR, TIME)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The option --part."""
-    parser.add_argument("--part", action="store_true", help="also with contact forces that end at the root of a part")
+    """Add --part."""
+    parser.add_argument("--part", action="store_true", help="also with contact forces that act only up to the root of a part")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every explorer at the table and at its ghost."""
+    """Return every explorer at the table and at its ghost."""
     transitions, name = (QUICK, "quick-") if arguments.quick else (TRANSITIONS, "")
     return [
         Condition(
@@ -112,7 +127,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore.
 
-    The transitions of each part and how long they took; of the arms whether they touched at the end, and whether the torso was bent.
+    Returns the transitions of each part and their durations; and for each action of an arm whether it ended at the table, and whether the
+    torso was bent then.
     """
     count = settings["transitions"]
     plant = table_plant(seed, settings["world"] == "ghost", settings["propagate"])
@@ -130,73 +146,81 @@ Number = Callable[[Run], float]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """A row for each condition, interest beside the ghost, the detector; and the claims as far as their conditions were run in full."""
+    """Return a row for each condition, tries compared with the ghost, the detector; and the claims, with numbers after a full run."""
     runs = runs_of(found)
     whole = all(runs.get(("tree", explorer, world)) for explorer in EXPLORERS for world in WORLDS)
     whole = whole and len(next(iter(runs.values()))[0].seen["torso"]) >= TRANSITIONS
     return {
-        "conditions": {", ".join(key): _row(mine) for key, mine in runs.items()},
-        "beside the ghost": {
-            f"{propagate}, {explorer}": _interest(pairs)
+        "conditions": {_label(*key): _row(group) for key, group in runs.items()},
+        "tries at the table over those at the ghost": {
+            f"{NAMES[explorer]}, forces on the {propagate}": _interest(pairs)
             for propagate, explorer in product(PROPAGATIONS, EXPLORERS)
             if (pairs := with_ghosts(runs, propagate, explorer))
         },
-        "outcomes an action": {", ".join(key): _histogram(mine) for key, mine in runs.items()},
-        "detector": detector(runs),
+        "number of actions by number of outcomes": {_label(*key): _histogram(group) for key, group in runs.items()},
+        "precision of finding actions that depend on other parts": detector(runs),
         "claims": [claim.record() for claim in (measured(runs) if whole else CLAIMS)],
     }
 
 
+ROW: dict[str, Number] = {  # numbers of a run by their labels
+    "share_of_arm_actions_at_table": lambda run: run.touch,
+    "growth_of_contact_rate": lambda run: run.growth,
+    "relative_tries_of_leaning_forward": lambda run: run.torso_forward,
+    "share_of_low_arm_actions_with_torso_bent": lambda run: run.low_and_forward,
+    "relative_tries_of_low_arm_goals": lambda run: run.arms_low,
+    "arm_actions_that_sometimes_fail": lambda run: run.half_failing,
+    "timeouts_of_torso": lambda run: run.timeouts["torso"],
+    "timeouts_of_arms": lambda run: 0.5 * sum(run.timeouts[arm] for arm in ARMS),
+    "robot_hours": lambda run: run.hours,
+    "computing_seconds": lambda run: run.result.seconds,
+}
+
+
 def _row(runs: list[Run]) -> dict[str, float]:
-    return {
-        "seeds": len(runs),
-        "touch": mean_over(runs, lambda run: run.touch),
-        "growth": mean_over(runs, lambda run: run.growth),
-        "torso_forward": mean_over(runs, lambda run: run.torso_forward),
-        "low_and_forward": mean_over(runs, lambda run: run.low_and_forward),
-        "arms_low": mean_over(runs, lambda run: run.arms_low),
-        "half_failing": mean_over(runs, lambda run: run.half_failing),
-        "timeouts_torso": mean_over(runs, lambda run: run.timeouts["torso"]),
-        "timeouts_arms": mean_over(runs, lambda run: 0.5 * sum(run.timeouts[arm] for arm in ARMS)),
-        "hours": mean_over(runs, lambda run: run.hours),
-        "seconds": mean_over(runs, lambda run: run.result.seconds),
-    }
+    return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in ROW.items()}
+
+
+def _label(propagate: str, explorer: str, world: str) -> str:
+    return f"{NAMES[explorer]} at the {world}, forces on the {propagate}"
 
 
 def _interest(pairs: Sequence[tuple[Run, Run]]) -> dict[str, float]:
     ratios = [of_arms(*pair) for pair in pairs]
     aims_low = low()[spaces()[ARMS[0]].goals]
     return {
-        "rho_actions": interquartile_mean([agreement(ratio) for ratio in ratios]),
-        "rho_goals": interquartile_mean([agreement(by_goal(ratio)) for ratio in ratios]),
-        "low_of_top_5_percent": interquartile_mean([share_of_top(ratio, aims_low) for ratio in ratios]),
-        "low_of_all": float(aims_low.mean()),
-        "rho_raw": interquartile_mean([agreement(np.array([run.tries[arm] for arm in ARMS])) for run, _ in pairs]),
+        "correlation_of_arms_by_action": interquartile_mean([agreement(ratio) for ratio in ratios]),
+        "correlation_of_arms_by_goal": interquartile_mean([agreement(by_goal(ratio)) for ratio in ratios]),
+        "share_of_low_goals_in_top_5_percent": interquartile_mean([share_of_top(ratio, aims_low) for ratio in ratios]),
+        "share_of_low_goals_in_all": float(aims_low.mean()),
+        "correlation_of_arms_without_ghost": interquartile_mean(
+            [agreement(np.array([run.tries[arm] for arm in ARMS])) for run, _ in pairs]
+        ),
     }
 
 
 def _histogram(runs: Sequence[Run]) -> dict[str, float]:
-    """The number of actions of a run that ended in each number of states."""
+    """Return the number of actions of a run by the number of states in which they ended."""
     most = max(int(run.outcome_numbers.max()) for run in runs)
     counts = np.mean([np.bincount(run.outcome_numbers, minlength=most + 1) for run in runs], axis=0)
     return {str(number): float(counts[number]) for number in range(1, most + 1)}
 
 
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
-    """Precision, equal to recall, when as many actions are called dependent as are; and the share of these, which chance gives."""
+    """Return the precision, equal to recall, when as many actions are called dependent as really are, and that of chance."""
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
         found = {score: judged(runs, explorer, learner, score) for score in SCORES}
         if all(found.values()):
-            table[f"{learner}, {explorer}"] = {
-                **{score: mean_over(mine, lambda one: one.at_all) for score, mine in found.items()},
+            table[f"{learner}, {NAMES[explorer]}"] = {
+                **{score: mean_over(group, lambda one: one.at_all) for score, group in found.items()},
                 "chance": mean_over(found["tries"], lambda one: one.chance),
             }
     return table
 
 
 def measured(runs: Runs) -> list[Claim]:
-    """The claims with our numbers, of the runs of all conditions with tree propagation."""
+    """Return the claims with our numbers, from the runs of all conditions with forces on the whole tree."""
     curious = runs["tree", "curious", "table"]
     return [
         _against(TOUCH, runs, lambda run: run.touch),
@@ -216,17 +240,17 @@ def measured(runs: Runs) -> list[Claim]:
 
 
 def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: float = -np.inf) -> Claim:
-    """The curious agents at the table stand out from all the controls, and are above `least`."""
-    values = {key[1:]: [number(run) for run in mine] for key, mine in runs.items() if key[0] == "tree"}
-    text = ", ".join(f"{explorer} at the {world} {estimate(mine, digits)}" for (explorer, world), mine in values.items())
+    """Judge whether a number of the curious agents at the table is above that of all controls, and above `least`."""
+    values = {key[1:]: [number(run) for run in group] for key, group in runs.items() if key[0] == "tree"}
+    text = ", ".join(f"{NAMES[explorer]} at the {world} {estimate(group, digits)}" for (explorer, world), group in values.items())
     ours = interval(values["curious", "table"])[0]
-    controls = (interval(mine)[1] for key, mine in values.items() if key != ("curious", "table"))
+    controls = (interval(group)[1] for key, group in values.items() if key != ("curious", "table"))
     return claim.measured(text, ours > max(least, *controls))
 
 
 def _similar(runs: Runs) -> Claim:
     found = {e: [agreement(by_goal(of_arms(*pair))) for pair in with_ghosts(runs, "tree", e)] for e in EXPLORERS}
-    text = ", ".join(f"{explorer} {estimate(values)}" for explorer, values in found.items())
+    text = ", ".join(f"{NAMES[explorer]} {estimate(values)}" for explorer, values in found.items())
     ours = interval(found["curious"])[0]
     return SIMILAR_ARMS.measured(text, ours > SIMILAR and all(ours > interval(found[e])[1] for e in EXPLORERS[1:]))
 
@@ -234,13 +258,12 @@ def _similar(runs: Runs) -> Claim:
 def _cyclic(runs: Runs) -> Claim:
     pairs = with_ghosts(runs, "tree", "curious")
     if len(pairs) < 2:
-        return CYCLES.measured("needs two seeds", None)
+        return CYCLES.measured("two seeds are needed", None)
     ours, theirs = (correlations([pair[which] for pair in pairs]) for which in (0, 1))
     here, there = at_second_peak(ours, theirs)
     text = (
-        f"around a lag of {WINDOW * second_peak(ours)} transitions {estimate(here)}, at the ghost {estimate(there)}; "
-        "touching comes in bouts: "
-        f"{estimate(ours[:, 1])} at {WINDOW}, at the ghost {estimate(theirs[:, 1])}"
+        f"autocorrelation near a lag of {WINDOW * second_peak(ours)} transitions {estimate(here)}, at the ghost {estimate(there)}; "
+        f"at a lag of {WINDOW} (contacts come in bouts) {estimate(ours[:, 1])}, at the ghost {estimate(theirs[:, 1])}"
     )
     return CYCLES.measured(text, is_cyclic(ours, theirs))
 
@@ -257,34 +280,36 @@ def _detects(runs: Runs) -> Claim:
         hits = {explorer: judged(runs, explorer, learner, "beside_ghost") for explorer in EXPLORERS}
         if not all(hits.values()):
             alone = len({run.seed for mine in runs.values() for run in mine}) == 1
-            return DETECTOR.measured("needs two seeds" if alone else f"{learner}: no action depends on other parts", None)
-        values = {explorer: [one.at_all for one in mine] for explorer, mine in hits.items()}
+            return DETECTOR.measured("two seeds are needed" if alone else f"{learner}: no action depends on other parts", None)
+        values = {explorer: [one.at_all for one in group] for explorer, group in hits.items()}
         chance = interquartile_mean([one.chance for one in hits["curious"]])
         parts.append(
-            f"{learner}: " + ", ".join(f"{explorer} {estimate(mine)}" for explorer, mine in values.items()) + f", chance {chance:.2f}"
+            f"{learner}: "
+            + ", ".join(f"{NAMES[explorer]} {estimate(group)}" for explorer, group in values.items())
+            + f", chance {chance:.2f}"
         )
         least = interval(values["curious"])[0]
         holds = holds and least > 2.0 * chance and all(least > interval(values[explorer])[1] for explorer in EXPLORERS[1:])
     return DETECTOR.measured("; ".join(parts), holds)
 
 
-AtTable = Mapping[tuple[str, str], list[Run]]  # explorer and world
-LAGS = 30  # windows
+AtTable = Mapping[tuple[str, str], list[Run]]  # by explorer and world
+LAGS = 30  # windows, of the drawn autocorrelation
 NAMES = {"curious": "curious", "least_tried": "least tried", "random": "random"}
 COLORS = dict(zip(EXPLORERS, ("C3", "C0", "C2"), strict=True))
 STYLES = {"table": "-", "ghost": ":"}
 
 
 def plot(found: Cells) -> Any:
-    """Tries of the three learners as in paper fig. 10; touch, agreement of the arms, cycles, outcomes and the detector.
+    """Draw tries of the three learners as in paper fig. 10; contact, agreement of the arms, cycles, outcomes and the detector.
 
-    Raises InvalidValue unless the curious agents were both at the table and at the ghost.
+    Raises InvalidValue unless there are runs of the curious agents both at the table and at the ghost.
     """
     every = runs_of(found)
-    runs = {key[1:]: mine for key, mine in every.items() if key[0] == "tree"}
+    runs = {key[1:]: group for key, group in every.items() if key[0] == "tree"}
     pairs = with_ghosts(every, "tree", "curious")
     if not pairs:
-        raise InvalidValue("there are no curious runs at the table and at the ghost: go on with --resume.")
+        raise InvalidValue("there are no curious runs at the table and at the ghost: continue the run with --resume.")
     drawing = new_figure(17.0, 13.0)
     grid = drawing.add_gridspec(4, 6)
     for part, place in zip(PARTS, (grid[0, :2], grid[0, 2:], grid[1, 2:]), strict=True):
@@ -299,32 +324,32 @@ def plot(found: Cells) -> Any:
 
 
 def _tries(axes: Any, pairs: list[tuple[Run, Run]], part: str) -> None:
-    """Of every state-action in the order of the states, at the table and at the ghost."""
+    """Draw the tries of every state-action, in the order of the states, at the table and at the ghost."""
     table, ghost = (np.mean([pair[which].tries[part].ravel() for pair in pairs], axis=0) for which in (0, 1))
     numbers = np.arange(len(table))
     axes.bar(numbers, table, width=1.0, color="C3", label="table")
     axes.step(numbers, ghost, where="mid", color="k", linewidth=0.5, label="ghost")
     if part == "torso":
         per_state = spaces()[part].goals.shape[1]
-        axes.axvspan(FORWARD_STATES.start * per_state, FORWARD_STATES.stop * per_state, color="0.9", zorder=0, label="from leaning forward")
+        axes.axvspan(FORWARD_STATES.start * per_state, FORWARD_STATES.stop * per_state, color="0.9", zorder=0, label="torso leans forward")
     axes.set(title=f"{part.replace('_', ' ')}: tries of each state-action", xlabel="state-action", xlim=(-0.5, len(table) - 0.5))
     axes.legend(loc="upper left", fontsize=7)
 
 
 def _ratio_by_pitch(axes: Any, runs: AtTable) -> None:
-    for place, ((explorer, world), mine) in enumerate(runs.items()):
-        values = [run.torso_forward for run in mine]
+    for place, ((explorer, world), group) in enumerate(runs.items()):
+        values = [run.torso_forward for run in group]
         axes.bar(place, np.mean(values), color=COLORS[explorer], alpha=1.0 if world == "table" else 0.4)
         axes.plot([place] * len(values), values, "k.", markersize=4)
     axes.axhline(1.0, color="k", linewidth=0.5)
     axes.set_xticks(range(len(runs)), [f"{NAMES[explorer]}\n{world}" for explorer, world in runs], fontsize=7)
-    axes.set_title("torso: tries leaning forward over others, second half")
+    axes.set_title("torso: tries of leaning forward over other tries, second half")
 
 
 def _touch(axes: Any, runs: AtTable) -> None:
-    for (explorer, world), mine in runs.items():
-        rates = np.array([_smooth(run.touch_rate) for run in mine])
-        at = WINDOW * (np.arange(rates.shape[1]) + 0.5 * (len(mine[0].touch_rate) - rates.shape[1] + 1))
+    for (explorer, world), group in runs.items():
+        rates = np.array([_smooth(run.touch_rate) for run in group])
+        at = WINDOW * (np.arange(rates.shape[1]) + 0.5 * (len(group[0].touch_rate) - rates.shape[1] + 1))
         axes.plot(at, rates.mean(axis=0), STYLES[world], color=COLORS[explorer], label=f"{NAMES[explorer]}, {world}")
         if world == "table":
             axes.fill_between(at, rates.min(axis=0), rates.max(axis=0), color=COLORS[explorer], alpha=0.15, linewidth=0)
@@ -334,14 +359,14 @@ def _touch(axes: Any, runs: AtTable) -> None:
 
 
 def _smooth(rate: Array) -> Array:
-    """Means over a tenth of the run."""
+    """Return moving means over a tenth of the run."""
     width = max(1, len(rate) // 10)
     return np.convolve(rate, np.full(width, 1.0 / width), mode="valid")
 
 
 def _arms(axes: Any, pairs: list[tuple[Run, Run]]) -> None:
     ratios = np.mean([by_goal(of_arms(*pair)) for pair in pairs], axis=0)
-    for chosen, color, label in ((~low(), "0.6", "other goals"), (low(), "C3", "goals below the table's top with the torso bent")):
+    for chosen, color, label in ((~low(), "0.6", "other goals"), (low(), "C3", "goals below the table's top if the torso is bent")):
         axes.plot(ratios[0, chosen], ratios[1, chosen], "o", color=color, markersize=4, label=label)
     for state in np.argsort(-ratios.sum(axis=0))[:8]:
         axes.annotate(str(state), ratios[:, state], fontsize=7, xytext=(3, 3), textcoords="offset points")
@@ -351,45 +376,44 @@ def _arms(axes: Any, pairs: list[tuple[Run, Run]]) -> None:
 
 def _autocorrelations(axes: Any, runs: AtTable) -> None:
     for world in ("table", "ghost"):
-        mine = runs.get(("curious", world), [])
-        most = min(LAGS, len(mine[0].touch_rate) - 2)
-        curves = np.array([autocorrelation(run.touch_rate, most) for run in mine])
+        group = runs.get(("curious", world), [])
+        most = min(LAGS, len(group[0].touch_rate) - 2)
+        curves = np.array([autocorrelation(run.touch_rate, most) for run in group])
         axes.plot(WINDOW * np.arange(most + 1), curves.mean(axis=0), STYLES[world], color="C3", label=world)
         axes.fill_between(WINDOW * np.arange(most + 1), curves.min(axis=0), curves.max(axis=0), color="C3", alpha=0.12, linewidth=0)
     axes.axhline(0.0, color="k", linewidth=0.5)
-    axes.set(title="curious: autocorrelation of the touch rate", xlabel="lag (transitions of an arm)")
+    axes.set(title="curious: autocorrelation of the contact rate", xlabel="lag (transitions of an arm)")
     axes.legend(fontsize=7)
 
 
 def _outcomes(axes: Any, runs: AtTable) -> None:
-    for place, ((explorer, world), mine) in enumerate((key, runs[key]) for key in runs if key[1] == "table" or key[0] == "curious"):
-        most = max(int(run.outcome_numbers.max()) for run in mine)
-        counts = np.mean([np.bincount(run.outcome_numbers, minlength=most + 1) for run in mine], axis=0)[1:]
+    for place, ((explorer, world), group) in enumerate((key, runs[key]) for key in runs if key[1] == "table" or key[0] == "curious"):
+        most = max(int(run.outcome_numbers.max()) for run in group)
+        counts = np.mean([np.bincount(run.outcome_numbers, minlength=most + 1) for run in group], axis=0)[1:]
         at = np.arange(1, most + 1) + 0.2 * (place - 1.5)
         hatch = "//" if world == "ghost" else None
         axes.bar(at, counts, 0.2, color=COLORS[explorer], hatch=hatch, label=f"{NAMES[explorer]}, {world}")
-    axes.set(title="in how many states an action ended (all parts)", xlabel="different outcomes", ylabel="actions", yscale="log")
+    axes.set(title="number of states in which an action ended (all parts)", xlabel="different outcomes", ylabel="actions", yscale="log")
     axes.legend(fontsize=7)
 
 
 def _detector(axes: Any, runs: Runs) -> None:
-    """Of the tries beside the ghost's; a dotted line is chance."""
+    """Draw precision over recall of tries compared with the ghost's as a detector; dotted lines are chance."""
     for learner, style in zip(LEARNERS, ("-", "--"), strict=True):
         for explorer in EXPLORERS:
-            mine = judged(runs, explorer, learner, "beside_ghost")
-            if mine:
-                recall, precision = (np.mean([getattr(one, name) for one in mine], axis=0) for name in ("recall", "precision"))
+            group = judged(runs, explorer, learner, "beside_ghost")
+            if group:
+                recall, precision = (np.mean([getattr(one, name) for one in group], axis=0) for name in ("recall", "precision"))
                 axes.plot(recall, precision, style, color=COLORS[explorer], label=f"{learner}, {NAMES[explorer]}")
-                axes.axhline(mine[0].chance, color="k", linestyle=":", linewidth=0.5)
-    axes.set(title="interest as detector of actions that depend on other parts", xlabel="recall", ylabel="precision", ylim=(0.0, 1.02))
+                axes.axhline(group[0].chance, color="k", linestyle=":", linewidth=0.5)
+    axes.set(title="tries over those at the ghost: finding dependent actions", xlabel="recall", ylabel="precision", ylim=(0.0, 1.02))
     if axes.lines:
         axes.legend(fontsize=7)
 
 
 EXPERIMENT = Experiment(
     name="table-discovery",
-    claim="torso and arms, three agents unaware of each other, become interested in the table: "
-    "they lean forward and touch it ever more often",
+    claim="three independent agents of torso and arms become interested in the table: they lean forward and touch it more and more often",
     source="paper 3.2 and 4.4, thesis 7.4",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=6, add_options=add_options),

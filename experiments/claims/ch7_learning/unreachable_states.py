@@ -1,18 +1,19 @@
-"""Rank 4: which states of a large lattice can an arm never reach, and what becomes of the actions that aim at them?
+"""Find the states of a large lattice that the arm never reaches, and the states in which actions towards them end.
 
-Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches 60, 124, 188 and 252 and hardly ever 61,
-125, 189 and 253, though it tries hundreds of times, for the cables of the shoulder turn it away; 57->61 ends in 62, 121->125 in
-126, 249->253 in 254.  Of the lattice stretched to 12.5 and 87.5 % far more states are out of reach.  The arm often touches its
-own body, and reaches its goal nevertheless.
+Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches 60, 124, 188 and 252, and hardly ever 61, 125, 189
+and 253, although it tries hundreds of times, because the shoulder's cables deflect the arm: 57->61 ends in 62, 121->125 in 126, 249->253 in
+254.  In a lattice stretched to 12.5 and 87.5 % far more states are unreachable.  The arm often touches its own body, and reaches its goal
+nevertheless.
 Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 3 minutes on 2 cores.
 
-The left arm from a random state, 50-50 initialisation, discount 0.9.  An action touches the own body if fields of two links overlap at any
-time while it lasts.  State numbers: pitch fastest, then roll, yaw and elbow.
+The left arm from a random state, prior 50-50, discount 0.9.  An action touches the own body if the fields of two links overlap at any time
+during it.  States are numbered with pitch varying fastest, then roll, yaw and elbow; source->goal is the action between two states.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.claims.ch7_learning.self_contacts import SelfContact, SelfContactPlant
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.learning.arm import RANK4, STRETCHED, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
@@ -30,36 +30,42 @@ from experiments.kit.learning.outcomes import ends_of, exists_in, goals_of, outc
 from experiments.kit.plots import new_figure
 from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from mobee import CuriousAgent, Lattice
+from mobee import CuriousAgent, Lattice, OfflinePlant, Outcome
 from mobee.arrays import Array, Ints
+from mobee.control.gains import SettleTest
 
 LEVELS = {"small": RANK4, "stretched": STRETCHED}
 ACTIONS = {"small": 14_597, "stretched": 26_963}
 NEVER, HARDLY = (60, 124, 188, 252), (61, 125, 189, 253)
 ASIDE = {(57, 61): 62, (121, 125): 126, (249, 253): 254}  # (source, goal): where it ends
-QUICK = 0.2  # of the transitions
-MOST_VISITS, LEAST_ASIDE, HANDFUL = 10, 100, 10
-MANY = 0.01  # of the actions, for self-contacts to be many
+QUICK = 0.2  # share of the transitions in the short version
+MAX_RARE_VISITS, MIN_DEFLECTED, HANDFUL = 10, 100, 10  # times in a run
+MANY = 0.01  # share of actions with self-contacts from which they are many
 
-UNREACHED = Claim("thesis 7.3, fig. 7.8", "20-80 %: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
-RARE = Claim("thesis 7.3", "20-80 %: 61, 125, 189 and 253 are reached at most 10 times each in 14 597 actions", "2, 3, 0 and 2 times")
-TURNED = Claim(
+_SMALL, _WIDE = "lattice of 256 states, 20-80 % of the ranges", "lattice of 256 states stretched to 12.5-87.5 %"
+UNREACHED = Claim("thesis 7.3, fig. 7.8", f"{_SMALL}: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
+RARE = Claim(
+    "thesis 7.3", f"{_SMALL}: the states 61, 125, 189 and 253 are reached at most 10 times each in 14 597 actions", "2, 3, 0 and 2 times"
+)
+DEFLECTED = Claim(
     "thesis 7.3",
-    "57->61 ends in 62, 121->125 in 126, 249->253 in 254, at least 100 times each with a handful of exceptions",
+    f"{_SMALL}: action 57->61 ends in 62, 121->125 in 126, 249->253 in 254, at least 100 times each with a handful of exceptions",
     "225 of 228, 238 of 244, 208 of 213",
 )
-RANDOM = Claim("thesis 7.3", "static constraints do not make outcomes deterministic: actions end in several states", "qualitative")
-STRETCH = Claim("thesis 7.3, fig. 7.9", "12.5-87.5 %: many more states are out of reach", "far too many to discuss")
+RANDOM = Claim("thesis 7.3", f"{_SMALL}: in spite of static constraints some actions sometimes fail and sometimes succeed", "qualitative")
+STRETCH = Claim("thesis 7.3, fig. 7.9", f"{_WIDE}: many more states are never reached", "far too many to discuss")
 CONTACTS = Claim(
-    "thesis 7.3", "many self-collisions occur between arm and body on both lattices (more than 1 % of the actions)", "qualitative"
+    "thesis 7.3", "arm and body touch each other often on both lattices of 256 states (in more than 1 % of the actions)", "qualitative"
 )
-MORE = Claim("thesis 7.3", "the stretched lattice produces many more of them", "qualitative")
-DESPITE = Claim("thesis 7.3", "some of them do not affect the outcome: the arm is deflected and reaches its goal", "qualitative")
-CLAIMS = (UNREACHED, RARE, TURNED, RANDOM, STRETCH, CONTACTS, MORE, DESPITE)
+MORE = Claim("thesis 7.3", f"{_WIDE}: arm and body touch each other much more often", "qualitative")
+DESPITE = Claim(
+    "thesis 7.3", f"{_WIDE}: some contacts of arm and body do not change the outcome, and the arm reaches its goal", "qualitative"
+)
+CLAIMS = (UNREACHED, RARE, DEFLECTED, RANDOM, STRETCH, CONTACTS, MORE, DESPITE)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Both lattices; the short version makes a fifth of the transitions."""
+    """Return both lattices; the short version makes a fifth of the transitions."""
     share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
     return [
         Condition(f"{name}{lattice}", {"lattice": lattice, "transitions": round(share * actions)}, actions)
@@ -68,10 +74,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore.
+    """Explore, and record self-contacts.
 
-    Transitions (T, 3), values (256, 8); and of each transition the pair of links and the depth [m] of its deepest self-contact,
-    -1 and 0 where there was none.
+    Returns `seen`, the transitions (T, 3); `values` (256, 8); `pairs`, the pairs of links that touched; and of each transition the index of
+    the pair (-1: none) in `touching`, and the depth [m] of the deepest self-contact (0: none) in `depths`.
     """
     space, plant = arm_space(LEVELS[settings["lattice"]]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
@@ -89,10 +95,67 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _numbered(contacts: list[SelfContact | None]) -> tuple[list[str], NDArray[np.int16]]:
-    """The pairs of links that touched, and which of them did in each action, (T,)."""
+    """Return the pairs of links that touched, and the index of the pair that did in each action, (T,)."""
     pairs = sorted({contact.pair for contact in contacts if contact})
     touching = [-1 if contact is None else pairs.index(contact.pair) for contact in contacts]
     return [" and ".join(pair) for pair in pairs], np.array(touching, dtype=np.int16)
+
+
+@dataclass(frozen=True, slots=True)
+class SelfContact:
+    """The deepest overlap of two fields during an action."""
+
+    pair: tuple[str, str]  # links
+    depth: float  # m
+
+
+class SelfContactPlant:
+    """A plant with exactly the same actions, which records in `contacts` a SelfContact, or None, for every action so far."""
+
+    def __init__(self, plant: OfflinePlant) -> None:
+        self._plant = plant
+        self.robot = plant.robot
+        self.contacts: list[SelfContact | None] = []
+
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._plant.q
+
+    def measure(self, part: str) -> Array:
+        """See Plant."""
+        return self._plant.measure(part)
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """See Plant; runs the plant from one settle test to the next."""
+        plant, settle = self._plant, self._plant.controller.gains.settle
+        where, start = self.robot.part(part).slice, plant.time - plant.dt
+        test, ticks = SettleTest(settle, start), _ticks(settle.first_look, plant.dt)
+        deepest, pose = 0.0, None
+        plant.begin(part, target)
+        while True:
+            trace = plant.run(ticks)
+            at = int(trace.field.argmax())
+            if trace.field[at] > deepest:
+                deepest, pose = float(trace.field[at]), trace.encoders[at]
+            velocity = trace.velocity[-2:, where]
+            verdict = test.update(plant.time - plant.dt, velocity[1], (velocity[1] - velocity[0]) / plant.dt)
+            if verdict != "moving":
+                break
+            ticks = _ticks(settle.interval, plant.dt)
+        self.contacts.append(None if pose is None else SelfContact(self._pair(pose), deepest))
+        return Outcome(plant.measure(part), verdict == "settled", plant.time - plant.dt - start, ())
+
+    def _pair(self, q: Array) -> tuple[str, str]:
+        """Return the links of the deepest overlap of fields in the pose q (n,) rad."""
+        table = self._plant.model.evaluate(q).table
+        row = int(np.where(table.kind == 1, table.depth, -1.0).argmax())
+        first, second = sorted(self.robot.links[int(link[row])] for link in (table.first_link, table.second_link))
+        return first, second
+
+
+def _ticks(time: float, dt: float) -> int:
+    return math.ceil(time / dt - 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,20 +186,20 @@ class Run:
 
     @property
     def touched(self) -> NDArray[np.bool_]:
-        """Whether each transition touched the own body, (T,)."""
+        """Whether the arm touched the body in each transition, (T,)."""
         return np.asarray(self.touching >= 0)
 
     @property
     def uncertain(self) -> int:
-        """How many actions failed in 10 to 90 % of their tries."""
+        """The number of actions that failed in 10 to 90 % of their tries."""
         return uncertain_in(self.space, self.seen)
 
 
 def runs_of(found: Cells) -> dict[str, list[Run]]:
-    """The finished runs of each lattice."""
+    """Return the finished runs of each lattice."""
     return {
-        lattice: [_run(arm_space(LEVELS[lattice]), values) for values in mine]
-        for lattice, mine in grouped(found, "lattice", (*LEVELS,)).items()
+        lattice: [_run(arm_space(LEVELS[lattice]), values) for values in group]
+        for lattice, group in grouped(found, "lattice", (*LEVELS,)).items()
     }
 
 
@@ -145,14 +208,16 @@ def _run(space: Lattice, values: Mapping[str, Any]) -> Run:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """What was reached, where the actions turned aside end, self-contacts by pair; and the claims, if both lattices were explored."""
+    """Return rows of both lattices, unreached states, ends of the deflected actions, self-contacts by pair; and the claims."""
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())
     return {
-        "lattices": {lattice: _row(mine) for lattice, mine in runs.items()},
-        "unreached": {lattice: _shares(mine) for lattice, mine in runs.items()},
-        "turned aside": {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in ASIDE} if "small" in runs else {},
-        "self-contacts": {lattice: contacts_by_pair(mine) for lattice, mine in runs.items()},
+        "lattices": {lattice: _row(group) for lattice, group in runs.items()},
+        "states never reached": {lattice: _shares(group) for lattice, group in runs.items()},
+        "end states of deflected actions, times per run": (
+            {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in ASIDE} if "small" in runs else {}
+        ),
+        "self-contacts": {lattice: contacts_by_pair(group) for lattice, group in runs.items()},
         "claims": [claim.record() for claim in (measured(runs["small"], runs["stretched"]) if whole else CLAIMS)],
     }
 
@@ -161,17 +226,17 @@ def _row(runs: list[Run]) -> dict[str, Any]:
     return {
         "seeds": len(runs),
         "actions": len(runs[0].seen),
-        "unreached": mean_over(runs, lambda run: len(run.unreached)),
-        "end_elsewhere": mean_over(runs, lambda run: float(1.0 - run.succeeded.mean())),
-        "uncertain_actions": mean_over(runs, lambda run: run.uncertain),
-        "most_outcomes": max(int(outcome_counts(run.space, run.seen).max()) for run in runs),
-        "touch_self": mean_over(runs, lambda run: float(run.touched.mean())),
-        "deepest_mm": 1e3 * max(float(run.depths.max()) for run in runs),
+        "states_never_reached": mean_over(runs, lambda run: len(run.unreached)),
+        "share_of_failed_actions": mean_over(runs, lambda run: float(1.0 - run.succeeded.mean())),
+        "actions_that_sometimes_fail": mean_over(runs, lambda run: run.uncertain),
+        "largest_number_of_outcomes": max(int(outcome_counts(run.space, run.seen).max()) for run in runs),
+        "share_of_actions_with_self_contact": mean_over(runs, lambda run: float(run.touched.mean())),
+        "deepest_self_contact_mm": 1e3 * max(float(run.depths.max()) for run in runs),
     }
 
 
 def _shares(runs: list[Run]) -> dict[str, str]:
-    """In how many runs each state was never reached, those of one frequency together."""
+    """Return the states that were never reached, by the number of runs in which they were not."""
     by_count: dict[int, list[int]] = {}
     for state, count in sorted(_unreached(runs).items()):
         by_count.setdefault(count, []).append(state)
@@ -179,12 +244,12 @@ def _shares(runs: list[Run]) -> dict[str, str]:
 
 
 def _unreached(runs: list[Run]) -> Counter[int]:
-    """In how many runs each state was never reached."""
+    """Count the runs in which each state was never reached."""
     return Counter(state for run in runs for state in run.unreached)
 
 
 def _ends(runs: Sequence[Run], source: int, goal: int) -> dict[str, float]:
-    """Where an action ends and how often in a run, on average."""
+    """Return the states in which an action ended, and how often in a run, on average."""
     counted: Counter[int] = Counter()
     for run in runs:
         counted.update(ends_of(run.space, run.seen, source, goal))
@@ -192,27 +257,27 @@ def _ends(runs: Sequence[Run], source: int, goal: int) -> dict[str, float]:
 
 
 def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
-    """For each pair of links: how many actions of a run touched with it, the deepest overlap, and which share reached their goal."""
+    """Return for each pair of links the number of actions per run in which it touched, the deepest overlap, and their success."""
     table: dict[str, dict[str, float]] = {}
     for pair in sorted({pair for run in runs for pair in run.pairs}):
-        mine = [(run, run.touching == run.pairs.index(pair)) for run in runs if pair in run.pairs]
-        actions = sum(int(touched.sum()) for _, touched in mine)
+        group = [(run, run.touching == run.pairs.index(pair)) for run in runs if pair in run.pairs]
+        actions = sum(int(touched.sum()) for _, touched in group)
         table[pair] = {
-            "actions": actions / len(runs),
-            "deepest_mm": 1e3 * max(float(run.depths[touched].max(initial=0.0)) for run, touched in mine),
-            "succeed": sum(int(run.succeeded[touched].sum()) for run, touched in mine) / actions,
+            "actions_per_run": actions / len(runs),
+            "deepest_mm": 1e3 * max(float(run.depths[touched].max(initial=0.0)) for run, touched in group),
+            "share_that_succeeds": sum(int(run.succeeded[touched].sum()) for run, touched in group) / actions,
         }
-    return dict(sorted(table.items(), key=lambda item: -item[1]["actions"]))
+    return dict(sorted(table.items(), key=lambda item: -item[1]["actions_per_run"]))
 
 
 def measured(small: list[Run], stretched: list[Run]) -> list[Claim]:
-    """The claims with our numbers, of the runs on both lattices."""
+    """Return the claims with our numbers, from the runs on both lattices."""
     uncertain, wide = [run.uncertain for run in small], [run.uncertain for run in stretched]
-    text = f"{estimate(uncertain, 0)} actions (stretched {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
+    text = f"{estimate(uncertain, 0)} actions (stretched lattice {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
     return [
         _never(small),
         _rare(small),
-        _turned(small),
+        _deflected(small),
         RANDOM.measured(text, interval(uncertain)[0] >= 1.0),
         _stretch(small, stretched),
         *_self_contacts(small, stretched),
@@ -230,34 +295,34 @@ def _rare(small: list[Run]) -> Claim:
     visits = np.array([run.visits[list(HARDLY)] for run in small])
     others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in small)
     text = f"{estimate(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
-    return RARE.measured(text, bool(visits.max() <= MOST_VISITS))
+    return RARE.measured(text, bool(visits.max() <= MAX_RARE_VISITS))
 
 
-def _turned(small: list[Run]) -> Claim:
+def _deflected(small: list[Run]) -> Claim:
     parts, holds = [], True
     for (source, goal), end in ASIDE.items():
         ends = [ends_of(run.space, run.seen, source, goal) for run in small]
         aside = [found.get(end, 0) for found in ends]
         others = [sum(found.values()) - found.get(end, 0) for found in ends]
-        parts.append(f"{source}->{goal}: {estimate(aside, 0)} times, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
-        holds = holds and min(aside) >= LEAST_ASIDE and max(others) <= HANDFUL
-    return TURNED.measured("; ".join(parts), holds)
+        parts.append(f"{source}->{goal}: {estimate(aside, 0)} times in {end}, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
+        holds = holds and min(aside) >= MIN_DEFLECTED and max(others) <= HANDFUL
+    return DEFLECTED.measured("; ".join(parts), holds)
 
 
 def _stretch(small: list[Run], stretched: list[Run]) -> Claim:
     few, many = [len(run.unreached) for run in small], [len(run.unreached) for run in stretched]
     always = sorted(set.intersection(*(set(run.unreached) for run in stretched)))
-    text = f"{estimate(many, 0)} against {estimate(few, 0)}; in every run {' '.join(map(str, always))}"
+    text = f"{estimate(many, 0)} states, on the other lattice {estimate(few, 0)}; in every run {' '.join(map(str, always))}"
     return STRETCH.measured(text, interval(many)[0] > 2.0 * interval(few)[1])
 
 
 def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
     shares = {name: [float(run.touched.mean()) for run in runs] for name, runs in (("20-80 %", small), ("stretched", stretched))}
-    text = ", ".join(f"{name}: {estimate([100.0 * share for share in mine], 1)} % of the actions" for name, mine in shares.items())
+    text = ", ".join(f"{name}: {estimate([100.0 * share for share in group], 1)} % of the actions" for name, group in shares.items())
     few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
     reached = [float(run.succeeded[run.touched].mean()) for run in stretched if run.touched.any()]
     despite = (
-        f"stretched: {estimate([100.0 * share for share in reached], 0)} % of these actions reach their goal" if reached else "no contact"
+        f"{estimate([100.0 * share for share in reached], 0)} % of the actions with a contact reach their goal" if reached else "no contact"
     )
     return [
         CONTACTS.measured(text, min(few[0], many[0]) > MANY),
@@ -270,19 +335,19 @@ SIDE = 16  # states along an edge of the map
 
 
 def plot(found: Cells) -> Any:
-    """A row for each lattice: outcomes, visits, tries and values as in figs. 7.8 and 7.9, and a map of the states out of reach."""
+    """Draw outcomes, visits, tries and values as in figs. 7.8 and 7.9, and a map of unreached states: one row per lattice."""
     runs = runs_of(found)
     drawing = new_figure(17.0, 5.8 * len(runs))
     grid = drawing.add_gridspec(3 * len(runs), 3, width_ratios=(1.0, 1.0, 1.3))
-    for row, (lattice, mine) in enumerate(runs.items()):
+    for row, (lattice, group) in enumerate(runs.items()):
         rows = slice(3 * row, 3 * row + 3)
         levels = ", ".join(f"{100 * level:g}" for level in LEVELS[lattice])
-        _outcomes(drawing.add_subplot(grid[rows, 0]), mine[0], f"{levels} %: where the actions of one run ended")
-        _map(drawing, drawing.add_subplot(grid[rows, 1]), mine, f"visits in {ACTIONS[lattice]} actions, mean of {len(mine)} runs")
-        _visits(drawing.add_subplot(grid[3 * row, 2]), mine)
-        exists = exists_in(mine[0].space)
-        _actions(drawing.add_subplot(grid[3 * row + 1, 2]), "tries", np.array([tries_of(run.space, run.seen)[exists] for run in mine]))
-        _actions(drawing.add_subplot(grid[3 * row + 2, 2]), "values", np.array([run.values[exists] for run in mine]))
+        _outcomes(drawing.add_subplot(grid[rows, 0]), group[0], f"levels {levels} %: outcomes of one run")
+        _map(drawing, drawing.add_subplot(grid[rows, 1]), group, f"visits in {ACTIONS[lattice]} actions, mean of {len(group)} runs")
+        _visits(drawing.add_subplot(grid[3 * row, 2]), group)
+        exists = exists_in(group[0].space)
+        _actions(drawing.add_subplot(grid[3 * row + 1, 2]), "tries", np.array([tries_of(run.space, run.seen)[exists] for run in group]))
+        _actions(drawing.add_subplot(grid[3 * row + 2, 2]), "values", np.array([run.values[exists] for run in group]))
     return drawing
 
 
@@ -290,9 +355,9 @@ def _outcomes(axes: Any, run: Run, title: str) -> None:
     seen, counts = np.unique(run.seen, axis=0, return_counts=True)
     elsewhere = seen[:, 2] != goals_of(run.space, seen)
     states, actions = np.nonzero(exists_in(run.space))
-    axes.plot(run.space.goals[states, actions], states, "s", color="0.8", markersize=1.2, label="intended")
+    axes.plot(run.space.goals[states, actions], states, "s", color="0.8", markersize=1.2, label="goal")
     axes.scatter(
-        seen[elsewhere, 2], seen[elsewhere, 0], 1.0 + 0.3 * counts[elsewhere], "C3", linewidths=0, label="elsewhere (area: how often)"
+        seen[elsewhere, 2], seen[elsewhere, 0], 1.0 + 0.3 * counts[elsewhere], "C3", linewidths=0, label="another state (area: how often)"
     )
     for state in run.unreached:
         axes.axhline(state, color="0.3", linewidth=0.4)
@@ -323,7 +388,7 @@ def _visits(axes: Any, runs: list[Run]) -> None:
 
 
 def _actions(axes: Any, name: str, values: Array) -> None:
-    """Of every state-action, (runs, state-actions)."""
+    """Draw numbers of every state-action, (runs, state-actions)."""
     numbers = np.arange(values.shape[1])
     axes.fill_between(numbers, values.min(axis=0), values.max(axis=0), color="0.75", step="mid", linewidth=0)
     axes.plot(numbers, values.mean(axis=0), linewidth=0.6)
@@ -332,7 +397,7 @@ def _actions(axes: Any, name: str, values: Array) -> None:
 
 EXPERIMENT = Experiment(
     name="unreachable-states",
-    claim="256 states: some are never reached, others hardly ever, since the cables turn actions aside, "
+    claim="some of 256 states are never reached, others hardly ever, because the cables deflect the arm, "
     "and more so when the lattice is stretched",
     source="thesis 7.3",
     notes=__doc__,

@@ -14,7 +14,7 @@ CHECKS = 4 * SOON // EVERY  # half of them before the change
 
 
 def a_run(errors):
-    """Before the change nothing that changed is tried, afterwards nothing else."""
+    """Before the change no changed action is tried, afterwards no other."""
     changed = np.zeros(arm_space().goals.shape, dtype=bool)
     changed[0, 0] = True
     seen = np.zeros((CHECKS * EVERY, 3), dtype=int)
@@ -27,23 +27,23 @@ def a_run(errors):
 
 def test_tries_are_over_the_mean_of_all_actions():
     run = a_run(np.ones(CHECKS // 2))
-    assert run.eagerness_before == 0.0
-    assert run.eagerness == pytest.approx(arm_space().state_actions)
+    assert run.tries_before == 0.0
+    assert run.tries_after == pytest.approx(arm_space().state_actions)
     assert run.value_jump == pytest.approx(3.0) and run.value_jump_before == pytest.approx(1.0)
 
 
-def test_half_of_the_error_at_the_change_is_gone_or_never_is():
+def test_relearning_takes_until_the_error_is_halved_or_never_ends():
     errors = np.linspace(1.8, 0.0, CHECKS // 2)
     assert a_run(errors).relearned == EVERY * (np.flatnonzero(errors <= 1.0)[0] + 1)
     assert a_run(np.full(CHECKS // 2, 1.5)).relearned == np.inf
 
 
-def test_an_error_that_is_gone_at_the_first_check_counts():
+def test_an_error_that_is_halved_at_the_first_check_counts():
     assert a_run(np.full(CHECKS // 2, 0.9)).relearned == EVERY
 
 
 def all_succeed(but=()):
-    """Every action once, to its goal, but for some (state, action), which stay where they are."""
+    """Every action once, to its goal, except for some (state, action), which do not leave their state."""
     space = arm_space()
     return truth_of(space, np.array([[s, a, s if (s, a) in but else space.goals[s, a]] for s, a in np.argwhere(space.goals >= 0).tolist()]))
 
@@ -51,7 +51,7 @@ def all_succeed(but=()):
 SHORT = {"change": "object", "explorer": "curious", "forgetting": 1.0, "transitions": EVERY}
 
 
-def test_the_error_at_the_change_is_that_of_a_model_that_knows_nothing_of_it(monkeypatch):
+def test_the_error_at_the_change_is_that_of_a_model_without_later_observations(monkeypatch):
     before, after = all_succeed(), all_succeed({(0, 0), (40, 1), (80, 0)})
     monkeypatch.setattr(changed_outcomes, "truths", lambda name: (before, after))
     values = trial(SHORT, 0)
@@ -64,12 +64,12 @@ def test_the_error_at_the_change_is_that_of_a_model_that_knows_nothing_of_it(mon
 
 def test_a_change_of_no_action_is_refused(monkeypatch):
     monkeypatch.setattr(changed_outcomes, "truths", lambda name: (all_succeed(), all_succeed()))
-    with pytest.raises(InvalidValue, match="make it larger"):
+    with pytest.raises(InvalidValue, match="make the change larger"):
         trial(SHORT, 0)
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_what_changes_moves_where_the_middle_state_is_or_how_the_elbow_gets_there(name):
+def test_a_change_moves_the_end_of_an_action(name):
     space = arm_space()
     ends = []
     for is_after in (False, True):
@@ -79,7 +79,7 @@ def test_what_changes_moves_where_the_middle_state_is_or_how_the_elbow_gets_ther
     assert np.abs(ends[0] - ends[1]).max() > np.deg2rad(3.0)
 
 
-def test_an_action_changed_if_it_ends_elsewhere_and_neither_if_that_is_not_known():
+def test_an_action_without_tries_after_the_change_is_neither_changed_nor_the_same():
     space = arm_space()
     goals = space.goals[0]
     before = truth_of(space, np.array([[0, 0, goals[0]], [0, 1, goals[1]], [0, 2, goals[2]]]))

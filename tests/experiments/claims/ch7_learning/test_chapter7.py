@@ -26,7 +26,7 @@ def options(*given: str) -> argparse.Namespace:
 
 @pytest.fixture
 def toys(monkeypatch):
-    """Two experiments that note how they were called, in place of hypercube and coverage."""
+    """Two experiments that record their calls, in place of hypercube-exploration and exploration-coverage."""
     calls = []
 
     def run(name):
@@ -71,20 +71,20 @@ def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys)
     }
 
 
-def test_what_is_given_for_all_is_handed_on(tmp_path, toys):
+def test_options_for_all_are_passed_on(tmp_path, toys):
     chapter7.run(options("--seeds", "2", "--quick", "--only", "exploration-coverage"), new_run(tmp_path, "chapter7", {}))
     assert toys.calls == [("exploration-coverage", 2, 0, True)]
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("error", "reason"),
     [(MobeeError("the toy is broken"), "the toy is broken"), (ValueError("of its own code"), "ValueError: of its own code")],
 )
-def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, told):
+def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error, reason):
     folder = new_run(tmp_path, "chapter7", {})
     toys.broken["hypercube-exploration"] = error
     results = chapter7.run(options(), folder)
-    assert not results["passed"] and results["parts"]["hypercube-exploration"]["failed"] == told
+    assert not results["passed"] and results["parts"]["hypercube-exploration"]["failed"] == reason
     assert str(error) in (folder / "hypercube-exploration" / "failed.txt").read_text()
     toys.broken.clear()
     assert chapter7.run(options(), folder)["passed"]
@@ -92,7 +92,7 @@ def test_a_part_that_fails_stops_no_other_and_is_run_again(tmp_path, toys, error
     assert not (folder / "hypercube-exploration" / "failed.txt").exists()
 
 
-def test_a_part_goes_on_when_more_seeds_are_asked_for_and_not_when_fewer_are(tmp_path, toys):
+def test_a_part_continues_for_more_seeds_and_not_for_fewer(tmp_path, toys):
     folder = new_run(tmp_path, "chapter7", {})
     for seeds in ("2", "6", "3"):
         chapter7.run(options("--only", "exploration-coverage", "--seeds", seeds), folder)
@@ -106,7 +106,7 @@ def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
     assert json.loads((folder / "exploration-coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
 
 
-def test_the_time_of_an_interrupted_part_is_not_forgotten(tmp_path, toys, monkeypatch):
+def test_the_time_of_an_interrupted_part_is_counted(tmp_path, toys, monkeypatch):
     clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
     monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
     folder = new_run(tmp_path, "chapter7", {})
@@ -121,7 +121,7 @@ def test_an_unknown_part_is_refused(tmp_path):
         chapter7.run(options("--only", "tabel"), tmp_path)
 
 
-def test_all_runs_what_goes_beyond_the_chapter_too(tmp_path, toys, monkeypatch):
+def test_the_option_all_adds_the_experiments_beyond_the_chapter(tmp_path, toys, monkeypatch):
     monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration",))
     monkeypatch.setattr(chapter7, "BEYOND", ("exploration-coverage",))
     assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube-exploration"]

@@ -5,15 +5,15 @@ import numpy as np
 from experiments.claims.ch7_learning.exploration_uniformity import EXPLORERS, measured
 from experiments.kit.learning.outcomes import Explored
 
-EVEN, UNEVEN = np.array([10, 11, 10, 11, 10, 20]), np.array([1, 30, 2, 40, 3, 2])
+UNIFORM, UNEQUAL = np.array([10, 11, 10, 11, 10, 20]), np.array([1, 30, 2, 40, 3, 2])
 VISITS = {True: np.array([5, 5, 6]), False: np.array([1, 9, 20])}
 
 
-def runs(is_even, fails=True):
+def runs(is_uniform, fails=True):
     """Three seeds that try six actions, of which the last fails."""
-    tries = EVEN if is_even else UNEVEN
+    tries = UNIFORM if is_uniform else UNEQUAL
     failures = np.where(np.arange(6) == 5, tries, 0) * fails
-    return [Explored(seed, tries, failures, VISITS[is_even], {}) for seed in range(3)]
+    return [Explored(seed, tries, failures, VISITS[is_uniform], {}) for seed in range(3)]
 
 
 def verdicts(fails=True):
@@ -22,7 +22,7 @@ def verdicts(fails=True):
     return [claim.verdict for claim in measured(nearest | equidistant)]
 
 
-def test_even_tries_with_spikes_where_actions_fail_confirm_the_claims():
+def test_uniform_tries_with_spikes_where_actions_fail_confirm_the_claims():
     assert verdicts() == ["confirmed"] * 5
 
 

@@ -3,15 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch7_learning.hypercube_exploration import dispersion, findings, trial
+from experiments.claims.ch7_learning.hypercube_exploration import findings, relative_variance, trial
 from tests.experiments.finished_cells import Cell, finished
 
 
-def test_a_random_choice_has_dispersion_one_and_equal_tries_none():
+def test_a_random_choice_has_relative_variance_one_and_equal_tries_zero():
     rng = np.random.default_rng(0)
-    drawn = [dispersion(np.bincount(rng.integers(64, size=320), minlength=64)) for _ in range(400)]
+    drawn = [relative_variance(np.bincount(rng.integers(64, size=320), minlength=64)) for _ in range(400)]
     assert np.mean(drawn) == pytest.approx(1.0, abs=0.05)
-    assert dispersion(np.full(64, 5)) == 0.0
+    assert relative_variance(np.full(64, 5)) == 0.0
 
 
 def test_every_action_of_the_hypercube_succeeds_and_is_tried_five_times():

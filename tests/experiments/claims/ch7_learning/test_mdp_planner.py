@@ -45,7 +45,7 @@ def in_worlds(success, touched):
 
 @pytest.fixture
 def done(tmp_path):
-    """Four seeds in which learning with the moving table saves touches, and a roadmap that is repaired works."""
+    """Four seeds in which an MDP trained with the moving table meets it less often, and a roadmap that is repaired works."""
     for seed in range(4):
         fates = {"tried": 100, "goal": 90, "elsewhere": 6, "sometimes": 4}
         written = {
@@ -53,10 +53,10 @@ def done(tmp_path):
             "moving": {"tests": {"plans": in_worlds(0.97, 0.3)}, "fates": fates},
             "roadmap": {"tests": dict(zip(ROADMAPS, (in_worlds(0.5, 0.5), in_worlds(0.95, 0.4), in_worlds(0.97, 0.3)), strict=True))},
         }
-        for way, values in written.items():
-            write_cell(tmp_path, Cell(f"{way}-s{seed}", seed, {"way": way}), values, 1.0)
+        for training, values in written.items():
+            write_cell(tmp_path, Cell(f"{training}-s{seed}", seed, {"training": training}), values, 1.0)
         for forgetting in ENTERS:
-            settings = {"way": "enters", "forgetting": forgetting}
+            settings = {"training": "enters", "forgetting": forgetting}
             values = {"after": AFTER, "rows": [means(0.8), means(0.98)]}
             write_cell(tmp_path, Cell(f"enters-{forgetting:g}-s{seed}", seed, settings), values, 1.0)
     return load_cells(tmp_path)
@@ -70,10 +70,10 @@ def test_the_claims_follow_from_the_numbers(done):
     assert "0.80" in enters.ours and "1000 transitions later" in enters.ours
 
 
-def test_the_tables_have_a_row_for_each_rival_and_world_and_each_moment(done):
+def test_there_is_a_row_for_each_planner_and_world_and_each_time(done):
     found = tables(runs_of(done))
-    assert len(found["carried out"]) == (2 + len(ROADMAPS)) * 3
-    assert len(found["since the table entered"]) == len(ENTERS) * len(AFTER)
+    assert len(found["plans executed"]) == (2 + len(ROADMAPS)) * 3
+    assert len(found["after the table entered"]) == len(ENTERS) * len(AFTER)
 
 
 @pytest.fixture(scope="module")
@@ -81,20 +81,20 @@ def space():
     return arm_space(RANK3, ARM_NEIGHBOURS)
 
 
-def test_the_raised_table_is_in_the_way_of_some_states_and_the_lowered_one_of_none(space):
+def test_the_raised_table_touches_some_states(space):
     plant = TablePlant(0)
     down, up = touched_states(plant, space, DOWN), touched_states(plant, space, UP)
     assert (up >= down).all() and 5 < (up & ~down).sum() < 40
 
 
-def test_queries_begin_and_end_free_with_the_table_between(space):
+def test_the_table_is_between_start_and_goal_of_a_query_and_in_neither(space):
     plant = TablePlant(0)
     wanted = drawn_pairs(plant, space, 10, seed=1)
     assert len(set(wanted)) == 10 and not touched_states(plant, space, UP)[np.array(wanted)].any()
     assert wanted == drawn_pairs(plant, space, 10, seed=1) != drawn_pairs(plant, space, 10, seed=2)
 
 
-def test_a_moving_table_moves_after_so_many_actions_and_a_still_one_never(space):
+def test_a_moving_table_moves_after_every_period_and_a_still_one_never(space):
     moving, still = TablePlant(0, moves=True), TablePlant(0)
     tops = []
     for action in range(4 * PERIOD):
@@ -105,7 +105,7 @@ def test_a_moving_table_moves_after_so_many_actions_and_a_still_one_never(space)
     assert len(set(tops)) == 2 and still.world.version == 1
 
 
-def test_a_plan_without_obstacle_is_kept_and_its_path_is_counted(space):
+def test_a_plan_without_obstacle_is_followed(space):
     beliefs = TransitionModel(space).debiased()
     wanted = [(0, int(space.goal(0, 0)))]
     followed = follow(space, FrozenModel(space, beliefs), wanted, [DOWN], seed=0)
@@ -114,13 +114,13 @@ def test_a_plan_without_obstacle_is_kept_and_its_path_is_counted(space):
     assert promised == pytest.approx(0.75) and kept == 1.0  # an untried action is believed to succeed with 0.3 of 0.4
 
 
-def test_states_on_the_path_count_without_start_and_end():
+def test_start_and_end_do_not_count_as_states_on_the_path():
     blocked = np.array([True, True, False, True])
     assert through([(0, 1, 2, 3), (1, 2), (3,)], blocked) == 0.5
     assert through([(0, 1)], blocked) == 0.0
 
 
-def test_a_roadmap_that_knows_no_table_fails_at_it_and_recovers_when_repaired(space):
+def test_a_roadmap_without_the_table_fails_and_a_repaired_one_succeeds_more_often(space):
     plant = TablePlant(0)
     queries = Queries.of_seed(plant, space, 60, seed=0)
     rivals = roadmaps(plant, space)
@@ -129,7 +129,7 @@ def test_a_roadmap_that_knows_no_table_fails_at_it_and_recovers_when_repaired(sp
     assert once["up"]["success"] < repairs["up"]["success"]
 
 
-def test_fates_count_what_was_tried_twice(space):
+def test_fates_count_actions_that_were_tried_twice(space):
     model = TransitionModel(space)
     for state, action, ends in ((0, 0, (int(space.goal(0, 0)),) * 4), (1, 0, (70,) * 4), (2, 0, (70, int(space.goal(2, 0)))), (3, 0, (3,))):
         for end in ends:
@@ -137,7 +137,7 @@ def test_fates_count_what_was_tried_twice(space):
     assert fates(model) == {"tried": 3, "goal": 1, "elsewhere": 1, "sometimes": 1}
 
 
-def test_a_goal_to_which_no_path_is_known_promises_nothing(space):
+def test_without_a_known_path_the_predicted_probability_is_zero(space):
     shape, goal = space.goals.shape, int(space.goal(0, 0))
     stuck = SimpleNamespace(outcomes=np.indices(shape)[0][..., None], probabilities=np.ones((*shape, 1)))
     assert promises(space, stuck, [(0, goal)], [(0, 0)]) == (0.0, 0.0)

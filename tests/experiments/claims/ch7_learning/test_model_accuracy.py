@@ -28,12 +28,12 @@ def half_space_cells(explorers, seeds=(1,)):
     return [Cell(f"half-space-{e}-s{seed}", seed, {"world": "half-space", "explorer": e}) for e in explorers for seed in seeds]
 
 
-def test_in_the_half_space_the_numbers_of_the_toy_experiments_come_back():
+def test_the_errors_in_the_half_space_are_those_of_a_reference_implementation():
     results = findings(finished(work, half_space_cells(["curious", "least_tried"])))
-    curious, least_tried = results["runs"]["half-space curious"], results["runs"]["half-space least_tried"]
+    curious, least_tried = results["runs"]["half-space, 81 states; curious"], results["runs"]["half-space, 81 states; least tried"]
     assert curious["stochastic_actions"] == 13
-    assert curious["counts"] == pytest.approx(0.317, abs=0.01) and curious["debiased"] == pytest.approx(0.033, abs=0.005)
-    assert least_tried["debiased_stochastic"] > 1.4 * curious["debiased_stochastic"]
+    assert curious["L1_with_imagined"] == pytest.approx(0.317, abs=0.01) and curious["L1_debiased"] == pytest.approx(0.033, abs=0.005)
+    assert least_tried["L1_debiased_stochastic"] > 1.4 * curious["L1_debiased_stochastic"]
     measured = {claim["text"]: claim["verdict"] for claim in results["claims"] if claim["ours"]}
     assert measured[CLAIMS[0].text] == "confirmed" and len(measured) == 2
 
@@ -50,7 +50,7 @@ def test_the_error_is_that_of_the_agent_s_own_model():
     assert np.isnan(curve[1:]).all()
 
 
-def test_the_truth_of_the_arm_is_that_of_all_walks(monkeypatch):
-    monkeypatch.setattr(model_accuracy, "LONGEST_WALK", 30)
+def test_the_true_outcomes_of_the_arm_are_those_of_all_walks(monkeypatch):
+    monkeypatch.setattr(model_accuracy, "MAX_WALK", 30)
     cells = [Cell(f"truth-s{seed}", seed, {"world": "rank3", "explorer": "walk"}) for seed in WALKS]
     assert truths(finished(work, cells))["rank3"].tries.sum() == 60

@@ -11,7 +11,7 @@ from experiments.kit.learning.outcome_distance import Compared, Distance
 pytestmark = pytest.mark.timeout(120)
 
 
-def test_parts_learn_at_once_and_each_makes_its_number_of_transitions():
+def test_parts_learn_at_the_same_time_and_each_makes_its_number_of_transitions():
     cell = Cell("arms-s0", 0, {"task": "arms", "transitions": 4})
     first, again = learn_offline(cell), learn_offline(cell)
     assert set(first) == {"seen_left_arm", "seen_right_arm"}
@@ -20,20 +20,20 @@ def test_parts_learn_at_once_and_each_makes_its_number_of_transitions():
         assert np.array_equal(rows[1:, 0], rows[:-1, 2])
 
 
-def test_the_bound_is_that_of_one_more_value():
+def test_one_more_value_is_below_the_bound_with_95_percent():
     rng = np.random.default_rng(0)
     draws = rng.normal(3.0, 0.5, size=(4000, 6))
     below = [row[-1] <= prediction_bound(list(row[:-1])) for row in draws]
     assert np.mean(below) == pytest.approx(0.95, abs=0.01)
 
 
-def test_offline_seeds_that_differ_widely_decide_nothing():
+def test_offline_seeds_that_differ_widely_leave_the_claim_open():
     wide = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.05, 0.1))
     assert measured({"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})}).verdict == "open"
     assert measured({"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})}).verdict == "refuted"
 
 
-def test_where_nothing_was_compared_nothing_is_decided():
+def test_without_compared_actions_the_claim_is_open():
     none = Distance(float("nan"), float("nan"), 0)
     assert measured({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"
 

@@ -4,8 +4,17 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from experiments.claims.ch7_learning.table_interest import Judged, agreement, at_second_peak, autocorrelation, is_cyclic, second_peak
-from experiments.claims.ch7_learning.table_runs import is_forward, low_goals, near_table
+from experiments.claims.ch7_learning.table_measures import (
+    Judged,
+    agreement,
+    at_second_peak,
+    autocorrelation,
+    is_cyclic,
+    is_forward,
+    low_goals,
+    near_table,
+    second_peak,
+)
 from experiments.kit.learning.arm import robot
 
 RUNS, WINDOWS, LONGEST = 6, 300, 100
@@ -28,39 +37,39 @@ def waves(periods):
 GHOSTS = curves(noise(1))
 
 
-def test_touching_that_comes_and_goes_with_one_period_is_cyclic():
+def test_contact_with_one_period_is_cyclic():
     found = curves(waves([PERIOD] * RUNS) + noise(0))
     assert second_peak(found) % PERIOD in (0, 1, PERIOD - 1)
     assert is_cyclic(found, GHOSTS) is True
 
 
-def test_bouts_that_do_not_return_in_time_are_not():
+def test_bouts_of_contact_without_a_period_are_not_cyclic():
     bouts = curves(lfilter([1.0], [1.0, -0.4], noise(0)))
     assert bouts[:, 1].min() > GHOSTS[:, 1].max()
     assert is_cyclic(bouts, GHOSTS) is False
 
 
-def test_what_stands_out_at_longer_lags_without_a_second_peak_is_open():
+def test_correlations_at_longer_lags_without_a_second_peak_are_open():
     assert is_cyclic(curves(lfilter([1.0], [1.0, -0.9], noise(0))), GHOSTS) is None
 
 
-def test_runs_with_a_period_each_have_none_in_common():
+def test_runs_with_different_periods_are_open():
     assert is_cyclic(curves(waves([13, 17, 22, 29, 37, 47]) + noise(0)), GHOSTS) is None
 
 
-def test_a_period_that_the_ghosts_have_too_shows_nothing():
+def test_a_period_that_the_ghosts_have_too_is_not_cyclic():
     waving = waves([PERIOD] * RUNS)
     assert is_cyclic(curves(waving + noise(0)), curves(waving + noise(1))) is not True
 
 
-def test_a_run_is_judged_where_the_others_have_their_peak():
+def test_a_run_is_judged_at_the_peak_of_the_other_runs():
     alone = curves(np.concatenate([waves([PERIOD] * RUNS)[:1], waves([PERIOD / 2] * RUNS)[1:]]))
     here, there = at_second_peak(alone, np.zeros_like(alone))
     assert here[0] == pytest.approx(alone[0, second_peak(alone[1:])])
     assert there == [0.0] * RUNS
 
 
-def test_a_trend_is_no_correlation_but_periods_are():
+def test_the_autocorrelation_ignores_a_trend_and_shows_periods():
     steps = np.arange(100)
     periods = (steps // 10) % 2
     found = autocorrelation(periods + 0.01 * steps, 10)
@@ -70,7 +79,7 @@ def test_a_trend_is_no_correlation_but_periods_are():
     assert autocorrelation(steps % 2, 1)[1] < -0.9
 
 
-def test_arms_that_prefer_the_same_agree():
+def test_arms_that_prefer_the_same_actions_agree():
     tries = np.random.default_rng(0).normal(size=(3, 4))
     assert agreement(np.array([tries, 2.0 * tries + 1.0])) == pytest.approx(1.0)
     assert agreement(np.array([tries, -tries])) == pytest.approx(-1.0)
@@ -83,7 +92,7 @@ def test_precision_and_recall_of_a_ranking():
     assert (judged.at_all, judged.chance) == (0.5, 0.5)
 
 
-def test_both_arms_of_a_run_are_one_value():
+def test_the_numbers_of_both_arms_of_a_run_are_averaged():
     judged = Judged(np.array([[True, True, False, False], [False, True, False, True]]))
     assert (judged.at_all, judged.chance) == (0.75, 0.5)
     assert judged.precision.tolist() == pytest.approx([0.5, 0.75, 0.5, 0.5])
