@@ -83,7 +83,7 @@ LOW = Claim(
 )
 SIMILAR_ARMS = Claim(
     "paper 3.2, fig. 10",
-    "the two arms choose very similar actions: rank correlation of their tries at the table over those at a table without forces (ghost), by goal",
+    "the two arms choose very similar actions: rank correlation of tries over those at a table without forces (ghost), by goal",
     "qualitative",
 )
 CYCLES = Claim(
@@ -99,7 +99,7 @@ RICHER = Claim(
 FEW = Claim("thesis 6.4", "at the table no action has more than a handful (5) of outcomes", "a handful")
 DETECTOR = Claim(
     "paper 4.4",
-    "the actions whose tries at the table most exceed those at a table without forces (ghost) depend on other parts: precision, equal to recall",
+    "actions whose tries most exceed those at a table without forces (ghost) depend on other parts: precision, equal to recall",
     "qualitative",
 )
 TIME = Claim("paper 3.2", "18 000 transitions per learner at the table take so many days of robot time", "a little more than 2")
