@@ -1,4 +1,4 @@
-"""Assembles the state of the whole body from parts that report at their own times (thesis 2.3.2)."""
+"""Assembles the state of the whole body from the parts' states, each with its own sampling time (thesis 2.3.2)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Body:
         self.states: dict[str, State] = {}
 
     def update(self) -> bool:
-        """Take what has come; True once every part has reported."""
+        """Read the newest states; returns True once every part has one."""
         for name, stream in self._streams.items():
             state = stream.take()
             if state is not None:
@@ -27,16 +27,16 @@ class Body:
         return len(self.states) == len(self._streams)
 
     def forget(self) -> None:
-        """A new run: nothing is known yet."""
+        """A new run: no state is known."""
         self.states.clear()
 
     def q(self) -> Array:
-        """Motor positions, shape (n,), in [rad]; only after `update` said True."""
+        """Motor positions, shape (n,), in [rad]; only after `update` returned True."""
         q = np.empty(len(self._robot.motors))
         for name, part in self._robot.parts.items():
             q[part.slice] = self.states[name].q
         return q
 
     def ages(self, t: int) -> dict[str, int]:
-        """How old each part's sample is at bus time t, in [ns]."""
+        """Age of each part's sample at bus time t, in [ns]."""
         return {name: t - state.t for name, state in self.states.items()}

@@ -48,7 +48,7 @@ class Publisher(Generic[_M]):
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
-        self._is_heard: bool | None = None  # None: nobody asked yet
+        self._is_heard: bool | None = None  # None: not asked for yet
         how = _SETTINGS[bus.control if delivery == "CONTROL" else delivery]
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
@@ -63,7 +63,7 @@ class Publisher(Generic[_M]):
             self._publisher = bus.session.declare_publisher(key, **settings)
 
     def put(self, *, k: int | None = None, t: int | None = None, **fields: Any) -> None:
-        """Send one message; k and t default to the bus clock's."""
+        """Publish one message; `k` and `t` are by default those of the bus clock."""
         bus = self._bus
         message = self._cls(
             v=VERSION,
@@ -80,14 +80,14 @@ class Publisher(Generic[_M]):
 
     @property
     def heard(self) -> bool:
-        """Whether anybody subscribes: what is dear to make need not be made otherwise."""
+        """Whether there is a subscriber; without one, an expensive message need not be made."""
         if self._is_heard is None:
             self._publisher.declare_matching_listener(Callback(self._note_matching, indirect=False))
             self._is_heard = bool(self._publisher.matching_status.matching)
         return self._is_heard
 
     def _note_matching(self, status: zenoh.MatchingStatus) -> None:
-        """On Zenoh's thread: to be told is much cheaper than to ask in every tick."""
+        """On Zenoh's thread: a callback is much cheaper than a query in every tick."""
         self._is_heard = bool(status.matching)
 
 
@@ -99,7 +99,7 @@ class Latest(Generic[_M]):
         self._subscriber = bus.session.declare_subscriber(key, RingChannel(1))
 
     def take(self) -> _M | None:
-        """The newest message since the last call, if there is one and it is right."""
+        """The newest valid message since the last call; None if there is none."""
         sample = self._subscriber.try_recv()
         return None if sample is None else self._bus.receive(self._cls, sample, self._part)
 
@@ -110,7 +110,7 @@ def part_of(cls: type[Message], name: str) -> str | None:
 
 
 class Bus:
-    """A session, the bus clock as last heard, and the count of what was refused."""
+    """A session, the newest bus clock, and the counts of refused messages."""
 
     def __init__(self, session: zenoh.Session, who: str, log: logging.Logger) -> None:
         self.session, self.who, self.log = session, who, log
@@ -138,9 +138,9 @@ class Bus:
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """The message in a sample; None if it was refused, which is counted and told.
+        """The message in a sample; None if it was refused, which is counted and reported.
 
-        Before the first clock message nobody knows which run it is: then None, and nothing is counted.
+        Before the first clock message the run is not known: then it is None too, and nothing is counted.
         """
         if self.run == NO_RUN and not any_run:
             return None
@@ -148,14 +148,14 @@ class Bus:
             size = None if part is None else self.part_sizes[part]
             message = decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.robot_size)
             if not any_run and message.run != self.run:
-                raise Refused("run", f"{cls.__name__} of run {message.run}, this is {self.run}")
+                raise Refused("run", f"{cls.__name__} of run {message.run}, the present run is {self.run}")
         except Refused as refused:
             self.reject(refused.reason, f"{sample.key_expr}: {refused}")
             return None
         return message
 
     def reject(self, reason: str, text: str) -> None:
-        """Count a refused message or call; tell it at most once a second and reason."""
+        """Count a refused message or call, and report it at most once per second and reason."""
         self.rejected[reason] += 1
         now = time.monotonic()
         if now - self._reported.get(reason, -1.0) >= 1.0:
@@ -163,6 +163,6 @@ class Bus:
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
 
     def event(self, level: str, code: str, text: str, **values: float) -> None:
-        """Tell a person: on the bus and in the log."""
+        """Report to a person: on the bus and in the log."""
         self.log.log({"info": 20, "warning": 30, "error": 40}[level], "%s: %s", code, text)
         self._events.put(level=level, code=code, text=text[:2000], values=values)

@@ -1,4 +1,4 @@
-"""Configuration: a frozen struct is the schema of the file, the flags and the help."""
+"""Configuration: a frozen struct is the schema of the settings file, the command-line flags and the help."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ _KEY = re.compile("[a-z0-9_]+")
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be used: file, line, field and the nearest valid name are in the message."""
+    """A configuration that cannot be used; the message has file, line, field and the nearest valid name."""
 
 
 class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every service is told."""
+    """Settings of every service."""
 
     endpoint: str = DEFAULT_ENDPOINT
-    """Where the router listens."""
+    """Address of the router."""
     namespace: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
-    """Whose keys it uses: the robot's, or those of a filter in front of it."""
+    """Prefix of all keys: the robot, or the filter in front of it."""
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
     seed: int = 0
     """Seed of everything random in this service."""
     mode: Literal["free", "lock"] = "free"
-    """The clock on the wall sets the pace, or lockstep: every tick waits for all who take part, as fast as they are."""
+    """free: in real time; lock: in lockstep, where every tick waits for all participants and time runs as fast as they answer."""
     patience: Annotated[float, Meta(ge=2, le=60)] = 2.0
-    """Lockstep: s of the clock on the wall after which who has not answered counts as lost; more where others use the machine too."""
+    """Lockstep: s of real time after which a participant without answer is dropped; more if others use the machine too."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError for a robot that the service cannot serve with these settings: what, why, and what to do instead.
+        """Raise MobeeError if the service cannot serve the robot with these settings; the message says why and what to do instead.
 
-        The launcher asks before it starts anything, and the service itself before it is ready. Services add their own conditions.
+        The launcher calls this before it starts any service, and each service before it is ready. Services add their own conditions.
         """
         for part in robot.parts:
             if not _KEY.fullmatch(part):
@@ -135,7 +135,7 @@ def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], 
 
 
 def nearest(given: str, valid: Iterable[str]) -> str:
-    """The end of a message about an unknown name: the most similar one, and all there are."""
+    """End of a message about an unknown name: the most similar valid name, and all valid names."""
     names = list(valid)
     near = difflib.get_close_matches(given, names, n=1)
     return f"{f' Did you mean {near[0]!r}?' if near else ''} Valid: {', '.join(names) or 'none'}."

@@ -16,17 +16,17 @@ from services.common.config import ServiceConfig
 from services.common.exit_codes import BAD_INPUT, FAILED
 from services.common.session import BusUnreachable
 
-HELD = "MOBEE_HELD"  # set: standard input is a pipe that the launcher closes when the service may join the others
+HELD = "MOBEE_HELD"  # environment variable; if set, standard input is a pipe that the launcher closes when the service may join the system
 
 
 def wait_until_released() -> None:
-    """Wait until the services that this one needs are ready, where the launcher has started it before they are."""
+    """Wait until the services that this one needs are ready, if the launcher has started it before them."""
     if os.environ.pop(HELD, None) is not None:
-        os.read(sys.stdin.fileno(), 1)  # the end of the file: nobody writes
+        os.read(sys.stdin.fileno(), 1)  # returns at the end of the file
 
 
 def robot_of(config: ServiceConfig) -> Robot:
-    """The robot of a service; raises MobeeError for one that cannot be read, or that the service cannot serve."""
+    """Load the robot of a service; raises MobeeError if it cannot be read, or the service cannot serve it."""
     robot = load_robot(config.robot)
     config.check_robot(robot)
     return robot
@@ -34,7 +34,7 @@ def robot_of(config: ServiceConfig) -> Robot:
 
 @contextmanager
 def explained(prog: str) -> Iterator[None]:
-    """Turn the project's errors into one line on standard error; exit code 2 for a mistake in what was given, else 1."""
+    """Report errors of the project in one line on standard error; exit code 2 if a setting is wrong, else 1."""
     try:
         yield
     except (MobeeError, BusUnreachable) as error:
@@ -43,16 +43,16 @@ def explained(prog: str) -> Iterator[None]:
 
 
 class _LogFile(logging.FileHandler):
-    """A file of log lines."""
+    """A log file."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """A line that the disk has no room for is lost: told without logging's traceback, which would cover the screen."""
+        """Drop a line for which the disk has no room, without logging's traceback, which would cover the status screen."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handleError(record)
 
 
 def set_up_log(who: str, file: Path | None = None) -> logging.Logger:
-    """The service's logger; `file` instead of standard error."""
+    """The logger of a service; it writes to standard error, which the launcher redirects to a file, or to `file`."""
     logging.basicConfig(
         handlers=[logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)],
         level=logging.INFO,

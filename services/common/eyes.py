@@ -16,7 +16,7 @@ UP = np.array([0.0, 0.0, 1.0])  # at zero pose the pictures stand upright
 
 
 def require_eyes(robot: Robot) -> None:
-    """Raise InvalidValue for a robot through whose eyes nothing can be seen: what is missing, and what to do."""
+    """Raise InvalidValue if the robot has no usable eyes; the message names what is missing and what to do."""
     instead = "Leave renderer and vision out of the scenario, or add what is missing to the robot's file."
     if missing := [name for name in EYES if name not in robot.markers]:
         raise InvalidValue(

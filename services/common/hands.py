@@ -11,7 +11,7 @@ from mobee.model.kinematics import link_transforms
 from mobee.robot.robot import Robot
 
 PALMS = ("left_palm", "right_palm")
-AS_NEAR = 1e-3  # m, palms whose distances differ by less are as near
+EQUAL_DISTANCE = 1e-3  # m; palms whose distances differ by less count as equally near
 
 
 def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
@@ -36,9 +36,9 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """The markers that a motor moves on links at the ends of the tree, or anywhere if no end has one.
+    """The markers on moving links at the ends of the tree, or all moving markers if no end has one.
 
-    Those with most motors before them come first, so a hand is before a wheel.
+    Those with the most motors before them come first, so a hand is before a wheel.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -48,7 +48,7 @@ def end_markers(robot: Robot) -> tuple[str, ...]:
 
 
 def part_of(robot: Robot, marker: str) -> str:
-    """The part with the most motors that move a marker, of several the one nearest to it.
+    """The part with the most motors that move a marker; of equal ones the nearest to it.
 
     Raises UnknownName for a marker that the robot does not have, InvalidValue for one that no motor moves.
     """
@@ -60,10 +60,10 @@ def part_of(robot: Robot, marker: str) -> str:
 
 
 def hand_for(robot: Robot, place: Array | None) -> str:
-    """The marker to put on a place when none was chosen: the one that is nearest at home of the palms, or of the ends with most motors.
+    """Choose the marker that reaches a place: of the palms, or of the end markers with the most motors, the nearest one at home.
 
-    `place`: (3,) m, None where it is not known. Where several are as near, or nothing is known, it is the right palm, or the first end.
-    Raises InvalidValue for a robot without a marker that a motor moves.
+    `place`: (3,) m, or None if it is not known. Of equally near ones, or without a place, it is the right palm, or the first end marker.
+    Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:
@@ -76,7 +76,7 @@ def hand_for(robot: Robot, place: Array | None) -> str:
     if place is None:
         return hands[0]
     far = [float(np.linalg.norm(_at_home(robot, name) - place)) for name in hands]
-    return next(name for name, distance in zip(hands, far, strict=True) if distance < min(far) + AS_NEAR)
+    return next(name for name, distance in zip(hands, far, strict=True) if distance < min(far) + EQUAL_DISTANCE)
 
 
 def _motors_before(robot: Robot, marker: str) -> list[int]:

@@ -1,4 +1,4 @@
-"""One inbox for each process: Zenoh's threads put messages in, the main thread handles them."""
+"""The inbox of a process: Zenoh's threads put messages in, the main thread handles them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import Any, NoReturn
 
 Handler = Callable[[], None]
 CROWDED = 1000  # waiting messages and calls at which further messages are dropped
-CROWDED_WITH_CALLS = 2 * CROWDED  # at which further calls are dropped: a flood of messages must not make the service deaf
-CROWDED_WITH_STOPS = 2 * CROWDED_WITH_CALLS  # at which even emergency stops are dropped: no flood but one of stops gets there
-GRACE = 0.002  # s for which `spin` goes on with what is waiting when its time is up
+CROWDED_WITH_CALLS = 2 * CROWDED  # at which further calls are dropped: a service must answer calls during a flood of messages
+CROWDED_WITH_STOPS = 2 * CROWDED_WITH_CALLS  # at which emergency stops are dropped: only a flood of stops gets this far
+GRACE = 0.002  # s for which `spin` handles waiting messages after its time is over
 
 
 class Newest:
@@ -40,40 +40,40 @@ class Newest:
 
 
 class Timer:
-    """What is to be done at some time, unless it is cancelled before."""
+    """A handler that is called at some time, unless it is cancelled before."""
 
     def __init__(self, handle: Handler) -> None:
         self.handle: Handler | None = handle
 
     def cancel(self) -> None:
-        """Have nothing done, and nobody woken for it; in a handler only."""
+        """Do not call the handler, and do not wake the process for it; in a handler only."""
         self.handle = None
 
 
 class Inbox:
-    """What is to be done, in order of arrival, and timers."""
+    """Handlers in order of arrival, and timers."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Handler] = SimpleQueue()
         self._later: deque[Handler] = deque()
         self._timers: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
-        self._turn = Lock()  # of who runs handlers: the main thread, but while it waits in `serve`
+        self._turn = Lock()  # held by the thread that runs handlers: the main thread, except while it waits in `serve`
         self._turn.acquire()
         self._serves = False
-        self._calls: SimpleQueue[None] = SimpleQueue()  # for the main thread to look into the inbox while it serves
-        self.dropped = 0  # what came while the inbox was crowded
+        self._calls: SimpleQueue[None] = SimpleQueue()  # wakes the main thread while it serves
+        self.dropped = 0  # number of messages and calls dropped because too many were waiting
 
     def put(self, handler: Handler) -> None:
-        """Have the main thread run it; any thread may call this."""
+        """Let the main thread run the handler; any thread may call this."""
         self._queue.put(handler)
         if self._serves:
             self._calls.put(None)
 
     def handle(self, handler: Handler) -> None:
-        """Run it in this thread, if the main thread waits in `serve` and nothing else does here; else as put.
+        """Run the handler in this thread if the main thread waits in `serve` and no other handler is waiting; else as put.
 
-        What it raises is raised in the main thread.
+        An exception of the handler is raised in the main thread.
         """
         if not self._turn.acquire(blocking=False):
             self.put(handler)
@@ -89,7 +89,7 @@ class Inbox:
             self._turn.release()
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """As put, but False, and counted, while `crowd` handlers are waiting: a flood must not fill the memory."""
+        """As put, but return False and count it while `crowd` handlers are waiting, so that a flood does not fill the memory."""
         if self._queue.qsize() >= crowd:
             self.dropped += 1
             return False
@@ -97,7 +97,7 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """As offer, but without waking the main thread: it runs before whatever is put next."""
+        """As offer, but without waking the main thread: the handler runs before the one that is put next."""
         if len(self._later) >= crowd:
             self.dropped += 1
             return False
@@ -105,7 +105,7 @@ class Inbox:
         return True
 
     def at(self, when: float, handler: Handler) -> Timer:
-        """Have it run at a time of the monotonic clock; main thread or in a handler only."""
+        """Call the handler at a time of the monotonic clock; in the main thread or in a handler only."""
         timer = Timer(handler)
         heapq.heappush(self._timers, (when, next(self._order), timer))
         if self._serves:
@@ -113,16 +113,16 @@ class Inbox:
         return timer
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
-        """Handle what comes until that time of the monotonic clock, or until it was `enough`.
+        """Run handlers until that time of the monotonic clock, or until `enough` returns True.
 
-        What is waiting then is handled too, as far as a short grace allows: no flood keeps the caller here.
+        Handlers that wait at that time still run, but only for the time GRACE, so that a flood does not block the caller.
         """
         self._spin(until, enough, self._awaited)
 
     def serve(self, until: float) -> None:
-        """As spin, but other threads may `handle` in place of this one while it waits.
+        """As spin, but other threads may run handlers by `handle` while this one waits.
 
-        A message is then answered by the thread that has received it, and neither it nor the answer is handed from thread to thread.
+        The thread that has received a message then also answers it, which saves two changes of threads.
         """
         self._serves = True
         try:
@@ -150,11 +150,11 @@ class Inbox:
             self._run(handler)
 
     def _awaited(self, seconds: float) -> Handler:
-        """The next in the queue, waited for; raises Empty."""
+        """Wait for the next handler in the queue; raises Empty."""
         return self._queue.get(timeout=seconds) if seconds > 0 else self._queue.get_nowait()
 
     def _called(self, seconds: float) -> Handler:
-        """The same while others may take their turn: nothing is taken out of the queue meanwhile, or it would lose its place."""
+        """The same, but other threads may run handlers meanwhile; none is taken out of the queue before, to keep the order."""
         if seconds > 0 and self._queue.empty():
             self._turn.release()
             try:

@@ -1,4 +1,4 @@
-"""Subscriptions of a service, handled in its main thread."""
+"""Subscriptions of a service, whose handlers run in its main thread."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _known = threading.local()  # lives as long as Python knows the thread
 
 
 class Listener:
-    """The streams that one process reads; all handlers run in the main thread."""
+    """The streams that a process reads; all handlers run in its main thread."""
 
     def __init__(self, bus: Bus, inbox: Inbox, locked: bool, direct: bool) -> None:
-        """`locked`: in lockstep; `direct`: Zenoh's own thread puts into the inbox."""
+        """`locked`: in lockstep.  `direct`: Zenoh's own thread puts messages into the inbox."""
         self.bus, self.inbox, self.locked, self._direct = bus, inbox, locked, direct
-        self.keeps_step = False  # a Participant of lockstep says otherwise
-        self.inject_test_delay: Callable[[], None] = lambda: None  # before every tick: for tests of lockstep
+        self.keeps_step = False  # set by a Participant in lockstep
+        self.inject_test_delay: Callable[[], None] = lambda: None  # called before every tick, for tests of lockstep
         bus.control = "STEP" if locked else "LATEST"
         self._kept: list[Any] = []  # tokens die with their handles
         self._on_run: list[Callable[[], None]] = []
 
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
-        """Have the newest message of a stream handled; older ones that wait are overwritten.
+        """Handle the newest message of a stream; older ones that wait are overwritten.
 
         `name`: the variable in the message's key, such as the part; by default any.
         """
@@ -51,7 +51,7 @@ class Listener:
         crowd: int = CROWDED,
         later: bool = False,
     ) -> None:
-        """Have every message of a stream handled.
+        """Handle every message of a stream.
 
         Args:
             cls: the message.
@@ -75,7 +75,7 @@ class Listener:
             self._subscribe(key, enqueue)
 
     def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-        """The newest sample only; one after the other for who keeps step, since a slot would mix up the order of two streams."""
+        """Handle the newest sample only; in lockstep every sample, because a slot would change the order of two streams."""
         slot = Newest(self.inbox, handle)
 
         def offer(sample: zenoh.Sample) -> None:
@@ -87,30 +87,30 @@ class Listener:
         return offer
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
-        """Each subscriber has a thread of its own, which costs time and in lockstep would mix up what one service put on two keys."""
+        """Subscribe; `direct`: without a thread per subscriber, which costs time and could reorder two streams in lockstep."""
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(_stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
-        """Have every tick handled that is not overtaken; a new run is announced to `on_run` first."""
+        """Handle the newest tick; the handlers of `on_run` are called first if it is of a new run."""
         self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
-        """As on_clock, for who computes on the body: every tick comes with the newest state of every part."""
+        """As on_clock, with the newest state of every part in each tick."""
 
         def whole(tick: Tick) -> None:
             if tick.parts.keys() == self.bus.part_sizes.keys():
                 handler(tick)
             else:
-                self.bus.reject("part", f"Tick of {', '.join(tick.parts)}: this robot has {', '.join(self.bus.part_sizes)}")
+                self.bus.reject("part", f"Tick with the parts {', '.join(tick.parts)}; this robot has {', '.join(self.bus.part_sizes)}")
 
         self._on_time(Tick, whole)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
-        """Lockstep, instead of `on_clock`: have only those ticks handled that wait for this service."""
+        """Lockstep, instead of `on_clock`: handle only those ticks that wait for this service."""
         self._on_time(Turn, handler, self.bus.who)
 
     def _on_time(self, cls: type[_T], handler: Callable[[_T], None], name: str = "*") -> None:
-        def tick(sample: zenoh.Sample) -> None:
+        def handle(sample: zenoh.Sample) -> None:
             time = self.bus.receive(cls, sample, any_run=True)
             if time is None:
                 return
@@ -124,10 +124,10 @@ class Listener:
                     announce()
             handler(time)
 
-        self._subscribe(cls.stream.keys(name), self._newest(tick))
+        self._subscribe(cls.stream.keys(name), self._newest(handle))
 
     def on_run(self, handler: Callable[[], None]) -> None:
-        """Have it called at the first tick of every run."""
+        """Call the handler at the first tick of every run."""
         self._on_run.append(handler)
 
     def _deliver(self, cls: type[_M], sample: zenoh.Sample, handler: Callable[[_M], None], part: str | None, any_run: bool = False) -> None:
@@ -137,10 +137,10 @@ class Listener:
 
 
 def _stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-    """The callback, for a thread of Zenoh's own that stays known to Python.
+    """Wrap a callback so that Python keeps its state for the calling thread of Zenoh.
 
-    Python makes a state for a foreign thread that calls it, on fresh pages of memory, and takes it down when the call is over: dearer
-    than the callback.  A claim on the state that is never given up keeps it.
+    Python allocates a state when a foreign thread calls it, and frees it when the call ends, which costs more than the callback.  A claim
+    on the state that is never released keeps it.
     """
 
     def call(sample: zenoh.Sample) -> None:

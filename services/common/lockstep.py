@@ -1,7 +1,7 @@
 """Lockstep: tick k + 1 begins when all participants have answered tick k (docs/bus.md).
 
-A participant keeps a `Participant` and says `done(k)` when all that it has to say to tick k is put; whoever owns the clock waits at a
-`Barrier`.  In free mode `done` says nothing.
+A participant has a `Participant` and calls `done(k)` after it has published all its messages for tick k; the owner of the clock waits at
+a `Barrier`.  In free mode `done` does nothing.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterable, Sequence
 from bus_schema.messages import Answer, StepDone, Turn
 from services.common.service import Service
 
-TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment: a participant sleeps up to so long at every tick and again before it answers
+TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep of a participant, at every tick and again before it answers
 
 
 class Participant:
-    """One who answers every tick, or every tick at which there is something to decide."""
+    """A service that answers every tick, or every tick in which it has something to decide."""
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked
@@ -28,45 +28,45 @@ class Participant:
             self._done = service.bus.publisher(StepDone, service.who)
 
     def done(
-        self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), told: bool = False
+        self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), implied: bool = False
     ) -> None:
-        """All that this service has to say to tick k is put; see StepDone for the rest.
+        """Report that this service has published all its messages for tick k; see StepDone for the other arguments.
 
-        `told`: somebody else will say so, in whose answer this one is included.
+        `implied`: publish nothing, because the answer of another service will include this one.
         """
         if not self._locked:
             return
         self.inject_test_delay()
-        if not told:
+        if not implied:
             self._done.put(re_k=k, ok=ok, busy=list(busy), last=last, including=list(including))
 
     def inject_test_delay(self) -> None:
-        """Be late, in tests that ask for it: before every answer."""
+        """Sleep for a random time if MOBEE_TEST_DELAY_MS is set, to test that delays change no result."""
         if self._delay:
-            time.sleep(random.uniform(0.0, self._delay))  # not seeded: it stands for the scheduler
+            time.sleep(random.uniform(0.0, self._delay))  # not seeded, like a scheduler
 
 
 class Barrier:
-    """Who must answer, and who has.
+    """Which participants must answer a tick, and which have.
 
-    A participant counts from its first answer on until its token goes, until it is dropped for being late, or until its last
-    answer; when it answers again it counts again.  Who is named busy by the controller's answer need not answer that tick; the
-    others are told by then that it is their turn, so that an agent need not listen to every tick.
+    A participant is present from its first answer until its liveliness token disappears, it is dropped because it is late, or it gives its
+    last answer; when it answers again it is present again.  A participant that the controller's answer names as busy need not answer that
+    tick.  The others get their turn with that answer, so that an agent need not read every tick.
     """
 
     def __init__(
         self,
         service: Service,
         participants: Iterable[str],
-        tell: Callable[[str, str], None],
+        report: Callable[[str, str], None],
         referee: str = "controller",
         patience: float = 2.0,
     ) -> None:
-        """`tell` hears (who, why) of all that makes a run one that cannot be repeated; `referee` says who is busy.
+        """`report` is called with (participant, reason) when the run is not repeatable any more; `referee` names the busy participants.
 
-        `patience`: s of the clock on the wall for one tick; who has not answered then is out.
+        `patience`: s of real time for one tick; a participant that has not answered by then is dropped.
         """
-        self._service, self._tell, self._referee, self._patience = service, tell, referee, patience
+        self._service, self._report, self._referee, self._patience = service, report, referee, patience
         self._expected = set(participants)
         self._present: set[str] = set()
         self._answered: dict[str, int] = {}  # newest tick that each has answered
@@ -76,35 +76,35 @@ class Barrier:
         service.on_alive(self._note_alive)
 
     def begin(self) -> None:
-        """A new run: everybody has to come anew."""
+        """A new run: no participant is present yet."""
         self._present.clear()
         self._answered.clear()
 
     def absent(self) -> list[str]:
-        """Who is expected and does not take part (yet)."""
+        """Expected participants that are not present."""
         return sorted(self._expected - self._present)
 
     def missing(self, k: int) -> list[str]:
-        """Who must still answer tick k."""
+        """Present participants that must still answer tick k."""
         waiting = {who for who in self._present if self._answered.get(who, -1) < k}
         if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
             waiting.difference_update(self._busy)
         return sorted(waiting)
 
     def wait(self, k: int) -> list[str]:
-        """Handle what comes until tick k is answered by all, or until those who have not are late: these are dropped, and named."""
+        """Handle messages until all have answered tick k, or the time is over; returns the late participants, which are dropped."""
         if self._referee not in self._present:
             self._give_turns(())
         self._service.spin(time.monotonic() + self._patience, lambda: not self.missing(k))
         late = self.missing(k)
         for who in late:
-            self._drop(who, f"has not answered tick {k} within {self._patience:g} s")
+            self._drop(who, f"did not answer tick {k} within {self._patience:g} s")
         return late
 
     def _drop(self, who: str, why: str) -> None:
         if who in self._present:
             self._present.discard(who)
-            self._tell(who, why)
+            self._report(who, why)
             if who == self._referee:
                 self._give_turns(())
 
@@ -115,7 +115,7 @@ class Barrier:
                 turn.put(dt=self._service.bus.dt)
 
     def note(self, who: str, re_k: int, answer: Answer) -> None:
-        """Somebody has answered tick re_k, and with that those whose answers are included."""
+        """Note the answer of a participant to tick re_k, and of those whose answers it includes."""
         for one in (who, *answer.including):
             self._answered[one] = re_k
             self._present.add(one)
@@ -123,7 +123,7 @@ class Barrier:
             self._busy = answer.busy
             self._give_turns(answer.busy)
         if not answer.ok:
-            self._tell(who, f"lacked something at tick {re_k}")
+            self._report(who, f"lacked an input at tick {re_k}")
 
     def _note_done(self, done: StepDone) -> None:
         if done.last:

@@ -17,7 +17,7 @@ from services.common import rpc
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A message as it came, of whatever type."""
+    """A message of any type, not decoded."""
 
     key: str
     encoding: str
@@ -26,11 +26,11 @@ class Heard:
 
     @property
     def type(self) -> str:
-        """Name of the message's type; the whole encoding when it is none of ours."""
+        """Name of the message's type; the whole encoding if it is no message of this project."""
         return self.encoding.removeprefix("application/msgpack;icub/").partition("/")[0]
 
     def content(self) -> Any:
-        """The message as dicts, lists and values, unchecked; raises ValueError when it is not msgpack."""
+        """The message as dicts, lists and values, unchecked; raises ValueError if it is not msgpack."""
         try:
             return msgspec.msgpack.decode(self.payload)
         except (msgspec.MsgspecError, RecursionError) as error:
@@ -38,9 +38,9 @@ class Heard:
 
 
 def listen(session: zenoh.Session, key: str, handle: Callable[[Heard], None]) -> None:
-    """Have every message on a key expression handled, on a thread of Zenoh, until the session is closed.
+    """Handle every message on a key expression, on a thread of Zenoh, until the session is closed.
 
-    Raises ValueError when the key expression is not valid.
+    Raises ValueError if the key expression is not valid.
     """
 
     def enqueue(sample: zenoh.Sample) -> None:
@@ -53,7 +53,7 @@ def listen(session: zenoh.Session, key: str, handle: Callable[[Heard], None]) ->
 
 
 def alive(session: zenoh.Session) -> dict[str, list[str]]:
-    """Instances by service, of all that have declared themselves ready."""
+    """The running instances of each service, by their liveliness tokens."""
     found: dict[str, list[str]] = {}
     for answer in session.liveliness().get(keys.ALL_ALIVE, timeout=1.0):
         if answer.ok is not None:
@@ -63,7 +63,7 @@ def alive(session: zenoh.Session) -> dict[str, list[str]]:
 
 
 def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
-    """How the services are, all asked at once; who does not answer in time is left out."""
+    """The status of the services, all asked at once; those that do not answer in time are left out."""
     answers: dict[str, Stat | rpc.CallFailed] = {}
 
     def ask(who: str) -> None:

@@ -1,4 +1,4 @@
-"""Keeps a rate by absolute deadlines, and running percentiles of measured times."""
+"""Keeps a rate by absolute deadlines; percentiles of measured times."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Rate:
         self.missed = 0  # ticks that were skipped
 
     def next(self) -> float:
-        """The deadline to wait for; call once a tick, after the tick's work."""
+        """The deadline to wait for; call it once per tick, after the tick's work."""
         late = time.monotonic() - self.deadline
         if late > self.period:
             skipped = int(late / self.period)
@@ -29,13 +29,13 @@ class Rate:
 
 
 class Percentiles:
-    """The newest values of a quantity."""
+    """Percentiles of the newest values of a quantity."""
 
     def __init__(self, keep: int = 20_000) -> None:
         self._values: deque[float] = deque(maxlen=keep)
 
     def add(self, value: float) -> None:
-        """One more value."""
+        """Add a value."""
         self._values.append(value)
 
     def clear(self) -> None:
@@ -43,5 +43,5 @@ class Percentiles:
         self._values.clear()
 
     def at(self, percent: float) -> float:
-        """The percentile, or -1 when there is no value yet."""
+        """The percentile; -1 if there is no value yet."""
         return float(np.percentile(self._values, percent)) if self._values else -1.0

@@ -1,4 +1,4 @@
-"""Calls with a time limit, on both sides: each is answered once, however often it is repeated."""
+"""Calls with a time limit, client and server: a repeated call happens once."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from services.common.bus import Bus
 
 _R = TypeVar("_R", bound=Reply)
 TIMEOUT = 0.5  # s
-LOCKED_TIMEOUT = 1.5  # s, in lockstep: within its ceiling, so that a busy machine makes no difference
+LOCKED_TIMEOUT = 1.5  # s, in lockstep: shorter than its patience, so that the load of the machine changes nothing
 
 
 class CallFailed(Exception):
-    """A call without the wanted answer; `code` is the server's, or no_answer, or bad_answer."""
+    """A call that got no valid reply; `code` is the server's, or no_answer, or bad_answer."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -38,9 +38,9 @@ def call(
     tries: int = 1,
     **fields: object,
 ) -> _R:
-    """Ask the service behind `key`; raises CallFailed.  An empty answer means that nobody is there.
+    """Call the service that answers `key` and wait for the reply; raises CallFailed.
 
-    `tries`: how often a call that nobody answers is sent; with one id, so that it happens once.
+    `tries`: how often a call without answer is sent, always with one id, so that it happens at most once.
     """
     payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
     for left in reversed(range(tries)):
@@ -50,7 +50,7 @@ def call(
         except CallFailed as failed:
             if failed.code != "no_answer" or not left:
                 raise
-    raise CallFailed("no_answer", f"{key}: nobody answers")
+    raise CallFailed("no_answer", _no_answer(key))
 
 
 def ask(
@@ -64,12 +64,12 @@ def ask(
     timeout: float = TIMEOUT,
     **fields: object,
 ) -> None:
-    """Call that does not wait: `done` gets the answer or the failure, once, on a thread of Zenoh."""
+    """Call without waiting: `done` gets the reply or the failure, once, on a thread of Zenoh."""
     message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
     answers: list[zenoh.Reply] = []
 
     def finish() -> None:
-        result: _R | CallFailed = CallFailed("no_answer", f"{key}: nobody answers")
+        result: _R | CallFailed = CallFailed("no_answer", _no_answer(key))
         if answers:
             try:
                 result = _read(key, answers[0], reply)
@@ -78,6 +78,10 @@ def ask(
         done(result)
 
     session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout, handler=Callback(answers.append, finish))
+
+
+def _no_answer(key: str) -> str:
+    return f"{key}: no service answers"
 
 
 def _read(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R:
@@ -92,21 +96,21 @@ def _read(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R:
 def _failure(key: str, answer: zenoh.Reply) -> CallFailed:
     error = answer.err
     if error is None:
-        return CallFailed("no_answer", f"{key}: an answer without content")
+        return CallFailed("no_answer", f"{key}: the answer is empty")
     try:
         failure = decode(Failure, error.payload.to_bytes(), str(error.encoding))
-    except Refused:  # Zenoh's own errors are plain text, its timeout among them
+    except Refused:  # Zenoh's own errors, such as a timeout, are plain text
         return CallFailed("no_answer", f"{key}: {error.payload.to_bytes()[:200].decode(errors='replace')}")
     return CallFailed(failure.code, failure.text)
 
 
 _Q = TypeVar("_Q", bound=Request)
 
-REMEMBERED = 256  # replies kept, so that a repeated call is harmless
+REMEMBERED = 256  # replies kept for repeated calls
 
 
 class CallRefused(Exception):
-    """Raised by a request's handler: the caller gets code and text."""
+    """Raised by the handler of a request: the caller gets code and text."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -114,7 +118,7 @@ class CallRefused(Exception):
 
 
 class Answering:
-    """Decodes requests, has them handled, and replies."""
+    """Decodes requests, calls their handlers, and replies."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -122,7 +126,7 @@ class Answering:
 
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
         """Reply to a query on the `declared` key: handler(request, key) -> reply, or CallRefused."""
-        key = str(query.key_expr) if "*" in declared else declared  # answers to one wildcard call must differ by key
+        key = str(query.key_expr) if "*" in declared else declared  # answers to one call with a wildcard must differ by key
         with query:
             try:
                 reply_type, payload = self._reply(query, cls, handler, key, part_of_key)
@@ -140,10 +144,10 @@ class Answering:
         if part_of_key:
             part = key.split("/")[0]
             if part not in self.bus.part_sizes:
-                raise CallRefused("part", f"no part {part!r}; there are {', '.join(self.bus.part_sizes)}")
+                raise CallRefused("part", f"no part {part!r}; this robot has {', '.join(self.bus.part_sizes)}")
             size = self.bus.part_sizes[part]
         if query.payload is None or query.encoding is None:
-            raise Refused("decode", f"{cls.__name__}: an empty request")
+            raise Refused("decode", f"{cls.__name__}: the request is empty")
         request = decode(cls, query.payload.to_bytes(), str(query.encoding), part=size, robot=self.bus.robot_size)
         call = (key, request.id)
         if call not in self._replies:

@@ -1,4 +1,4 @@
-"""The life cycle of a service: session, calls, liveliness, and a quick end from every state."""
+"""The life cycle of a service: session, calls, liveliness, and a quick end in every state."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ ORPHANED = 10.0  # s without a router after which a service ends
 
 
 class Service(Listener):
-    """A process on the bus.  All handlers run one after the other, inside `spin` or `run`: in the main thread.
+    """A process on the bus.  All handlers run one after the other, in the main thread, inside `spin` or `run`.
 
-    In lockstep those of a `prompt` service that is in `run` run in Zenoh's thread, which must not wait for an answer: none may `call`.
+    In lockstep the handlers of a `prompt` service that is in `run` run in Zenoh's thread, which must not wait: they must not use `call`.
     """
 
     def __init__(
@@ -52,10 +52,16 @@ class Service(Listener):
         inbox: Inbox | None = None,
         prompt: bool = False,
     ) -> None:
-        """`session` and `inbox`: its own unless they are given; two services of one process share an inbox.
+        """Connect to the router.
 
-        `prompt`: every tick waits for it, and it never computes for long, so that Zenoh's own thread may put into its inbox, or
-        in lockstep handle what it brings.
+        Args:
+            who: name of the service.
+            config: its settings.
+            robot: gives the lengths of vectors in messages.
+            session: an open session instead of a new one.
+            inbox: that of another service in the same process.
+            prompt: every tick waits for this service, and no handler computes for long: Zenoh's own thread puts messages into the inbox
+                and, in lockstep, handles them.
         """
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         signal.signal(signal.SIGTERM, _end)
@@ -68,7 +74,7 @@ class Service(Listener):
             wait_until_released()
         session = session or open_client(os.environ.get(LOCAL_ENDPOINT) or config.endpoint, namespace=config.namespace, lease=lease)
         with ExitStack() as failed:
-            failed.enter_context(session)  # closed: an open callback would keep the interpreter from exiting
+            failed.enter_context(session)  # closes it: an open callback would keep the interpreter from exiting
             self._begin(session, robot, inbox or Inbox(), prompt)
             failed.pop_all()
 
@@ -83,9 +89,9 @@ class Service(Listener):
         self.alive: dict[str, set[str]] = {}
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
-        self.words: Callable[[], Mapping[str, str]] = dict  # of `stat`: what is no number
-        self.mark: Callable[[], None] = lambda: None  # zero the counters of `describe`: a measurement begins
-        self.end: Callable[[], None] = _leave  # what a shutdown call leads to
+        self.words: Callable[[], Mapping[str, str]] = dict  # of `stat`: values that are not numbers
+        self.mark: Callable[[], None] = lambda: None  # called when a measurement begins: sets the counters of `describe` to 0
+        self.end: Callable[[], None] = _leave  # called after a shutdown call
         self._answering = Answering(self.bus)
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._is_ready = False
@@ -100,21 +106,21 @@ class Service(Listener):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        with self.bus.session:  # closed even if a signal comes in between: an open callback would keep the interpreter from exiting
+        with self.bus.session:  # closes it even if a signal comes in between: an open callback would keep the interpreter from exiting
             _ignore_signals()
-            if error is not None and not isinstance(error, SystemExit) and not self._says_all(error):
+            if error is not None and not isinstance(error, SystemExit) and not self._is_explained(error):
                 self.log.error("ended by %s", error, exc_info=error)
 
-    def _says_all(self, error: BaseException) -> bool:
-        """Whether its text is enough for a person (entry.py prints it); a wrong value once all runs is a fault of ours."""
+    def _is_explained(self, error: BaseException) -> bool:
+        """Whether the text of the error is enough for a user (entry.py prints it); an InvalidValue after the start is a defect."""
         return type(error) is MobeeError or (isinstance(error, MobeeError) and not self._is_ready)
 
     def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
-        """Have (who, instance, up) told for every process that comes or goes."""
+        """Call the handler with (service, instance, up) when a process appears or disappears."""
         self._on_alive.append(handler)
 
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
-        """Answer calls: handler(request, key) -> reply, or CallRefused.  `part_of_key`: its first chunk names the part."""
+        """Answer calls by handler(request, key) -> reply, or CallRefused.  `part_of_key`: the key begins with the part's name."""
 
         def enqueue(query: zenoh.Query) -> None:
             self.inbox.offer(lambda: self._answering.answer(query, key, cls, handler, part_of_key), CROWDED_WITH_CALLS)
@@ -124,7 +130,7 @@ class Service(Listener):
     def call(
         self, key: str, request: type[Request], reply: type[_R], *, timeout: float | None = None, tries: int = 1, **fields: object
     ) -> _R:
-        """Ask another service, as rpc.call; raises rpc.CallFailed."""
+        """Call another service, see rpc.call; raises rpc.CallFailed."""
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout or self.patience, tries=tries, **fields)
 
     def ask(
@@ -137,7 +143,7 @@ class Service(Listener):
         timeout: float = rpc.TIMEOUT,
         **fields: object,
     ) -> None:
-        """Call that does not wait: `done` handles the answer or the failure in the main thread."""
+        """Call without waiting: `done` handles the answer or the failure in the main thread."""
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
             self.inbox.put(lambda: done(answer))
@@ -145,31 +151,33 @@ class Service(Listener):
         rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, **fields)
 
     def ready(self) -> None:
-        """Tell the world: after every subscriber and queryable is declared."""
+        """Declare the liveliness token, after all subscriptions and calls are declared."""
         gc.collect()
-        gc.freeze()  # what lives as long as the process is not looked at again: a full collection would stall a tick
+        gc.freeze()  # objects that live as long as the process: a full collection of them would delay a tick
         _return_free_memory()
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
-        """Handle what comes until that time of the monotonic clock, or until it was `enough`."""
+        """Run handlers until that time of the monotonic clock, or until `enough` returns True."""
         self.inbox.spin(until, enough)
 
     def run(self) -> None:
-        """Handle what comes until SIGTERM, a shutdown call, or ten seconds without a router."""
+        """Run handlers until SIGTERM, a shutdown call, or ten seconds without a router."""
         spin = self.inbox.serve if self._serves else self.inbox.spin
         while True:
             spin(time.monotonic() + 1.0)
             self.check_router()
 
     def check_router(self) -> None:
-        """End the process when nobody routes any more: an orphan must not outlive its system."""
+        """End the process after ten seconds without a router."""
         if self.alive.get("router"):
             self._router_seen = time.monotonic()
         elif time.monotonic() - self._router_seen > ORPHANED:
-            self.log.error("no router at %s for %g s: ending", self.config.endpoint, ORPHANED)
+            self.log.error(
+                "no router at %s for %g s: this service ends; start the system again with `mobee launch`", self.config.endpoint, ORPHANED
+            )
             raise SystemExit(ENVIRONMENT)
 
     def _watch_liveliness(self) -> None:
@@ -190,9 +198,9 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """A service belongs to the system it was started in: a later one at the same endpoint must not inherit it."""
+        """Note the router; end if it is another one, because a service must not join a system that is started later."""
         if self._router not in ("", router):
-            self.log.error("another router came to %s: ending", self.config.endpoint)
+            self.log.error("another router came to %s, of a new system: this service ends", self.config.endpoint)
             raise SystemExit(ENVIRONMENT)
         self._router = router
 
@@ -221,13 +229,13 @@ class Service(Listener):
         return Config(v=VERSION, config=msgspec.json.encode(self.config).decode())
 
     def _shutdown(self, request: Empty, key: str) -> Done:
-        self.log.info("asked by %s to end", request.who)
+        self.log.info("%s requested the end", request.who)
         self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply is out
         return Done(v=VERSION)
 
 
 def _return_free_memory() -> None:
-    """Return to the system what starting has used and freed, where the C library can: 23 MB where meshes were read."""
+    """Return freed memory of the start to the system, if the C library can: 23 MB if meshes were read."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc
     if trim is not None:
         trim(0)

@@ -15,14 +15,14 @@ import zenoh
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
-LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: where a service connects to the router, instead of its endpoint
+LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: address at which a service connects to the router, instead of its endpoint
 _LONGEST_PATH = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
 
 _COMMON = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
-    "transport/unicast/open_timeout": 2000,  # ms; a listener that says nothing blocks `open` so long, and signals with it
+    "transport/unicast/open_timeout": 2000,  # ms; a listener that does not answer blocks `open`, and signals, for so long
     "timestamping/enabled": {"router": True, "peer": True, "client": True},  # events keep a history
 }
 
@@ -31,7 +31,7 @@ _ONE_THREAD = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx)
 
 
 class BusUnreachable(Exception):
-    """No router where one was expected; the message names the endpoint and the remedy."""
+    """There is no router at the endpoint; the message names it and what to do."""
 
 
 def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.Config:
@@ -42,18 +42,18 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 
 
 def spare_threads() -> None:
-    """Have Zenoh work in one thread of this process; before its first session only.
+    """Let Zenoh use one thread of this process; call it before the first session.
 
-    In lockstep all wait for one message after the other, and handing each from thread to thread takes a fifth of the time.
+    In lockstep services wait for one message after the other, and passing each from thread to thread takes a fifth of the time.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 
 
 @contextmanager
 def local_endpoint() -> Iterator[str]:
-    """A second address of a router, a socket in the file system, for the processes that it starts; empty where there can be none.
+    """A second address of a router for processes on the same machine: a Unix socket in a private folder; empty if that is not possible.
 
-    A socket in a folder that nobody else may enter: what the kernel does for TCP even on the loopback interface is left out.
+    It is faster than TCP on the loopback interface.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-") as folder:
         path = f"{folder}/bus"
@@ -63,8 +63,8 @@ def local_endpoint() -> Iterator[str]:
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
     """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: the robot that its keys are about, or the filter in front of it; one chunk of a key.  `lease`: s of silence after
-    which this process counts as dead.
+    `namespace`: prefix of all keys: the robot, or the filter in front of it.  `lease`: s without a sign of life after which this process
+    counts as dead.
     """
     settings: dict[str, object] = {
         "mode": "client",
@@ -85,13 +85,13 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
 
 
 def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -> zenoh.Session:
-    """The router every service connects to, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable."""
+    """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable."""
     settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint, *filter(None, [local_endpoint])]}
     try:
         return zenoh.open(_config(NAMESPACE, lease, settings))
     except zenoh.ZError as error:
         raise BusUnreachable(
-            f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, `mobee stop --endpoint {endpoint}` ends it; "
+            f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, end it with `mobee stop --endpoint {endpoint}`, "
             "or choose another endpoint with --endpoint, such as tcp/127.0.0.1:7448."
         ) from None
 
@@ -100,4 +100,4 @@ def _reason(error: zenoh.ZError) -> str:
     """Zenoh's message without the lines of its own source files."""
     text = re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
     text = re.sub(r'^Json5Err\(Message \{ msg: "(.*?)", location:.*', r"\1", text)
-    return re.sub(r"Unable to connect to any of \[.*\]!", "nobody answers", text)
+    return re.sub(r"Unable to connect to any of \[.*\]!", "no answer", text)

@@ -1,4 +1,4 @@
-"""The default world of a robot, and the fingerprint by which processes agree on a robot."""
+"""The default world of a robot, and a hash of the robot that processes compare."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.robot.robot import Robot
 
-NO_WORLD = "none"  # the word for a world without objects
+NO_WORLD = "none"  # setting for a world without objects
 TABLE = "table"
 AT_TABLE = ("icub", "icub_2014", "icub_katana")  # shipped robots whose experiments take place at the table
 

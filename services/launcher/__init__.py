@@ -1,5 +1,5 @@
 """The launcher: router, start order, supervision, status and stop.
 
 Reads: alive/*/* (readiness), the `stat` of every service it started.
-Writes: alive/router/<id>, alive/launcher/<id>, event/launcher, estop (when a service the robot needs is given up); answers launcher/rpc/*.
+Writes: alive/router/{id}, alive/launcher/{id}, event/launcher, estop (if a vital service is given up); answers launcher/rpc/*.
 """

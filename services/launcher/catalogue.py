@@ -10,26 +10,26 @@ AGENT = "agent_"
 
 @dataclass(frozen=True)
 class Entry:
-    """What the launcher knows of a service before it reads its settings."""
+    """A service as the launcher knows it before it reads its settings."""
 
     module: str  # run with `python -m mobee_system.run`
     config: str  # its configuration: module:class
     stage: int  # services are listed in this order, and stopped in the opposite one
-    after: tuple[str, ...] = ()  # who must be ready before it joins them
+    after: tuple[str, ...] = ()  # services that must be ready before it joins the system
     nice: int = 0
-    vital: bool = True  # when it is given up, the robot is stopped
-    steps: bool = True  # lockstep: every tick waits for it
-    looks: bool = False  # what it sees depends on the clock on the wall, so lockstep does without it
+    vital: bool = True  # the robot is stopped if it is given up
+    participates: bool = True  # lockstep: every tick waits for it
+    real_time: bool = False  # its results depend on real time, so that it is left out in lockstep
     needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
     given: Mapping[str, str] = field(default_factory=dict)  # settings that make it this service
 
 
-_PICTURES = 10  # nice value of whatever may come late
-_PLANS = 9  # of who plans: the control chain must not wait for a thought, and no thought for a picture
+_NICE_PICTURES = 10  # niceness of services that may be late
+_NICE_PLANS = 9  # of agents: after the control chain, before pictures
 
 _ENTRIES = {
     "robot_sim": Entry(
-        "services.robot_sim", "services.robot_sim.config:Config", 0, steps=False, needs={"pybullet": "sim", "icub_models": "sim"}
+        "services.robot_sim", "services.robot_sim.config:Config", 0, participates=False, needs={"pybullet": "sim", "icub_models": "sim"}
     ),
     "model": Entry("services.model", "services.model.config:Config", 1),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
@@ -39,29 +39,29 @@ _ENTRIES = {
         "services.robot_sim.config:RendererConfig",
         4,
         after=("robot_sim", "controller"),
-        nice=_PICTURES,
+        nice=_NICE_PICTURES,
         vital=False,
-        steps=False,
-        looks=True,
+        participates=False,
+        real_time=True,
     ),
     "vision": Entry(
         "services.vision",
         "services.vision.config:Config",
         4,
         after=("model", "controller"),
-        nice=_PICTURES,
+        nice=_NICE_PICTURES,
         vital=False,
-        steps=False,
-        looks=True,
+        participates=False,
+        real_time=True,
     ),
     "monitor": Entry(
         "services.monitor",
         "services.monitor.config:Config",
         5,
         after=("robot_sim", "controller"),
-        nice=_PICTURES,
+        nice=_NICE_PICTURES,
         vital=False,
-        steps=False,
+        participates=False,
         needs={"rerun": "viz", "icub_models": "viz"},
     ),
 }
@@ -70,7 +70,7 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 
 
 def entry_of(who: str, module: str | None) -> Entry | None:
-    """The entry of a service; `module`: another program in its place, or one that is not shipped.  None: nobody knows it."""
+    """The entry of a service; None if it is unknown.  `module`: another program in its place, or one that is not shipped."""
     entry = _ENTRIES.get(who)
     if who.startswith(AGENT):
         entry = Entry(
@@ -78,7 +78,7 @@ def entry_of(who: str, module: str | None) -> Entry | None:
             "services.agents.config:Config",
             3,
             after=("controller",),
-            nice=_PLANS,
+            nice=_NICE_PLANS,
             given={"part": who.removeprefix(AGENT)},
         )
     if module is None:

@@ -26,7 +26,7 @@ class PortInUse(Exception):
 
 
 def check_extras(scenario: Scenario) -> None:
-    """Raise MissingExtra for the first service that could not even be imported."""
+    """Raise MissingExtra for the first service whose packages are not installed."""
     for part in scenario.parts:
         if part.entry.module == "services.robot_sim" and getattr(part.config, "backend", "pybullet") == "kinematic":
             continue
@@ -58,7 +58,7 @@ def check_ports(scenario: Scenario) -> None:
 
 def _is_free(port: int) -> bool:
     with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as servers do: connections just closed do not count
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as servers do: ignore connections that were just closed
         try:
             probe.bind(("127.0.0.1", port))
         except OSError:
@@ -67,18 +67,18 @@ def _is_free(port: int) -> bool:
 
 
 def check_gains(scenario: Scenario) -> None:
-    """Raise ConfigError when services of one law would use different sets of gains, or of terms: nothing would tell later."""
+    """Raise ConfigError if services would use different gains or terms of the law, which nothing would report later."""
     for what in ("gains", "terms"):
         named = {part.who: str(getattr(part.config, what)) for part in scenario.parts if hasattr(part.config, what)}
         if len(set(named.values())) > 1:
-            said = ", ".join(f"{who} {given}" for who, given in named.items())
+            listed = ", ".join(f"{who} {given}" for who, given in named.items())
             raise ConfigError(
-                f"{scenario.where(f'shared.{what}')}: {what} differ: {said}. They share one law: set it once, as shared.{what}."
+                f"{scenario.where(f'shared.{what}')}: {what} differ: {listed}. All services use one law: set {what} once, as shared.{what}."
             )
 
 
 def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
-    """Raise ConfigError when the controller would answer no tick, since its gains are unstable at the robot's rate.
+    """Raise ConfigError if the controller's gains are unstable at the robot's rate, so that it would answer no tick.
 
     `robots`: as check_robots returns them.
     """
@@ -97,12 +97,12 @@ def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 
 
 def check_lockstep(scenario: Scenario) -> None:
-    """Raise ConfigError when only some services keep step, or a number of ticks is asked for where none is exact."""
+    """Raise ConfigError if only some services run in lockstep, or a number of ticks is set in free mode, where it is not exact."""
     modes = {part.who: part.config.mode for part in scenario.parts}
     if len(set(modes.values())) > 1:
-        said = ", ".join(f"{who} {mode}" for who, mode in modes.items())
+        listed = ", ".join(f"{who} {mode}" for who, mode in modes.items())
         raise ConfigError(
-            f"{scenario.where('shared.mode')}: modes differ: {said}. All keep step or none does: set it once, as shared.mode."
+            f"{scenario.where('shared.mode')}: modes differ: {listed}. All services run in lockstep or none: set mode once, as shared.mode."
         )
     for part in scenario.parts:
         if getattr(part.config, "ticks", 0) and not scenario.is_locked:
@@ -114,7 +114,7 @@ def check_lockstep(scenario: Scenario) -> None:
 def check_robots(scenario: Scenario) -> dict[str, Robot]:
     """The robots by the name or path that services give for them.
 
-    Raises ConfigError in one line when a robot or world that a service names cannot be read, or holds what would be ignored.
+    Raises ConfigError in one line if a robot or world cannot be read, or its file has elements that would be ignored.
     """
     from mobee.model.world_file import load_world
     from mobee.robot.load import load_robot
@@ -139,7 +139,7 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
 def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
     """Raise ConfigError in one line for the first service that cannot serve its robot; `robots`: as check_robots returns them.
 
-    Such a service would end as soon as it is started, and a service that is not vital would be started again and again.
+    Such a service would end at its start; one that is not vital would be started again and again.
     """
     for part in scenario.parts:
         try:
@@ -151,8 +151,8 @@ def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)  # a misspelt table would be no table
-            warnings.simplefilter("default", OlderVersion)  # nothing is lost of it
+            warnings.simplefilter("error", UserWarning)  # such as a misspelt name
+            warnings.simplefilter("default", OlderVersion)  # such a file is read completely
             return read(getattr(part.config, field))
     except UserWarning as warning:
         raise ConfigError(f"{warning}. The launcher ignores nothing: correct it or take it out.") from None

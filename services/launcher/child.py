@@ -24,7 +24,7 @@ _ONE_THREAD = {
 
 @dataclass(frozen=True)
 class Program:
-    """What is run as one service."""
+    """The command and settings of one service process."""
 
     who: str
     argv: tuple[str, ...]
@@ -33,7 +33,7 @@ class Program:
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
-    patience: float = 0.0  # s for which it may be silent at least
+    patience: float = 0.0  # s without answer before it counts as frozen, at least
     environment: Mapping[str, str] = field(default_factory=dict)  # beside the launcher's own
 
 
@@ -67,14 +67,14 @@ class Child:
         return 0 if self.process is None else self.process.pid
 
     def enter(self, phase: Phase) -> None:
-        """Note the change of phase."""
+        """Change the phase."""
         self.phase, self.since = phase, time.monotonic()
 
     def spawn(self) -> None:
-        """Start the process: in its own group, so that a terminal's Ctrl-C reaches the launcher alone.
+        """Start the process, in its own group, so that Ctrl-C in a terminal reaches the launcher only.
 
-        In the same session, though: with autogroup scheduling, niceness counts only within one.  The service imports what it
-        needs, reads its robot, and then waits for `release` before it joins the others.
+        It stays in the same session, because with autogroup scheduling niceness counts only within one.  The service imports its
+        packages, reads its robot, and then waits for `release` before it joins the system.
         """
         with self.program.log.open("ab") as log:
             self.process = subprocess.Popen(
@@ -92,7 +92,7 @@ class Child:
         self.has_token, self.asking, self.unanswered, self.asked_at, self.answered_at, self.stat = False, False, 0, 0.0, 0.0, None
 
     def release(self) -> None:
-        """Let the service join the others."""
+        """Let the service join the system."""
         assert self.process is not None and self.process.stdin is not None
         self.process.stdin.close()
         self.enter("starting")
@@ -106,12 +106,12 @@ class Child:
         return self.process is not None and self.process.poll() is None
 
     def terminate(self) -> None:
-        """Ask the process to end, if there is one that runs."""
+        """Send SIGTERM to the process, if it runs."""
         if self.process is not None:
             self.process.terminate()
 
     def kill(self) -> None:
-        """End the process and whatever it started, and wait until it is gone."""
+        """Kill the process and its children, and wait until it has ended."""
         if self.process is None:
             return
         try:
@@ -123,9 +123,9 @@ class Child:
             self.process.stdin.close()
         self.process = None  # its number may now name another process
 
-    def last_words(self) -> str:
+    def last_log_line(self) -> str:
         """The last line of its log."""
         with self.program.log.open("rb") as log:
             log.seek(max(0, self.program.log.stat().st_size - 4000))
             lines = log.read().decode(errors="replace").split("\n")
-        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "its log is empty")

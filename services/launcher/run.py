@@ -41,19 +41,19 @@ from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
 
 _REDRAW = 0.5  # s
-_FOREVER = 1e6  # s
-_STILL = 5.0  # s, lockstep: a robot still at tick 0 so long after all are ready is told of
+_NO_LIMIT = 1e6  # s
+_START_NOTICE = 5.0  # s after all are ready: a run in lockstep that is still at tick 0 is reported
 
 
 @dataclass(frozen=True)
 class Options:
-    """How to launch."""
+    """Options of `mobee launch`."""
 
     scenario: str = "default"
     settings: tuple[str, ...] = ()  # table.field=value
     headless: bool = False  # without the monitor
-    duration: float | None = None  # s from readiness; None: until told to stop
-    ticks: int | None = None  # lockstep: the run ends after so many
+    duration: float | None = None  # s after all services are ready; None: until a stop is requested
+    ticks: int | None = None  # lockstep: number of ticks after which the run ends
     json: bool = False
     endpoint: str | None = None
     runs: Path = Path("runs")
@@ -70,7 +70,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
         scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
-        library()  # here in one line what every service would say
+        library()  # if the core cannot be loaded: one error here instead of one from each service
         check_gains(scenario)
         check_lockstep(scenario)
         robots = check_robots(scenario)
@@ -89,14 +89,14 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
-        return _refuse("interrupted before anything was started", INTERRUPTED)
+        return _refuse("interrupted before any service was started", INTERRUPTED)
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)
         service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
         service.log = service.bus.log = set_up_log("launcher", directory / "logs" / "launcher.log")
     except OSError as error:
         return _refuse(
-            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; name another with --runs", ENVIRONMENT
+            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; choose another with --runs", ENVIRONMENT
         )
     with service:
         return _Run(service, scenario, directory, options, local).execute(started)
@@ -114,13 +114,13 @@ class _Run:
         """`local`: the address at which the services connect to the router, if not its endpoint."""
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
-        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._tell)
+        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._announce)
         self._children = self._supervisor.children.values()
-        self._stop_asked, self._starting = False, True
+        self._stop_requested, self._starting = False, True
 
     def execute(self, started: float) -> int:
         """Start, watch, stop, summarise; `started`: monotonic time from which readiness is counted."""
-        self._listen_for_stop()
+        self._handle_signals()
         with self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance)):
             self._service.describe = self._describe
             self._service.ready()
@@ -128,25 +128,27 @@ class _Run:
         return self._report(ready, duration)
 
     def _live(self, started: float) -> tuple[float | None, float]:
-        """From the first service to the last; s until all were ready, None if they never were, and s from then on."""
+        """Start, run and stop the services; returns the time [s] until all were ready (None: never), and from then to the end."""
         ready = begun = None
         try:
             self._draw()
             self._supervisor.begin()
-            self._spin(_FOREVER, self._supervisor.settled)
+            self._spin(_NO_LIMIT, self._supervisor.settled)
             if not self._over():
                 self._starting = False
                 ready = time.monotonic() - started
-                self._tell(f"all ready after {ready:.1f} s" if not self._supervisor.faults else "running without what was given up")
-                if not self._scenario.is_locked:  # in lockstep all count from tick 1 on: the clock on the wall must not show
+                self._announce(
+                    "running without the services that were given up" if self._supervisor.faults else f"all ready after {ready:.1f} s"
+                )
+                if not self._scenario.is_locked:  # in lockstep all count from tick 1 on, so that real time changes no number
                     self._mark()
                 else:
-                    self._service.inbox.at(time.monotonic() + _STILL, self._tell_what_is_waited_for)
+                    self._service.inbox.at(time.monotonic() + _START_NOTICE, self._announce_start)
                 begun = time.monotonic()
-                self._spin(self._options.duration or _FOREVER, self._supervisor.has_arrived)
-                self._ask_last()
+                self._spin(self._options.duration or _NO_LIMIT, self._supervisor.has_arrived)
+                self._ask_final_numbers()
             duration = 0.0 if begun is None else time.monotonic() - begun
-            self._tell("stopping")
+            self._announce("stopping")
             self._supervisor.stop()
         finally:
             self._supervisor.kill_all()
@@ -154,15 +156,15 @@ class _Run:
         return ready, duration
 
     def _over(self) -> bool:
-        """Whether somebody asked for the end, or nobody waits at a robot that is stopped for good."""
+        """Whether the end was requested, or the robot is stopped for good in a run that no user watches."""
         lost = self._supervisor.stopped_robot and (self._options.duration is not None or self._starting)
-        return self._stop_asked or lost
+        return self._stop_requested or lost
 
     def _spin(self, seconds: float, enough: Callable[[], bool] = lambda: False) -> None:
         self._service.spin(time.monotonic() + seconds, lambda: self._over() or enough())
 
     def _mark(self) -> None:
-        """Have every service count from now on."""
+        """Let every service begin its measurement now."""
         waiting: set[str] = set()
         for child in self._children:
             if child.phase == "ready":
@@ -171,40 +173,40 @@ class _Run:
                 self._service.ask(keys.service_rpc(child.who, "mark"), Done, done, timeout=1.0)
         self._spin(2.0, lambda: not waiting)
 
-    def _ask_last(self) -> None:
-        """The numbers as they are now: the last poll is up to half a second old."""
+    def _ask_final_numbers(self) -> None:
+        """Ask for the final numbers: the last ones are up to half a second old."""
         asked = time.monotonic()
         for child in self._children:
             if child.phase == "ready":
                 self._supervisor.ask(child)
         self._service.spin(asked + 2.0, lambda: not any(child.asking for child in self._children))
 
-    def _listen_for_stop(self) -> None:
+    def _handle_signals(self) -> None:
         """One signal stops everything in order, a second one kills."""
-        self._service.end = self._ask_stop
+        self._service.end = self._request_stop
 
         def on_signal(signum: int, frame: FrameType | None) -> None:
-            if self._stop_asked:
+            if self._stop_requested:
                 self._supervisor.kill_all()
                 raise SystemExit(FAILED)
-            self._ask_stop()
+            self._request_stop()
 
         for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(signum) is not signal.SIG_IGN:  # nohup stays in force
+            if signal.getsignal(signum) is not signal.SIG_IGN:  # keep the effect of nohup
                 signal.signal(signum, on_signal)
 
-    def _ask_stop(self) -> None:
-        self._stop_asked = True
+    def _request_stop(self) -> None:
+        self._stop_requested = True
         self._service.inbox.put(lambda: None)  # wake the main thread
 
-    def _tell(self, text: str) -> None:
+    def _announce(self, text: str) -> None:
         self._service.log.info("%s", text)
-        self._screen.tell(text)
+        self._screen.add(text)
 
-    def _tell_what_is_waited_for(self) -> None:
+    def _announce_start(self) -> None:
         sim = self._supervisor.children.get("robot_sim")
         if not self._over() and sim is not None and sim.stat is not None and sim.stat.numbers.get("tick") == 0.0:
-            self._tell(f"robot_sim has not begun: {sim.stat.text}")
+            self._announce(f"robot_sim is still at tick 0: {sim.stat.text}")
 
     def _draw(self) -> None:
         self._screen.draw(self._children, self._directory)
@@ -226,7 +228,7 @@ class _Run:
             **summarise(self._children),
         }
         text = json.dumps(summary, indent=2)
-        with contextlib.suppress(OSError):  # a disk that is full now does not make the run a failure
+        with contextlib.suppress(OSError):  # a full disk does not make the run a failure
             (self._directory / "summary.json").write_text(text + "\n")
         print(text if self._options.json else as_text(summary), flush=True)
         if self._supervisor.bad_settings:

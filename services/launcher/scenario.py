@@ -1,4 +1,4 @@
-"""Reads a scenario from TOML: which services run with which settings; checks all of it before anything starts."""
+"""Reads a scenario from TOML, the services and their settings, and checks it before any service starts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHIPPED = Path(__file__).parent / "scenarios"
 
 
 class _File(Struct, forbid_unknown_fields=True):
-    """What a scenario file may hold at its top."""
+    """The top level of a scenario file."""
 
     title: str = ""
     shared: dict[str, Any] = {}
@@ -39,7 +39,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What is to be launched; parts in the order of their start."""
+    """The services to launch, in the order of their start."""
 
     name: str
     title: str
@@ -53,7 +53,7 @@ class Scenario:
         return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
 
     def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
-        """The scenario as its file would give it, with every setting of every service."""
+        """The scenario as tables of a TOML file, with every setting of every service."""
         services = {}
         for part in self.parts:
             module = {} if part.entry == entry_of(part.who, None) else {"module": part.entry.module}
@@ -89,12 +89,12 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
         return f"{path}:{line}" if line else str(path)
 
     file = convert(data, _File, place)
-    where = _through_shared(file, place)
+    where = _where_or_shared(file, place)
     parts = [_part(who, table, file.shared, where) for who, table in file.services.items()]
     if not parts:
         raise ConfigError(f"{path}: no services: name at least one as [services.<name>]. Valid: {', '.join(NAMES)}.")
     _check_shared(file.shared, parts, where)
-    kept = _in_step([part for part in parts if part.who not in leave_out])
+    kept = _for_lockstep([part for part in parts if part.who not in leave_out])
     return Scenario(path.stem, file.title, file.shared, tuple(sorted(kept, key=lambda part: part.entry.stage)), where)
 
 
@@ -139,8 +139,8 @@ def _value(text: str) -> Any:
         return text.strip()
 
 
-def _through_shared(file: _File, where: Callable[[str], str]) -> Callable[[str], str]:
-    """`where`, but a service's field that is set for all of them is found there."""
+def _where_or_shared(file: _File, where: Callable[[str], str]) -> Callable[[str], str]:
+    """`where`, but for a service's field that is set in [shared] it gives that place."""
 
     def find(field: str) -> str:
         match field.split(".", 3):
@@ -154,33 +154,33 @@ def _through_shared(file: _File, where: Callable[[str], str]) -> Callable[[str],
 def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Callable[[str], str]) -> Part:
     place = f"services.{who}"
     if not re.fullmatch(r"[a-z0-9_]+", who) or who in ("launcher", "router"):
-        raise ConfigError(f"{where(place)}: {who!r} cannot name a service: use a-z, 0-9 and _, and neither launcher nor router")
+        raise ConfigError(f"{where(place)}: {who!r} is no valid name of a service: use a-z, 0-9 and _, but not launcher or router")
     own = {key: value for key, value in table.items() if key != "module"}
     entry = entry_of(who, table.get("module"))
     if entry is None:
         raise ConfigError(f"{where(place)}: unknown service {who!r}.{nearest(who, NAMES)} Another program needs `module = ...`.")
     cls = _config_class(entry, where(place))
     given = {key: value for key, value in [*shared.items(), *entry.given.items()] if key in cls.__struct_fields__} | own
-    return Part(who, entry, _in_its_world(convert(given, cls, where, f"{place}.")), frozenset(given))
+    return Part(who, entry, _with_world(convert(given, cls, where, f"{place}.")), frozenset(given))
 
 
-def _in_its_world(config: ServiceConfig) -> ServiceConfig:
-    """The settings with the world that will be loaded, so that the record of a run shows it also where the scenario names none."""
+def _with_world(config: ServiceConfig) -> ServiceConfig:
+    """The settings with the world that will be loaded, so that the record of a run shows it if the scenario names none."""
     if not isinstance(config, WorldConfig):
         return config
     return structs.replace(config, world=effective_world(config.world, config.robot))
 
 
-def _in_step(parts: list[Part]) -> list[Part]:
-    """In lockstep robot_sim waits for all who compute what the robot does, and nobody looks at it in his own time."""
+def _for_lockstep(parts: list[Part]) -> list[Part]:
+    """In lockstep: name robot_sim's participants, and leave out services whose results depend on real time."""
     if all(part.who != "robot_sim" or part.config.mode == "free" for part in parts):
         return parts
-    kept = [part for part in parts if not part.entry.looks]
-    return [_awaiting(part, kept) if part.who == "robot_sim" and "participants" not in part.given else part for part in kept]
+    kept = [part for part in parts if not part.entry.real_time]
+    return [_with_participants(part, kept) if part.who == "robot_sim" and "participants" not in part.given else part for part in kept]
 
 
-def _awaiting(sim: Part, parts: Sequence[Part]) -> Part:
-    who = tuple(part.who for part in parts if part.entry.steps and part.config.namespace == sim.config.namespace)
+def _with_participants(sim: Part, parts: Sequence[Part]) -> Part:
+    who = tuple(part.who for part in parts if part.entry.participates and part.config.namespace == sim.config.namespace)
     return replace(sim, config=structs.replace(sim.config, participants=who))
 
 
@@ -189,9 +189,9 @@ def _config_class(entry: Entry, where: str) -> type[ServiceConfig]:
     try:
         found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{where}: {module} does not offer {name} ({error})") from None
+        raise ConfigError(f"{where}: cannot import {name} from {module} ({error})") from None
     if not (isinstance(found, type) and issubclass(found, ServiceConfig)):
-        raise ConfigError(f"{where}: {entry.config} is no ServiceConfig")
+        raise ConfigError(f"{where}: {entry.config} is not a subclass of ServiceConfig")
     return found
 
 

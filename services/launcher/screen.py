@@ -12,39 +12,39 @@ from pathlib import Path
 
 from services.launcher.child import Child
 
-_NEWS = 5  # lines kept on the screen
+_LOG_LINES = 5  # newest lines on the screen
 _COLOURS = {"ready": "32", "fault": "1;31", "failed": "33", "starting": "36"}
 
 
 class Screen:
-    """Writes to standard error: standard output belongs to the summary."""
+    """Writes to standard error; standard output is for the summary."""
 
     def __init__(self, title: str) -> None:
         self._title, self._started, self._height = title, time.monotonic(), 0
-        self._news: list[str] = []
+        self._lines: list[str] = []
         self._terminal = sys.stderr.isatty()
 
-    def tell(self, text: str) -> None:
-        """One line of news."""
+    def add(self, text: str) -> None:
+        """Add a line; in a pipe, print it."""
         line = f"{time.strftime('%H:%M:%S')} {text}"
-        self._news = [*self._news, line][-_NEWS:]
+        self._lines = [*self._lines, line][-_LOG_LINES:]
         if not self._terminal:
             print(line, file=sys.stderr, flush=True)
 
     def draw(self, children: Collection[Child], directory: Path, *, last: bool = False) -> None:
-        """The whole screen again, over the one before; nothing in a pipe."""
+        """Draw the screen over the last one; in a pipe, nothing."""
         if not self._terminal:
             return
         columns, rows = shutil.get_terminal_size()
         lines = [f"mobee: {self._title}   up {_clock(time.monotonic() - self._started)}", f"run    {directory}"]
-        lines += [f"page   {page}" if len(page) + 7 < columns else page for page in _pages(children)]  # cut short it would lead nowhere
-        lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  says"]
+        lines += [f"page   {page}" if len(page) + 7 < columns else page for page in _pages(children)]  # an address must not be cut
+        lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  status"]
         lines += [_row(child) for child in children]
-        news = [line for text in self._news for line in textwrap.wrap(text, columns - 1, subsequent_indent=" " * 9)]
+        added = [line for text in self._lines for line in textwrap.wrap(text, columns - 1, subsequent_indent=" " * 9)]
         end = [] if last else ["Ctrl-C stops everything."]
-        lines = lines[: rows - 1 - len(end)]  # what scrolled away could not be drawn over
+        lines = lines[: rows - 1 - len(end)]  # lines that have scrolled away could not be overwritten
         room = rows - 2 - len(end) - len(lines)
-        lines += ["", *news[-room:], *end] if room > 0 else end
+        lines += ["", *added[-room:], *end] if room > 0 else end
         text = "".join(f"\x1b[2K{_paint(line[: columns - 1])}\n" for line in lines)
         up = f"\x1b[{self._height}A" if self._height else ""
         sys.stderr.write(f"{up}{text}\x1b[J")
@@ -53,17 +53,17 @@ class Screen:
 
 
 def _row(child: Child) -> str:
-    says = child.reason if child.phase in ("failed", "fault") else child.stat.text if child.stat else ""
-    return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {' '.join(says.split())}"
+    status = child.reason if child.phase in ("failed", "fault") else child.stat.text if child.stat else ""
+    return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {' '.join(status.split())}"
 
 
 def _pages(children: Collection[Child]) -> list[str]:
-    """Addresses that services serve, as they say themselves."""
+    """Addresses of pages in the status lines of services."""
     return [page for child in children if child.stat for page in re.findall(r"https?://\S+", child.stat.text)]
 
 
 def _paint(line: str) -> str:
-    """The state in its colour, after the line was cut to the width of the terminal."""
+    """Colour the state, after the line was cut to the width of the terminal."""
     state = line[16:26].strip()
     return f"{line[:16]}\x1b[{_COLOURS[state]}m{line[16:26]}\x1b[0m{line[26:]}" if state in _COLOURS else line
 

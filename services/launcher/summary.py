@@ -9,11 +9,11 @@ from bus_schema.rpc import Stat
 from services.launcher.catalogue import AGENT
 from services.launcher.child import Child
 
-_NOT_MEASURED = -1.0  # how a service says that a number does not exist
+_NOT_MEASURED = -1.0  # value of a number that a service did not measure
 
 
 def summarise(children: Iterable[Child]) -> dict[str, Any]:
-    """The figures of a run; None where nobody measured.
+    """The numbers of a run; None where nothing was measured.
 
     Lengths in m, times in s; ages in ticks; counters since every service was ready, or since the service's last restart.
     """
@@ -39,7 +39,7 @@ def summarise(children: Iterable[Child]) -> dict[str, Any]:
 
 
 class _Numbers:
-    """A service's numbers, of which any may be missing."""
+    """A service's numbers, some of which may be missing."""
 
     def __init__(self, stat: Stat | None) -> None:
         self._numbers = {} if stat is None else stat.numbers
@@ -81,8 +81,8 @@ def as_text(summary: dict[str, Any]) -> str:
     ]
     for name, agent in summary["agents"].items():
         lines.append(
-            f"  {name:<15} {_say(agent['transitions'])} transitions, {_say(agent['timeouts'])} timeouts, "
-            f"mean action {_say(agent['mean_action_time_s'], 's', 2)}"
+            f"  {name:<15} {_text(agent['transitions'])} transitions, {_text(agent['timeouts'])} timeouts, "
+            f"mean action {_text(agent['mean_action_time_s'], 's', 2)}"
         )
     if summary["ticks"] is not None:
         lines += _robot_lines(summary)
@@ -97,25 +97,25 @@ def as_text(summary: dict[str, Any]) -> str:
 def _robot_lines(summary: dict[str, Any]) -> list[str]:
     age = summary["command_age_ticks"]
     return [
-        f"  table           {_say(summary['table_contact_ticks'])} ticks of field contact, closest gap {_mm(summary['closest_gap_m'])}",
-        f"  solid contact   deepest {_mm(summary['deepest_solid_contact_m'])} of {_say(summary['pairs_watched'])} watched pairs",
-        f"  command age     p50 {_say(age['p50'], '', 0)}, p99 {_say(age['p99'], '', 0)}, worst {_say(age['max'], '', 0)} ticks",
-        f"  ticks           {summary['ticks']}, {_say(summary['hold_ticks'])} in hold, {_say(summary['missed_ticks'])} missed",
+        f"  table           {_text(summary['table_contact_ticks'])} ticks of field contact, closest gap {_mm(summary['closest_gap_m'])}",
+        f"  solid contact   deepest {_mm(summary['deepest_solid_contact_m'])} of {_text(summary['pairs_watched'])} watched pairs",
+        f"  command age     p50 {_text(age['p50'], '', 0)}, p99 {_text(age['p99'], '', 0)}, worst {_text(age['max'], '', 0)} ticks",
+        f"  ticks           {summary['ticks']}, {_text(summary['hold_ticks'])} in hold, {_text(summary['missed_ticks'])} missed",
         f"  rejected        {_counts(summary['rejected_commands'])}",
     ]
 
 
 def _lockstep_lines(lockstep: dict[str, Any]) -> list[str]:
-    verdict = "can be repeated" if lockstep["repeatable"] else "cannot be repeated, see the events"
+    verdict = "repeatable" if lockstep["repeatable"] else "not repeatable, see the events in the logs"
     if not lockstep["ticks"]:
-        verdict = "never begun: somebody did not answer tick 0"
+        verdict = "not started: a participant did not answer tick 0"
     return [
-        f"  lockstep        {lockstep['ticks']} ticks at {_say(lockstep['speed'], '', 1)} x real time; {verdict}",
+        f"  lockstep        {lockstep['ticks']} ticks at {_text(lockstep['speed'], '', 1)} x real time; {verdict}",
         f"  states          sha256 {lockstep['states_sha256']}",
     ]
 
 
-def _say(value: float | None, unit: str = "", digits: int = 0) -> str:
+def _text(value: float | None, unit: str = "", digits: int = 0) -> str:
     return "-" if value is None else f"{value:.{digits}f}{unit and ' ' + unit}"
 
 

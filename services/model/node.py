@@ -107,7 +107,7 @@ class ModelNode:
             contacts=[_item(contact) for contact in pose.contacts] if self._tells_contacts else None,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
-        self._participant.done(tick.k, told=tick.k > 0 and bool(self._service.alive.get("controller")))
+        self._participant.done(tick.k, implied=tick.k > 0 and bool(self._service.alive.get("controller")))
         self._tell_viewers(tick.k, pose)
         self._count(tick.k)
 

@@ -15,8 +15,8 @@ from services.robot_sim.bullet_scene import BulletScene, load_solid_pairs
 from services.robot_sim.bullet_torque import Gears, Mask, Share
 from services.robot_sim.kinematic import SolidContact
 
-TOUCHING = ("forearm", "hand")  # links whose distance from the table is measured
-FAR = 2.0  # m, beyond it a gap is not searched
+GAP_LINKS = ("forearm", "hand")  # links whose distance from the table is measured
+MAX_GAP = 2.0  # m; larger distances are not searched for
 NO_CONTACT = SolidContact()
 
 
@@ -24,7 +24,7 @@ class BulletBackend:
     """The upper body of iCub v2.5 with gravity; fingers and eyes are the motor model alone.
 
     A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight, as it does on the robot. In
-    torque mode it gets the torque itself, through a gear (bullet_torque.py): nobody carries the weight who does not compensate it.
+    torque mode it gets the torque itself, through a gear (bullet_torque.py), and must include the torque that carries the weight.
     """
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
@@ -45,7 +45,7 @@ class BulletBackend:
         self._deepest.clear()
         for _ in range(self._substeps):
             self._advance(self._substep)
-            self._look_for_contacts()
+            self._find_contacts()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
         """Put a world object somewhere, m; raises MobeeError."""
@@ -65,8 +65,8 @@ class BulletBackend:
 
     def gap(self) -> float:
         """Closest distance of hands and forearms to the obstacles, m; -1 when there is none."""
-        links = [link for link in self._scene.links if link.endswith(TOUCHING)]
-        gaps = [self._scene.distance(link, obstacle, FAR) for link in links for obstacle in self._obstacles]
+        links = [link for link in self._scene.links if link.endswith(GAP_LINKS)]
+        gaps = [self._scene.distance(link, obstacle, MAX_GAP) for link in links for obstacle in self._obstacles]
         return max(min(gaps), 0.0) if gaps else -1.0
 
     def _build(self, seed: int) -> None:
@@ -98,11 +98,11 @@ class BulletBackend:
         target = np.clip(velocity[scene.motors], slowest, fastest)
         in_torque = motors.in_torque[scene.motors]
         if in_torque.any():
-            share = self._push(in_torque, target, (np.maximum(slowest, -self._fastest), np.minimum(fastest, self._fastest)), h)
+            share = self._apply_torques(in_torque, target, (np.maximum(slowest, -self._fastest), np.minimum(fastest, self._fastest)), h)
         else:
             share = None
             self._gears.forget()
-            self._pull(target, self._forces)
+            self._apply_velocities(target, self._forces)
         scene.client.stepSimulation()
         joints = scene.client.getJointStates(scene.body, scene.joints)
         q = np.clip(q, self._robot.limits[:, 0], self._robot.limits[:, 1])  # of the motors that the URDF lacks
@@ -113,25 +113,25 @@ class BulletBackend:
         efforts[scene.motors] = exerted if share is None else np.where(share.free, share.torque, exerted)
         motors.efforts = efforts
 
-    def _push(self, in_torque: Mask, target: Array, fastest: tuple[Array, Array], h: float) -> Share:
-        """Give joints in torque mode their torques, the others their velocities."""
+    def _apply_torques(self, in_torque: Mask, target: Array, fastest: tuple[Array, Array], h: float) -> Share:
+        """Set the torques of joints in torque mode, and the velocities of the others."""
         scene = self._scene
         torque = self.motors.torques[scene.motors]
         share = self._gears.transmit(scene.motion(self.motors.q), torque, in_torque, target, fastest, self._touched, h)
-        self._pull(share.velocity, np.where(share.free, 0.0, self._forces))
+        self._apply_velocities(share.velocity, np.where(share.free, 0.0, self._forces))
         free = np.flatnonzero(share.free)
         joints = [scene.joints[index] for index in free]
         scene.client.setJointMotorControlArray(scene.body, joints, pybullet.TORQUE_CONTROL, forces=share.torque[free].tolist())
         return share
 
-    def _pull(self, velocity: Array, force: Array) -> None:
-        """Have the joints go at a velocity, rad/s, with no more than a force, N m."""
+    def _apply_velocities(self, velocity: Array, force: Array) -> None:
+        """Set the velocities of the joints, rad/s, and their largest torques, N m."""
         scene = self._scene
         scene.client.setJointMotorControlArray(
             scene.body, scene.joints, pybullet.VELOCITY_CONTROL, targetVelocities=velocity.tolist(), forces=force.tolist()
         )
 
-    def _look_for_contacts(self) -> None:
+    def _find_contacts(self) -> None:
         scene = self._scene
         points = scene.client.getContactPoints(scene.body)
         self._touched = bool(points)

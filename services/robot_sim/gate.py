@@ -36,7 +36,7 @@ class Limits:
 
     @classmethod
     def of(cls, robot: Robot, part: str) -> Limits:
-        """As the robot file says."""
+        """The limits in the robot file."""
         motors = robot.motor_table[robot.part(part).slice]
         return cls(
             lower=np.array([m.limits[0] for m in motors]),
@@ -49,7 +49,7 @@ class Limits:
 
 
 class Order(Struct, frozen=True, eq=False):
-    """See `Command`; `reference` (n,) rad, rad/s or N m by mode."""
+    """A command to one part, see `Command`; `reference` (n,) rad, rad/s or N m by mode."""
 
     src: str
     epoch: int
@@ -61,12 +61,12 @@ class Order(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, command: Command) -> Order:
-        """That of a command to one part."""
+        """The order in a command to one part."""
         return cls(command.src, command.epoch, command.seq, command.re_k, command.mode, np.array(command.ref), command.ttl)
 
 
 def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
-    """Those of a message to several parts, by part; raises KeyError for one that the robot does not have."""
+    """The orders in a message to several parts, by part; raises KeyError for a part that the robot does not have."""
     reference = np.array(commands.ref)
     src, seq, re_k, ttl = commands.src, commands.seq, commands.re_k, commands.ttl
     return {
@@ -77,7 +77,7 @@ def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
 
 @contextmanager
 def refused_as_call() -> Iterator[None]:
-    """Let the caller know."""
+    """Turn a refusal of the gate into the answer of a call."""
     try:
         yield
     except Refused as refused:
@@ -86,11 +86,11 @@ def refused_as_call() -> Iterator[None]:
 
 MAX_AGE = 0.1  # s between the tick an order answers and the tick it arrives in, in free mode
 MAX_TTL = 1000  # ms
-MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
-START = math.radians(2.0)  # rad between the measured position and the first position ordered
-STEP = 2.0  # times the distance that full speed covers, by which a position reference may move
+POSITION_MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
+MAX_START = math.radians(2.0)  # rad between the measured position and the first commanded one
+MAX_STEP = 2.0  # largest move of a position reference, in distances covered at full speed
 
-_EXACT = 1.0 + 1e-9  # a limit that went through the wire is still the limit
+_EXACT = 1.0 + 1e-9  # factor for rounding: a reference at the limit is within the limit
 
 
 class Admission:
@@ -100,26 +100,26 @@ class Admission:
         """`max_ticks`: how many ticks ago the one may be that an order answers; None: as many as begin in MAX_AGE."""
         self._part, self._dt, self._max_ticks = part, dt, max_ticks
         self._velocity, self._torque = limits.velocity * _EXACT, limits.torque * _EXACT
-        self._margin, self._start = MARGIN * limits.fine, START * limits.fine
+        self._margin, self._start = POSITION_MARGIN * limits.fine, MAX_START * limits.fine
         self._lower, self._upper = limits.lower - self._margin, limits.upper + self._margin
-        self._stride = STEP * limits.velocity * dt  # rad a tick
+        self._stride = MAX_STEP * limits.velocity * dt  # rad a tick
         self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
 
     def check(self, order: Order, k: int) -> None:
-        """Numbers and time of an order that arrives in tick k."""
+        """Check numbers and age of an order that arrives in tick k."""
         reference = order.reference
         if reference.shape != self._lower.shape:
             raise Refused("length", f"{self._part}: {reference.size} numbers for {self._lower.size} motors")
-        if not self._is_within(order.mode, reference):  # so it is with NaN too
+        if not self._is_within(order.mode, reference):  # false for NaN too
             self._refuse(order.mode, reference)
         if order.re_k > k:
-            raise Refused("future", f"{self._part}: answers tick {order.re_k}, it is {k}")
+            raise Refused("future", f"{self._part}: the command answers tick {order.re_k}, the present tick is {k}")
         self._check_age(k - order.re_k)
         if not 0 < order.ttl <= MAX_TTL:  # 0 must not mean "indefinitely"
             raise Refused("ttl", f"{self._part}: ttl {order.ttl} ms, valid: 1 to {MAX_TTL}")
 
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
-        """The way from the position ordered `ticks` ago; None: from the measured q.  All (n,) rad."""
+        """Check the distance from the position commanded `ticks` ago (`before`), or from the measured q if there is none; all (n,) rad."""
         if before is None:
             before, allowed = q, self._start
         else:
@@ -145,7 +145,7 @@ class Admission:
         return _all(np.isfinite(reference))
 
     def _refuse(self, mode: str, reference: Array) -> None:
-        """Say what is wrong."""
+        """Raise Refused with what is wrong."""
         if not np.isfinite(reference).all():
             raise Refused("value", f"{self._part}: NaN or infinity")
         if mode == "position":
@@ -158,29 +158,29 @@ class Admission:
 
 
 def _all(found: NDArray[np.bool_]) -> bool:
-    """Whether each is true; of so few numbers that is three times as quick as their `all`."""
+    """Whether all are true; for few numbers three times as fast as `numpy.all`."""
     return bool(np.count_nonzero(found) == found.size)
 
 
 class Shaper:
-    """Turns commanded references into allowed ones, tick by tick; arrays (n,)."""
+    """Limits references to what the motors may do, tick by tick; arrays (n,)."""
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits = limits
         self._asked = Braking(limits.lower, limits.upper, limits.velocity, limits.acceleration * dt, dt)
 
     def start(self, q: Array, velocity: Array) -> None:
-        """Begin where the motors are, rad, as fast as they are, rad/s."""
+        """Begin at the motors' positions [rad] and velocities [rad/s]."""
         self._asked.velocity[:] = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
-        self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # so far is the reference ahead of a servo at that speed
+        self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # by which the reference leads a servo at that speed
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
-        """The velocity to ask for now; before a position limit no more than can still be braked."""
+        """The velocity for this tick; before a position limit at most what can still be braked."""
         self._asked.to_velocity(wanted, q)
         return self._asked.velocity.copy()
 
     def to_position(self, wanted: Array) -> Array:
-        """The position to ask for now, on the way to `wanted` and arriving there at rest."""
+        """The position for this tick, on a motion that comes to rest at `wanted`."""
         self._asked.to_position(wanted)
         return self._asked.position.copy()
 
@@ -189,13 +189,13 @@ class Shaper:
         return self._asked.runs_out(q, velocity)
 
 
-LOCKED_TTL = 3  # ticks after which a part holds in lockstep, where the clock on the wall means nothing
+LOCKED_TTL = 3  # ticks without a new command after which a part holds in lockstep
 
-Tell = Callable[[str, str, dict[str, float]], None]  # code, text, values
+Report = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
 
 class Drive(Struct, frozen=True, eq=False):
-    """What the motors shall do in this tick; `reference` (n,) rad, rad/s or N m by mode, None on hold."""
+    """Mode and reference of the motors in this tick; `reference` (n,) rad, rad/s or N m by mode, None on hold."""
 
     mode: Mode
     reference: Array | None = None
@@ -212,28 +212,34 @@ class InForce(Struct, frozen=True):
 
 
 class Gate:
-    """States: idle (nobody owns the part), hold, armed, fault, estop.  Only `armed` moves.
+    """The safety gate of one part.
 
-    Commands are admitted between ticks; `tick` says what the motors shall do.  A command stays in force until the
-    next one, or until its ttl; then the part brakes at full deceleration, holds where it came to rest, and must be
-    armed again: nothing is ever replayed.
+    States: idle (no owner), hold, armed, fault, estop; the part moves in `armed` only.  Commands are admitted between ticks; `tick` returns
+    what the motors do.  A command is in force until the next one, or until its ttl; then the part brakes at full deceleration, holds where
+    it came to rest, and must be armed again.
     """
 
     def __init__(
-        self, part: str, limits: Limits, dt: float, epoch: int = 0, tell: Tell | None = None, ttl_ticks: int | None = None
+        self, part: str, limits: Limits, dt: float, epoch: int = 0, report: Report | None = None, ttl_ticks: int | None = None
     ) -> None:
-        """Idle; `epoch`: every later one is larger.  `tell` hears why a part holds.
+        """Begin in state idle.
 
-        `ttl_ticks`: age [ticks] beyond which no command is in force; None: a command's own ttl, on the clock on the wall.
+        Args:
+            part: its name, for messages.
+            limits: of its motors.
+            dt: the tick, s.
+            epoch: every later epoch is larger.
+            report: called with code, text and numbers when the part holds.
+            ttl_ticks: age [ticks] after which a command is not in force any more; None: the command's own ttl, in real time.
         """
         self.part, self.epoch, self._ttl_ticks = part, epoch, ttl_ticks
         self.state: GateState = "idle"
         self.owner: tuple[str, str] | None = None  # service, instance of its token
         self.faults = 0
-        self.mode: Mode = "hold"  # these three: as applied in the tick that runs
+        self.mode: Mode = "hold"  # these three: of the command applied in the present tick
         self.seq = -1
         self.age = -1  # ticks
-        self._tell = tell or (lambda code, text, values: None)
+        self._report = report or (lambda code, text, values: None)
         self._admission = Admission(part, limits, dt, ttl_ticks)
         self._shaper = Shaper(limits, dt)
         self._in_force: InForce | None = None
@@ -241,7 +247,7 @@ class Gate:
         self._last_position: tuple[Array, int] | None = None  # newest accepted position reference and its tick
 
     def take(self, who: str, instance: str) -> int:
-        """A new owner, a new epoch: whatever the old one still sends is refused."""
+        """Set a new owner and epoch; later commands of the old owner are refused."""
         self.epoch += 1
         self.owner = (who, instance)
         self._newest_seq = -1
@@ -250,7 +256,7 @@ class Gate:
         return self.epoch
 
     def arm(self, epoch: int) -> None:
-        """Obey commands from now on; raises Refused (epoch, estop, fault)."""
+        """Follow commands from now on; raises Refused (epoch, estop, fault)."""
         self._check_epoch(epoch)
         if self.state in ("estop", "fault"):
             raise Refused(self.state, f"{self.part} is in {self.state}: {_REMEDY[self.state]}")
@@ -259,16 +265,16 @@ class Gate:
             self.state = "armed"
 
     def release(self, epoch: int) -> None:
-        """Give the part up; raises Refused (epoch)."""
+        """End the ownership; raises Refused (epoch)."""
         self._check_epoch(epoch)
         self.owner = None
         if self.state in ("hold", "armed"):
             self._enter("idle", "released")
 
     def hold(self, epoch: int) -> None:
-        """The owner's own wish to hold; raises Refused (epoch)."""
+        """Hold at the request of the owner; raises Refused (epoch)."""
         self._check_epoch(epoch)
-        self.force_hold("asked by its owner")
+        self.force_hold("requested by its owner")
 
     def force_hold(self, why: str) -> None:
         """Hold at once, whoever owns the part."""
@@ -276,7 +282,7 @@ class Gate:
             self._enter("hold", why)
 
     def lose_owner(self) -> None:
-        """The owner's token is gone."""
+        """Hold, because the owner's liveliness token is gone."""
         who = self.owner[0] if self.owner else "nobody"
         self.owner = None
         self.force_hold(f"its owner {who} is gone")
@@ -287,7 +293,7 @@ class Gate:
             self._enter("estop", why)
 
     def reset_stop(self) -> None:
-        """Unlatch; moving again needs `arm`."""
+        """End the emergency stop; to move again the part must be armed."""
         if self.state == "estop":
             self._enter("fault" if self.faults else "hold", "emergency stop reset")
 
@@ -300,7 +306,7 @@ class Gate:
     def admit(self, order: Order, k: int, now: int, q: Array) -> None:
         """Put an order in force from the next tick on, or raise Refused with the reason.
 
-        `k`: the tick that runs; `now`: ns, monotonic clock; `q`: (n,) rad measured.
+        `k`: the present tick; `now`: ns, monotonic clock; `q`: (n,) rad measured.
         """
         if self.state != "armed":
             raise Refused("not_armed", f"{self.part} is in {self.state}")
@@ -319,7 +325,7 @@ class Gate:
         self._in_force = InForce(order, now + order.ttl * 1_000_000)
 
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
-        """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): where they are."""
+        """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): measured."""
         current = self._in_force
         if current is not None and self._has_expired(current, k, now):
             current = None
@@ -333,7 +339,7 @@ class Gate:
         return self._shaped(order.mode, order.reference, q, velocity)
 
     def _has_expired(self, current: InForce, k: int, now: int) -> bool:
-        """Whether it is too old; then the part holds."""
+        """Whether the command is too old; then the part holds."""
         age, ttl, late = k - current.order.re_k, float(current.order.ttl), (now - current.expires) / 1e6
         if self._ttl_ticks is not None:
             if age > self._ttl_ticks:
@@ -357,7 +363,7 @@ class Gate:
         moved, self.state = self.state == "armed", state
         self._forget()
         if moved or state in ("estop", "fault"):
-            self._tell(state, f"{self.part}: {why}", values)
+            self._report(state, f"{self.part}: {why}", values)
 
     def _forget(self) -> None:
         self._in_force = None

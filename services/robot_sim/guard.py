@@ -16,7 +16,7 @@ from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, 
 from services.robot_sim.kinematic import Backend
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
-ESTOP_PERIOD = 0.1  # s
+ESTOP_PERIOD = 0.1  # s between two repetitions of an emergency stop
 
 
 class Guard:
@@ -27,7 +27,7 @@ class Guard:
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._estop_reason = ""
         self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
-        self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
+        self._on_answer: Callable[[str, int, Answer], None] = lambda who, re_k, answer: None
         if not service.locked:
             self._newest = service.bus.latest(Commands)
         self._estop = service.bus.publisher(EStop, delivery="LATEST")
@@ -35,15 +35,19 @@ class Guard:
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
         self._declare()
 
-    def renew(self) -> None:
-        """A new run: idle, nobody owns anything; a latched emergency stop stays."""
+    def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
+        """Lockstep: call handler(service, tick, answer) for the answer in a message of commands."""
+        self._on_answer = handler
+
+    def reset(self) -> None:
+        """A new run: all gates are idle and without owner; a latched emergency stop stays."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
         if self._estop_reason:
             self._stop_all()
 
     def tick(self, k: int) -> None:
-        """Hand to the motors what is in force in tick k."""
+        """Give the commands that are in force in tick k to the motors."""
         now = time.monotonic_ns()
         motors = self._backend.motors
         q, velocities = motors.q, motors.motor_velocities
@@ -55,15 +59,15 @@ class Guard:
             drive = gate.tick(k, now, q[where], velocities[where])
             motors.command(where, drive.mode, drive.reference)
 
-    def obey(self) -> None:
-        """Lockstep: admit what came in answer to this tick, in the order of the names, whichever came first."""
+    def admit_waiting(self) -> None:
+        """Lockstep: admit the commands that answer this tick, in the order of names, whichever came first."""
         q = self._backend.motors.q
         for part, order in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
             self._admit(part, order, q, self._service.bus.k)
         self._waiting.clear()
 
-    def do_without(self, who: str) -> None:
-        """It is late: what depends on it holds."""
+    def hold_dependents(self, who: str) -> None:
+        """Let the parts hold that depend on a late service."""
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is late")
         for gate in self.gates.values():
@@ -71,16 +75,16 @@ class Guard:
                 gate.force_hold(f"its owner {who} is late")
 
     def hold_all(self, why: str) -> None:
-        """Every part holds at once."""
+        """Let every part hold at once."""
         for gate in self.gates.values():
             gate.force_hold(why)
 
     def _gate(self, part: str, epoch: int) -> Gate:
-        def tell(code: str, text: str, values: dict[str, float]) -> None:
+        def report(code: str, text: str, values: dict[str, float]) -> None:
             self._service.bus.event("warning", code, text, **values)
 
         ttl_ticks = LOCKED_TTL if self._service.locked else None
-        return Gate(part, Limits.of(self._robot, part), self._dt, epoch, tell, ttl_ticks)
+        return Gate(part, Limits.of(self._robot, part), self._dt, epoch, report, ttl_ticks)
 
     def _declare(self) -> None:
         service = self._service
@@ -96,7 +100,7 @@ class Guard:
         service.on_alive(self._on_alive)
 
     def _listen(self, part: str) -> None:
-        """Who drives a single part has a stream of its own."""
+        """Subscribe to the stream of clients that drive a single part."""
         service = self._service
         if service.locked:
             service.on_each(Command, lambda command: self._wait(part, Order.of(command)), part, later=True)
@@ -107,13 +111,13 @@ class Guard:
         for part, order in self._orders(commands):
             self._wait(part, order)
         if commands.answer is not None:
-            self.answered(commands, commands.answer)
+            self._on_answer(commands.src, commands.re_k, commands.answer)
 
     def _orders(self, commands: Commands) -> Iterable[tuple[str, Order]]:
         try:
             return orders_of(commands, self._robot).items()
         except KeyError as unknown:
-            self._service.bus.reject("part", f"Commands to {unknown}: this robot has {', '.join(self._robot.parts)}")
+            self._service.bus.reject("part", f"Commands to the part {unknown}; this robot has {', '.join(self._robot.parts)}")
             return ()
 
     def _wait(self, part: str, order: Order) -> None:
@@ -123,16 +127,16 @@ class Guard:
         self._admit(part, order, self._backend.motors.q, self._service.bus.k)
 
     def _admit(self, part: str, order: Order, q: Array, k: int) -> None:
-        """`q` (n,) rad: where all motors are; `k`: the tick that runs."""
+        """`q`: (n,) rad, measured positions of all motors; `k`: the present tick."""
         try:
             self.gates[part].admit(order, k, time.monotonic_ns(), q[self._where[part]])
-        except Refused as refused:  # told and counted; robot_sim goes on
+        except Refused as refused:  # reported and counted
             self._service.bus.reject(refused.reason, str(refused))
 
     def _take(self, request: Take, key: str) -> Taken:
         gate = self.gates[key.split("/")[0]]
         if gate.owner is not None and gate.owner[1] != request.instance and gate.owner[1] in self._service.alive.get(gate.owner[0], ()):
-            raise CallRefused("owned", f"{gate.part} belongs to {gate.owner[0]}, which lives; it must release the part first")
+            raise CallRefused("owned", f"{gate.part} belongs to {gate.owner[0]}, which is running and must release it first")
         return Taken(v=VERSION, epoch=gate.take(request.who, request.instance))
 
     def _drive(self, request: WithEpoch, key: str) -> Driven:
@@ -149,9 +153,9 @@ class Guard:
         return Driven(v=VERSION, gate=gate.state)
 
     def _check_alive(self, gate: Gate) -> None:
-        """A part whose owner cannot be seen to die must not move."""
+        """Refuse to arm a part whose owner has no liveliness token, without which its end would not be noticed."""
         if gate.owner is not None and gate.owner[1] not in self._service.alive.get(gate.owner[0], ()):
-            raise CallRefused("no_token", f"{gate.part}: alive/{gate.owner[0]}/{gate.owner[1]} is not there; declare it, then arm")
+            raise CallRefused("no_token", f"{gate.part}: no liveliness token alive/{gate.owner[0]}/{gate.owner[1]}: declare it, then arm")
 
     def _on_alive(self, who: str, instance: str, up: bool) -> None:
         if up:
@@ -174,7 +178,7 @@ class Guard:
             gate.stop(self._estop_reason)
 
     def _repeat_estop(self) -> None:
-        """Tell whoever comes late, until it is reset."""
+        """Publish the stop again and again until it is reset, for services that join late."""
         if self._estop_reason:
             self._estop.put(set=True, source=self._service.who, reason=self._estop_reason[:2000])
             self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_estop)
@@ -185,6 +189,6 @@ class Guard:
             for gate in self.gates.values():
                 gate.reset_stop()
             self._service.bus.event("warning", "estop_reset", f"emergency stop reset by {request.who}")
-        # Told in any case: those who remember a stop of the run before must hear it.
+        # Published in any case: services may remember a stop of an earlier run.
         self._estop.put(set=False, source=request.who, reason="reset")
         return Done(v=VERSION)

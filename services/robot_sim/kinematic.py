@@ -16,7 +16,7 @@ SIMULATED = "icub"  # the robot that PyBullet's URDF describes
 
 
 class BackendUnavailable(InvalidValue):
-    """A back-end that cannot run here, and what to do instead."""
+    """A back-end that cannot be used; the message says what to do instead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,12 @@ class Backend(Protocol):
 
     @property
     def motors(self) -> Motors:
-        """Where they are now, and how fast."""
+        """Positions and velocities of the motors."""
         ...
 
     @property
     def world(self) -> World:
-        """What is around the robot now."""
+        """The objects around the robot."""
         ...
 
     def step(self, dt: float) -> None:
@@ -56,11 +56,11 @@ class Backend(Protocol):
         ...
 
     def reset(self, seed: int) -> None:
-        """Back home, at rest, in hold, the world as it was."""
+        """Home posture, at rest, in hold; the world in its initial state."""
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object somewhere, m; raises MobeeError."""
+        """Set the position of a world object, m; raises MobeeError."""
         ...
 
     def contact(self) -> SolidContact:
@@ -77,7 +77,7 @@ class Backend(Protocol):
 
 
 class KinematicBackend:
-    """Joints are where the motors take them."""
+    """The motor model alone: joints follow their motors exactly."""
 
     pairs_watched = 0
 
@@ -86,7 +86,7 @@ class KinematicBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Back home, at rest, in hold, the world as it was."""
+        """Home posture, at rest, in hold; the world in its initial state."""
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
 
@@ -101,15 +101,15 @@ class KinematicBackend:
             motors.move(1, dt / substeps)
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object somewhere, m; raises MobeeError."""
+        """Set the position of a world object, m; raises MobeeError."""
         self.world.move(name, position=position)
 
     def contact(self) -> SolidContact:
-        """Nothing here is solid."""
+        """There are no solids."""
         return SolidContact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Nothing here is solid."""
+        """There are no solids."""
         return {}
 
     def gap(self) -> float:

@@ -1,4 +1,4 @@
-"""Lockstep in robot_sim: owns the ticks, collects participants, waits for them, records whether the run is reproducible."""
+"""Lockstep in robot_sim: waits for the participants, and records whether the run is repeatable."""
 
 from __future__ import annotations
 
@@ -9,66 +9,66 @@ from services.common.lockstep import Barrier
 from services.common.service import Service
 from services.robot_sim.guard import Guard
 
-TELLS = 1.0  # s between two events about flaws
-GATHERING = 0.05  # s between two calls to come
+EVENT_PERIOD = 1.0  # s between two events about flaws
+START_PERIOD = 0.05  # s between two repetitions of tick 0
 
 
 class Lockstep:
-    """The barrier of a run, and what was wrong with it."""
+    """The barrier of a run, and the count of what made the run unrepeatable."""
 
     def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
-        """`last_tick`: where the run ends, 0: nowhere."""
+        """`last_tick`: tick at which the run ends; 0: it does not end."""
         self._service, self._guard = service, guard
         self._barrier = Barrier(service, participants, self._note, patience=service.config.patience)
-        guard.answered = lambda commands, answer: self._barrier.note(commands.src, commands.re_k, answer)
+        guard.on_answer(self._barrier.note)
         self._last_tick = last_tick
         self.flaws = 0
-        self._told = -TELLS  # monotonic clock
+        self._reported = -EVENT_PERIOD  # monotonic clock
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
         """A new run."""
         self._barrier.begin()
-        self.flaws, self._told = 0, -TELLS
+        self.flaws, self._reported = 0, -EVENT_PERIOD
 
     def is_complete(self) -> bool:
-        """Whether everybody has answered tick 0; until then it is repeated."""
+        """Whether all participants have answered tick 0; until then it is repeated."""
         self._began = time.monotonic()
         return not self._barrier.absent()
 
     def startup_status(self) -> str:
-        """What tick 0 waits for, in words."""
+        """Which participants tick 0 waits for, for the status."""
         absent = self._barrier.absent()
-        return f"waits for {', '.join(absent)}" if absent else "about to begin"
+        return f"waits for {', '.join(absent)}" if absent else "all participants are ready"
 
     def wait(self, k: int) -> None:
-        """Until tick k is answered; then its commands are admitted, whatever the order in which they came.
+        """Wait until tick k is answered, then admit its commands, in an order that does not depend on their arrival.
 
-        What depends on somebody who is late holds, and while anybody is away the ticks keep to the clock on the wall.
+        Parts that depend on a late participant hold; while a participant is absent, ticks run in real time.
         """
         for who in self._barrier.wait(k):
-            self._guard.do_without(who)
-        self._guard.obey()
+            self._guard.hold_dependents(who)
+        self._guard.admit_waiting()
         self._answered = time.monotonic()
 
     def is_over(self) -> bool:
-        """Whether the run has made its ticks."""
+        """Whether the run has reached its last tick."""
         return self._service.bus.k == self._last_tick > 0
 
     def is_degraded(self) -> bool:
-        """Whether it goes on without somebody who should be there."""
+        """Whether an expected participant is absent."""
         return bool(self._barrier.absent())
 
-    def spoil(self, why: str) -> None:
-        """Something happened that will not happen again at the same tick: counted, and told at most once a second."""
+    def note_flaw(self, why: str) -> None:
+        """Count an event that makes the run unrepeatable, and report it at most once a second."""
         self.flaws += 1
         now = time.monotonic()
-        if now - self._told >= TELLS:
-            self._told = now
-            self._service.bus.event("warning", "not_repeatable", f"this run cannot be repeated: {why}", k=float(self._service.bus.k))
+        if now - self._reported >= EVENT_PERIOD:
+            self._reported = now
+            self._service.bus.event("warning", "not_repeatable", f"this run is not repeatable: {why}", k=float(self._service.bus.k))
 
     def speed(self, dt: float) -> float:
-        """Simulated seconds a second since tick 1."""
+        """Simulated seconds per second of real time since tick 1."""
         return self._service.bus.k * dt / max(self._answered - self._began, 1e-9)
 
     def numbers(self) -> Mapping[str, float]:
@@ -76,5 +76,5 @@ class Lockstep:
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
 
     def _note(self, who: str, why: str) -> None:
-        if self._service.bus.k > 0 and not self.is_over():  # before tick 1 it will be waited for
-            self.spoil(f"{who} {why}")
+        if self._service.bus.k > 0 and not self.is_over():  # tick 0 is repeated until all are present
+            self.note_flaw(f"{who} {why}")

@@ -1,4 +1,4 @@
-"""Runs robot_sim: gate, clock, physics, then each part's state at its own time; in lockstep states first, answers last."""
+"""Runs robot_sim: in every tick gate, clock, physics, then each part's state at its own time; in lockstep the states come first."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from services.common.service import CallRefused, Service
 from services.robot_sim.config import Config
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend
-from services.robot_sim.lockstep import GATHERING, Lockstep
+from services.robot_sim.lockstep import START_PERIOD, Lockstep
 from services.robot_sim.sensors import Phases, Sensors, part_meta
 from services.robot_sim.watch import Watch
 
-SPREAD = 0.0025  # s, a tick shorter than this has its parts read one after the other without waiting between them
-CLOCK_RATE = 100.0  # messages a second of real time on `clock` at most, in free mode: who needs every tick has `tick`
-IDLE = 1.0  # s, lockstep: between looks when there is nothing to do
+MIN_SPREAD_PERIOD = 0.0025  # s; in shorter ticks all parts are read at once, without waiting for their sampling times
+MAX_CLOCK_RATE = 100.0  # messages per second of real time on `clock` in free mode; `tick` has every tick
+IDLE_PERIOD = 1.0  # s between two checks of a run that is paused or over, in lockstep
 
 
 class Node:
@@ -41,7 +41,7 @@ class Node:
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
         self._clock = self._bus.publisher(Clock)
-        self._clock_period = max(1, round(1.0 / (CLOCK_RATE * self._period)))  # ticks
+        self._clock_period = max(1, round(1.0 / (MAX_CLOCK_RATE * self._period)))  # ticks
         self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))
         self._rate = Rate(self._period)
         self._lockstep = Lockstep(service, config.participants, self._guard, config.ticks) if service.locked else None
@@ -54,7 +54,7 @@ class Node:
             service.on_request(keys.meta(part), Empty, self._meta)
 
     def run(self) -> None:
-        """Tick until the process is told to end."""
+        """Run ticks until the process is asked to end."""
         if self._lockstep is not None:
             self._run_locked(self._lockstep)
         self._rate = Rate(self._period)
@@ -78,9 +78,9 @@ class Node:
                 router_check = now + 1.0
             if self._bus.k == 0 and not lockstep.is_complete():
                 self._publish_start()
-                self._service.spin(now + GATHERING, lockstep.is_complete)
+                self._service.spin(now + START_PERIOD, lockstep.is_complete)
             elif self._paused or lockstep.is_over():
-                self._service.spin(now + IDLE)
+                self._service.spin(now + IDLE_PERIOD)
             else:
                 self._tick_locked(lockstep)
                 if lockstep.is_degraded():
@@ -95,12 +95,12 @@ class Node:
         self._sensors.digest()
         self._backend.step(self._dt)
         self._watch.counters.tick_time.add((time.monotonic() - begin) * 1e3)
-        self._watch.look()
-        self._watch.tell()
+        self._watch.measure()
+        self._watch.publish_truth()
         lockstep.wait(self._bus.k)
 
     def _publish_start(self) -> None:
-        """How everything is at the beginning of a tick in lockstep, and that it begins."""
+        """Lockstep: read all parts and publish the start of the tick."""
         self._sensors.sample_now(self._backend.motors, self._guard.gates)
         self._publish_tick("lock")
 
@@ -113,14 +113,14 @@ class Node:
         self._sensors.begin(backend.motors)
         backend.step(self._dt)
         self._watch.counters.tick_time.add((time.monotonic() - start) * 1e3)
-        self._watch.look()
+        self._watch.measure()
         if self._read(start):
-            self._watch.tell()
+            self._watch.publish_truth()
 
     def _read(self, start: float) -> bool:
-        """Read every part in its time; False when the run has ended meanwhile."""
+        """Read every part at its sampling time; returns False if a reset has ended the run meanwhile."""
         shares, motors, gates = self._phases.next(), self._backend.motors, self._guard.gates
-        if self._period < SPREAD:
+        if self._period < MIN_SPREAD_PERIOD:
             self._sensors.sample(shares, motors, gates)
             return True
         run = self._bus.run
@@ -155,10 +155,10 @@ class Node:
     def _reset(self, request: Empty, key: str) -> Done:
         self._backend.reset(self._config.seed)
         self._bus.run, self._bus.k, self._bus.t = _new_run(), 0, 0
-        self._guard.renew()
+        self._guard.reset()
         self._phases = Phases(tuple(self._robot.parts), self._config.jitter, self._config.seed)
-        self._watch.forget()
-        self._sensors.forget()
+        self._watch.reset()
+        self._sensors.reset()
         if self._lockstep is not None:
             self._lockstep.begin()
         self._paused = False
@@ -169,7 +169,7 @@ class Node:
         if not self._paused:
             self._paused = True
             self._guard.hold_all(f"paused by {request.who}")
-            self._disturb("paused")
+            self._note_disturbance("paused")
             self._publish_tick("paused")
         return Done(v=VERSION)
 
@@ -183,12 +183,12 @@ class Node:
             self._backend.place(request.name, (x, y, z))
         except MobeeError as error:
             raise CallRefused("object", str(error)) from None
-        self._disturb(f"{request.name} placed by {request.who}")
+        self._note_disturbance(f"{request.name} placed by {request.who}")
         return Done(v=VERSION)
 
-    def _disturb(self, why: str) -> None:
+    def _note_disturbance(self, why: str) -> None:
         if self._lockstep is not None and self._bus.k > 0:
-            self._lockstep.spoil(why)
+            self._lockstep.note_flaw(why)
 
     def _meta(self, request: Empty, key: str) -> PartMeta:
         return part_meta(self._robot, key.split("/")[0])

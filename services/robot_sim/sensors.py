@@ -1,4 +1,4 @@
-"""Encoders: when each part is sampled, what it reports, and its metadata."""
+"""Encoders: sampling times of the parts, their states, and their metadata."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from services.common.bus import Bus
 from services.common.worlds import robot_hash
 from services.robot_sim.gate import Gate, Limits
 
-PHASES = 0.8  # share of the tick in which the phases lie
-AHEAD = 256  # ticks whose jitter is drawn at once
+PHASE_RANGE = 0.8  # phases are in the first 80 % of the tick
+DRAWN_TICKS = 256  # ticks whose jitter is drawn at once
 
 
 class Phases:
@@ -29,14 +29,14 @@ class Phases:
         """`jitter`: standard deviation, share of a tick."""
         self._parts, self._jitter = tuple(parts), jitter
         self._rng = np.random.default_rng([seed, 0x706861])
-        self._phases = self._rng.uniform(0.0, PHASES, len(parts))
+        self._phases = self._rng.uniform(0.0, PHASE_RANGE, len(parts))
         self._drawn: Iterator[list[float]] = iter(())
 
     def next(self) -> list[tuple[float, str]]:
         """(share of the tick, part) for one tick, in order of time; every share lies in 0..1."""
         times = next(self._drawn, None)
         if times is None:
-            jitter = self._jitter * self._rng.standard_normal((AHEAD, len(self._parts)))
+            jitter = self._jitter * self._rng.standard_normal((DRAWN_TICKS, len(self._parts)))
             self._drawn = iter(np.clip(self._phases + jitter, 0.0, 0.95).tolist())
             times = next(self._drawn)
         return sorted(zip(times, self._parts, strict=True))
@@ -60,7 +60,7 @@ def part_meta(robot: Robot, part: str) -> PartMeta:
 
 
 class Sensors:
-    """The newest sample of every part, and the streams that tell of it."""
+    """The newest sample of every part, and the streams that publish it."""
 
     def __init__(self, bus: Bus, robot: Robot, dt: float) -> None:
         self._bus, self._dt = bus, dt
@@ -70,20 +70,20 @@ class Sensors:
         n = len(robot.motors)
         self._q, self._dq, self._tau = np.zeros(n), np.zeros(n), np.zeros(n)
         self._shares = np.zeros(n)  # of the tick after which each motor was read
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """A new run."""
         self._hash = hashlib.sha256()
         self._statuses: dict[str, PartStatus] = {}
 
     @property
     def hash(self) -> str:
-        """Of q, dq, mode and gate of every part at every tick from 1 on, in lockstep."""
+        """SHA-256 over q, dq, mode and gate of every part at every tick from 1 on, in lockstep."""
         return self._hash.hexdigest()
 
     def begin(self, motors: Motors) -> None:
-        """The tick begins: remember where everything is."""
+        """Store positions and velocities at the start of the tick."""
         self._q_before, self._dq_before = motors.q, motors.motor_velocities
 
     def sample(self, shares: Sequence[tuple[float, str]], motors: Motors, gates: Mapping[str, Gate]) -> None:
@@ -99,7 +99,7 @@ class Sensors:
 
         for share, part in shares:
             self._shares[self._where[part]] = share
-        if len(shares) == len(self._where):  # at once: a quarter of the work
+        if len(shares) == len(self._where):  # all at once takes a quarter of the time
             read(slice(None), self._shares)
         else:
             for share, part in shares:
@@ -116,12 +116,12 @@ class Sensors:
             self._report(part, self._bus.t, gate)
 
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
-        """The tick begins: tell the control chain, once every part was read."""
+        """Publish the start of the tick, once every part has been read."""
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)
 
     def digest(self) -> None:
-        """Put what was read into the hash."""
+        """Add the samples of this tick to the hash."""
         for part, status in self._statuses.items():
             where = self._where[part]
             self._hash.update(self._q[where].tobytes() + self._dq[where].tobytes() + f"{status.mode} {status.gate}".encode())

@@ -23,27 +23,27 @@ from services.robot_sim.gate import Gate
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend, SolidContact
 
-MOVING = np.deg2rad(1.0)  # rad/s, below it a part is at rest
+REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 
 @dataclass(slots=True)
 class Stops:
-    """The stop that each part is in, and the worst of those that ended."""
+    """How fast held parts stop: the stop in progress of each part, and the largest time and distance of the stops that ended."""
 
     count: int = 0
     time_max: float = 0.0  # s
     distance_max: float = 0.0  # rad
     _commanded: dict[str, tuple[int, Array]] = field(default_factory=dict)  # ns and q at the last tick under command, of parts that moved
 
-    def obeys(self, part: str, now: int, q: Array, moves: bool) -> None:
-        """The part follows a command now [ns], at q (n,) rad, which nobody changes; `moves`: some motor is faster than MOVING."""
+    def note_command(self, part: str, now: int, q: Array, moves: bool) -> None:
+        """The part follows a command at time `now` [ns] and q (n,) rad, which must not change later; `moves`: it is not at rest."""
         if moves:
             self._commanded[part] = (now, q)
         else:
             self._commanded.pop(part, None)
 
-    def look(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
-        """(time [s], distance [rad]) since the last command, once, when the part has come to rest just now."""
+    def note_hold(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
+        """Time [s] and distance [rad] since the last command, if the part has just come to rest; else None."""
         if moves or part not in self._commanded:
             return None
         start, q_start = self._commanded.pop(part)
@@ -58,7 +58,7 @@ class Stops:
 
 
 class Counters:
-    """One instance a measurement; the ages count the oldest command of each tick, so no part hides behind another."""
+    """Counts of one measurement; the age of a tick is that of its oldest command."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -74,10 +74,10 @@ class Counters:
         self.tick_time = Percentiles()  # ms, gate to end of physics
 
     def count_gates(self, gates: Iterable[Gate]) -> None:
-        """Once a tick: ages and holds."""
+        """Count ages and holds, once per tick."""
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
-        ages = [gate.age for gate in owned if gate.mode != "hold"]  # a hold that is commanded is a hold too
+        ages = [gate.age for gate in owned if gate.mode != "hold"]  # a commanded hold counts as a hold
         if ages:
             self.ages[max(ages)] += 1
         if len(ages) < len(owned):
@@ -86,14 +86,14 @@ class Counters:
             self.armed_ticks += 1
 
     def count_contact(self, contact: SolidContact) -> None:
-        """Once a tick."""
+        """Count the deepest contact, once per tick."""
         if contact.depth > 0.0:
             self.solid_ticks += 1
         if contact.depth > self.deepest.depth:
             self.deepest = contact
 
     def count_gap(self, gap: float) -> None:
-        """Whenever it was measured, m."""
+        """Note a measured gap, m."""
         if gap >= 0.0 and (gap < self.gap_min or self.gap_min < 0.0):
             self.gap_min = gap
 
@@ -204,7 +204,7 @@ NOT_FINITE = 1  # fault bit
 
 
 class Watch:
-    """Looks at the backend after every step."""
+    """Measures the back-end after every step."""
 
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
         """`truth_period`: ticks between two messages of the truth."""
@@ -219,12 +219,12 @@ class Watch:
         self.counters = Counters()
         self.counters.missed_before = missed
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """A new run."""
         self.counters.stops.forget()
 
-    def look(self) -> None:
-        """Once a tick, after the physics."""
+    def measure(self) -> None:
+        """Count gates and contacts, once per tick, after the physics."""
         gates = self._guard.gates
         self.counters.count_gates(gates.values())
         contact = self._backend.contact()
@@ -234,24 +234,24 @@ class Watch:
         q = self._backend.motors.q
         if not math.isfinite(q.dot(q)) and not np.isfinite(q).all():  # the first costs a third of the second
             for gate in gates.values():
-                gate.fail(NOT_FINITE, "the physics has no finite answer any more")
+                gate.fail(NOT_FINITE, "the physics gives NaN or infinite positions")
         self._watch_stops(q)
 
     def _watch_stops(self, all_q: Array) -> None:
         now, stops = self._bus.t, self.counters.stops
-        fast = (np.abs(self._backend.motors.motor_velocities) > MOVING).tolist()
+        fast = (np.abs(self._backend.motors.motor_velocities) > REST_SPEED).tolist()
         for part, gate in self._guard.gates.items():
             where = self._robot.parts[part].slice
             q, moves = all_q[where], any(fast[where])
             if gate.mode != "hold":
-                stops.obeys(part, now, q, moves)
+                stops.note_command(part, now, q, moves)
                 continue
-            stopped = stops.look(part, now, q, moves)
+            stopped = stops.note_hold(part, now, q, moves)
             if stopped:
                 self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
 
-    def tell(self) -> None:
-        """Once a tick: the truth, where it is time and somebody listens."""
+    def publish_truth(self) -> None:
+        """Publish the truth, if it is due in this tick and has a subscriber."""
         if self._bus.k % self._truth_period:
             return
         gap = self._backend.gap()

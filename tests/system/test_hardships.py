@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -93,11 +94,10 @@ def call_keys() -> list[str]:
     return [*drives, *goals, *sims, *world, *every, keys.MODEL_JACOBIAN, keys.ESTOP_RESET, keys.meta("torso")]
 
 
-def test_random_bytes_on_every_key_are_refused_and_nothing_dies(live: tuple[Launch, Watcher]) -> None:
-    system, watcher = live
+def send_random_bytes(watcher: Watcher) -> None:
+    """On every key; all are refused, and no service ends."""
     rng = np.random.default_rng(11)
     pids = {who: watcher.pid(who) for who in SERVICES}
-    run = watcher.run
     watcher.close_streams()
     for _ in range(40):
         for key in stream_keys():
@@ -109,10 +109,26 @@ def test_random_bytes_on_every_key_are_refused_and_nothing_dies(live: tuple[Laun
     assert {who: watcher.pid(who) for who in SERVICES} == pids
     for who in ("robot_sim", "controller"):
         until(lambda who=who: sum(watcher.stat(who).rejected.values()) >= 40, 10.0, f"the refusals of {who}")
+
+
+def test_random_bytes_on_every_key_are_refused_and_nothing_dies(live: tuple[Launch, Watcher]) -> None:
+    system, watcher = live
+    run = watcher.run
+    send_random_bytes(watcher)
     with Watcher(system.endpoint) as again:
+        assert until(lambda: again.run, 20.0, "the second watcher hears the clock") == run
+        until(lambda: all(again.states[part] and again.states[part][-1].gate == "armed" for part in PARTS), 20.0, "every part obeys")
+        until(lambda: any(again.speed(part) > 0.1 for part in AGENTS), 40.0, "a part moves")
+
+
+@pytest.mark.untimed
+def test_random_bytes_do_not_disturb_lockstep_and_every_agent_learns_on(tmp_path: Path) -> None:
+    with running(tmp_path, "kinematic", "shared.mode=lock", "shared.patience=20") as (system, watcher):
+        until(lambda: watcher.k > 0, 60.0, "tick 1")
+        send_random_bytes(watcher)
         counts = {agent: len(transitions(system.run_dir)[agent]) for agent in AGENTS}
         until(lambda: all(len(transitions(system.run_dir)[a]) > counts[a] for a in AGENTS), 60.0, "every agent goes on")
-        assert until(lambda: again.run, 20.0, "the second watcher hears the clock") == run
+        assert watcher.stat("robot_sim").numbers["flaws"] == 0.0
 
 
 def test_without_launcher_and_router_the_robot_holds_and_everything_ends(live: tuple[Launch, Watcher]) -> None:

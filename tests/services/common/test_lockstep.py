@@ -148,7 +148,7 @@ def test_who_says_that_it_was_its_last_answer_is_not_missed(bench: Bench) -> Non
 
 def test_an_answer_for_want_of_something_is_told(bench: Bench) -> None:
     bench.begun().done("controller", 1, ok=False)
-    assert bench.told == [("controller", "lacked something at tick 1")]
+    assert bench.told == [("controller", "lacked an input at tick 1")]
 
 
 def test_whoever_answers_takes_part(bench: Bench) -> None:

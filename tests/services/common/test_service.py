@@ -123,7 +123,7 @@ def test_one_id_at_two_keys_is_two_calls(bus: Rig, probe: Program) -> None:
 
 
 def test_an_unknown_part_is_refused_with_those_there_are(bus: Rig, probe: Program) -> None:
-    with pytest.raises(CallFailed, match="no part 'tail'; there are torso, head, left_arm, right_arm") as caught:
+    with pytest.raises(CallFailed, match="no part 'tail'; this robot has torso, head, left_arm, right_arm") as caught:
         bus.call("tail/rpc/take", Take, Taken, instance="i")
     assert caught.value.code == "part"
 
@@ -161,7 +161,7 @@ def test_a_bad_request_is_counted_and_answered_with_its_reason(bus: Rig, probe: 
 
 def test_a_call_to_nobody_fails_at_once_and_says_so(bus: Rig) -> None:
     start = time.monotonic()
-    with pytest.raises(CallFailed, match="nobody/rpc/stat: nobody answers") as caught:
+    with pytest.raises(CallFailed, match="nobody/rpc/stat: no service answers") as caught:
         bus.call("nobody/rpc/stat", Empty, Stat, timeout=30.0)
     assert caught.value.code == "no_answer"
     assert time.monotonic() - start < 10.0

@@ -61,7 +61,7 @@ def test_model_and_controller_must_use_one_set_of_gains_and_terms() -> None:
     with pytest.raises(ConfigError, match="model default, controller published_2014"):
         check_gains(read_scenario("default", ["services.model.gains=default"]))
     check_gains(read_scenario("default", ['shared.terms=["my_forces:viscous"]']))
-    with pytest.raises(ConfigError, match="terms differ: model .*set it once, as shared.terms"):
+    with pytest.raises(ConfigError, match="terms differ: model .*set terms once, as shared.terms"):
         check_gains(read_scenario("default", ['services.controller.terms=["my_forces:viscous"]']))
 
 

@@ -46,7 +46,7 @@ def test_the_screen_fits_the_terminal(monkeypatch: pytest.MonkeyPatch, children:
     monkeypatch.setenv("COLUMNS", str(columns))
     monkeypatch.setenv("LINES", str(rows))
     screen = Screen("a test")
-    screen.tell("FAULT: " + "something went wrong " * 10)
+    screen.add("FAULT: " + "something went wrong " * 10)
     screen.draw(children, Path("runs/x"))
     lines = lines_of(terminal.getvalue())
     assert max(map(len, lines)) < columns
@@ -61,8 +61,8 @@ def test_where_not_all_news_fit_the_newest_stay(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setenv("LINES", "12")
     screen = Screen("a test")
     for number in range(5):
-        screen.tell(f"news {number} " + "and what it means " * 5)
-    screen.tell("all ready")
+        screen.add(f"news {number} " + "and what it means " * 5)
+    screen.add("all ready")
     screen.draw(children, Path("runs/x"))
     assert [line[9:] for line in lines_of(terminal.getvalue())[-2:-1]] == ["all ready"]
 
@@ -99,7 +99,7 @@ def test_state_restarts_and_page_are_on_the_screen(monkeypatch: pytest.MonkeyPat
 
 def test_in_a_pipe_news_are_lines_and_nothing_is_drawn(capsys: pytest.CaptureFixture[str], children: list[Child]) -> None:
     screen = Screen("a test")
-    screen.tell("model is ready")
+    screen.add("model is ready")
     screen.draw(children, Path("runs/x"))
     said = capsys.readouterr()
     assert said.err.endswith(" model is ready\n")

@@ -10,7 +10,7 @@ import pytest
 
 from services.common.service import Service
 from services.launcher.child import Child, Program
-from services.launcher.supervisor import FROZEN, FROZEN_LATE, Supervisor
+from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, Supervisor
 
 
 class Silent:
@@ -21,7 +21,7 @@ class Silent:
     def on_alive(self, handler: object) -> None: ...
 
 
-@pytest.mark.parametrize(("nice", "limit"), [(0, FROZEN), (10, FROZEN_LATE)])
+@pytest.mark.parametrize(("nice", "limit"), [(0, FROZEN_TIME), (10, FROZEN_TIME_NICE)])
 def test_what_yields_to_others_may_be_silent_for_longer(nice: int, limit: float) -> None:
     supervisor = Supervisor(cast("Service", Silent()), [], lambda text: None)
     child = Child(Program("monitor", (), Path("monitor.log"), nice=nice), phase="ready", unanswered=5, answered_at=time.monotonic())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bus_schema import Refused
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.gate import MARGIN, START, Admission, Gate, Order
+from services.robot_sim.gate import MAX_START, POSITION_MARGIN, Admission, Gate, Order
 from tests.services.robot_sim.gated import LIMITS, PART, ROBOT, WHERE, Gated, N
 
 VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]
@@ -350,14 +350,14 @@ def order(position: float) -> Order:
 @pytest.mark.parametrize("fine", [np.ones(N), FINE])
 def test_a_position_may_be_beyond_its_limit_by_as_much_as_the_motor_is_exact(fine: np.ndarray) -> None:
     admission = Admission("torso", replace(LIMITS, fine=fine), 0.01, None)
-    admission.check(order(0.9 * MARGIN * fine[0]), 1)
+    admission.check(order(0.9 * POSITION_MARGIN * fine[0]), 1)
     with pytest.raises(Refused, match="rad beyond a limit"):
-        admission.check(order(1.1 * MARGIN * fine[0]), 1)
+        admission.check(order(1.1 * POSITION_MARGIN * fine[0]), 1)
 
 
 @pytest.mark.parametrize("fine", [np.ones(N), FINE])
 def test_the_first_position_may_be_as_far_from_the_measured_one(fine: np.ndarray) -> None:
     admission, q = Admission("torso", replace(LIMITS, fine=fine), 0.01, None), np.zeros(N)
-    admission.check_step(q + 0.9 * START * fine, None, 1, q)
+    admission.check_step(q + 0.9 * MAX_START * fine, None, 1, q)
     with pytest.raises(Refused, match="a jump of"):
-        admission.check_step(q + 1.1 * START * fine, None, 1, q)
+        admission.check_step(q + 1.1 * MAX_START * fine, None, 1, q)

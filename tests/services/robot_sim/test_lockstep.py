@@ -176,7 +176,7 @@ def test_who_is_late_is_done_without_its_parts_hold_and_the_run_is_marked(bench:
     assert time.monotonic() - begin > 2.0 + 8 * TICK  # at the pace of the clock on the wall
     assert bench.newest(3).gate == "hold"
     assert bench.stat()["flaws"] == 1.0
-    bench.hears("not_repeatable", "controller has not answered tick 2 within 2 s")
+    bench.hears("not_repeatable", "controller did not answer tick 2 within 2 s")
 
     def is_waited_for() -> bool:
         """It counts again: after an answer no tick begins without the next."""

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.robot_sim.sensors import PHASES, Phases
+from services.robot_sim.sensors import PHASE_RANGE, Phases
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
 
@@ -17,7 +17,7 @@ def test_parts_have_different_phases_and_a_little_jitter() -> None:
         for share, part in tick:
             times[part].append(share)
     means = sorted(float(np.mean(t)) for t in times.values())
-    assert all(0.0 <= mean <= PHASES for mean in means)
+    assert all(0.0 <= mean <= PHASE_RANGE for mean in means)
     assert min(np.diff(means)) > 0.01
     for part in PARTS:
         assert np.std(times[part]) == pytest.approx(0.02, rel=0.3)

@@ -64,19 +64,19 @@ def test_the_deepest_contact_and_the_closest_gap_are_kept() -> None:
 
 def test_a_stop_is_timed_from_the_last_tick_under_command_to_rest() -> None:
     stops, q = Stops(), np.zeros(3)
-    stops.obeys("torso", 0, q, moves=True)
-    stops.obeys("torso", 10_000_000, q, moves=True)
-    assert stops.look("torso", 20_000_000, q + 0.01, moves=True) is None
-    assert stops.look("torso", 40_000_000, q + 0.02, moves=False) == pytest.approx((0.03, 0.02))
-    assert stops.look("torso", 50_000_000, q + 0.02, moves=False) is None
+    stops.note_command("torso", 0, q, moves=True)
+    stops.note_command("torso", 10_000_000, q, moves=True)
+    assert stops.note_hold("torso", 20_000_000, q + 0.01, moves=True) is None
+    assert stops.note_hold("torso", 40_000_000, q + 0.02, moves=False) == pytest.approx((0.03, 0.02))
+    assert stops.note_hold("torso", 50_000_000, q + 0.02, moves=False) is None
     assert stops.count == 1
 
 
 def test_a_part_that_rested_under_command_does_not_stop() -> None:
     stops = Stops()
-    stops.obeys("torso", 0, np.zeros(3), moves=True)
-    stops.obeys("torso", 10_000_000, np.zeros(3), moves=False)
-    assert stops.look("torso", 20_000_000, np.zeros(3), moves=False) is None
+    stops.note_command("torso", 0, np.zeros(3), moves=True)
+    stops.note_command("torso", 10_000_000, np.zeros(3), moves=False)
+    assert stops.note_hold("torso", 20_000_000, np.zeros(3), moves=False) is None
 
 
 ROBOT = load_robot("icub")
